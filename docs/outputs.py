@@ -47,7 +47,7 @@ class Session:
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
 
     def run(self, block: Block) -> str:
-        """What a block prints; raises ExampleFailed where it ends otherwise than its mark says."""
+        """The output of a block; raises ExampleFailed where the block ends otherwise than its mark says."""
         return self._python(block.text) if block.language == "python" else self._console(block)
 
     def _python(self, text: str) -> str:

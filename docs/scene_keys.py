@@ -136,7 +136,7 @@ def _unit(field: FieldInfo) -> str:
 
 
 def _default(field: FieldInfo, inner: type[BaseModel] | None) -> str:
-    """What holds where a scene does not have the key."""
+    """Text on the default of a key that a scene leaves out."""
     if field.is_required():
         return "*needed*"
     value = field.get_default(call_default_factory=True)
@@ -245,7 +245,7 @@ def controllers() -> list[str]:
 
 
 def _parameters(kind: type, but: tuple[str, ...]) -> list[str]:
-    """What a class says of its fields, and their defaults."""
+    """Lines of the reference on the fields of a class, and their defaults."""
     rows = [f"| `{each.name}` | `{_toml(each.default)}` |" for each in fields(kind) if each.name not in but]
     head = ["", "| parameter | default |", "|---|---|"] if rows else []
     return [" ".join((getdoc(kind) or "").split()), *head, *rows]

@@ -81,7 +81,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
 
 def beside(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:
-    """By how much the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
+    """Differences by which the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
     if measured is None or measured.speeds is None:
         return {}
     return {"rim less measured, rms [m/s]": measured.rms(stop.times, rims)}
@@ -108,7 +108,7 @@ def compared(results: dict[str, Result]) -> list[str]:
     return rows
 
 
-def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
+def lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Tables of one procedure: of the vehicle, and of its wheels."""
     rest = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
     unfinished = "" if stop.path.stands else f": not stopped by {stop.times[-1]:g} s, {rest}"
@@ -116,10 +116,10 @@ def lines(name: str, stop: Stop, told: dict[str, float], wheels: dict[str, np.nd
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]
     rows += [
-        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in told.items()
+        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in figures.items()
     ]
-    rows += [f"    ({NOT_CHECKED})"] if told else []
-    rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in told else []
+    rows += [f"    ({NOT_CHECKED})"] if figures else []
+    rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in figures else []
     names = WHEELS[: stop.path.turning.shape[1]]
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheels.items()]

@@ -132,7 +132,7 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
 
 
 def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
-    """What was fitted, and each figure beside the paper's."""
+    """Lines: the fitted parameters, and each figure beside the paper's."""
     lines = [
         f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
         f"  means of {options.last} stops, +- the scatter of one",

@@ -66,8 +66,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
-            def tell(done: Done, i: int = i) -> None:
-                progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
+            def tell(finished: Done, i: int = i) -> None:
+                progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
 
             store, blocks = folder / BLOCKS / options.names[i], Blocks(BLOCK)
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))

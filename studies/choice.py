@@ -114,9 +114,9 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
     }
 
 
-def _spent(progress: Progress, title: str, done: int, of: int, share: float) -> None:
+def _spent(progress: Progress, title: str, completed: int, of: int, share: float) -> None:
     """Pass on what is spent of a scene's search, after some of so many scenes."""
-    progress(title, (done + share) / of)
+    progress(title, (completed + share) / of)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -135,7 +135,7 @@ def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
 
 
 def search(scene: Any) -> str:
-    """How far the search for a scene's choice may go, beforehand."""
+    """Text on the number of runs that a search for a scene's choice may take."""
     if has_closed_form(scene):
         return "  choice     by a closed form, without runs in time"
     runs = Variants(scene, engine_of(scene, ()))
@@ -159,7 +159,7 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
 
 
 def _linear(scene: Any) -> SceneChoice:
-    """The same of a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
+    """The choice for a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
     from models.systems.ride.of_scene import told_by
@@ -196,7 +196,7 @@ def _linear(scene: Any) -> SceneChoice:
 
 
 def _answer(answered: SceneChoice) -> dict[str, Any]:
-    """What was chosen, and how right and how cheap that is."""
+    """Saved answer of a choice: its effects, their changes and the saving."""
     choice = answered.choice
     return {
         "system": answered.scene.system,

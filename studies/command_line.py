@@ -160,7 +160,7 @@ def _say_user_code(scene: Any) -> None:
 
 
 def _search(scene: Any) -> list[str]:
-    """What the search for a choice may take, where a scene asks for one."""
+    """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
     from studies.choice import search
 
     return [] if scene.tolerance is None else [search(scene)]
@@ -261,7 +261,7 @@ def price(
 @app.command()
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
-    two: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
+    second: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
     out: Out = None,
     shift: Annotated[
         float | None,
@@ -279,16 +279,16 @@ def compare(
     from studies.command.comparison import compare as differences
     from studies.command.comparison import report
 
-    if measured.against(first, two):
+    if measured.against(first, second):
         for run in measured.runs_of(first).values():
-            measured.overlay(run, two, shift)  # before a folder is made
+            measured.overlay(run, second, shift)  # before a folder is made
         folder = _folder("compare", None, "", out, None)
-        return _finish(lambda progress: measured.report(first, two, folder, shift), folder, as_json)
+        return _finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
     if shift is not None:
         raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
-    differences(first, two)  # before a folder is made
+    differences(first, second)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
-    _finish(lambda progress: report(first, two, folder), folder, as_json)
+    _finish(lambda progress: report(first, second, folder), folder, as_json)
 
 
 @app.command()
@@ -429,7 +429,7 @@ def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
 
 
 def study(scene: str) -> None:
-    """What ``python studies/NAME.py`` does: ``twinrig run`` on that study's scene, with the same options."""
+    """Run a study's scene as ``python studies/NAME.py`` does: as ``twinrig run``, with the same options."""
     sys.argv = [sys.argv[0], "run", scene, *sys.argv[1:]]
     main()
 

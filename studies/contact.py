@@ -153,7 +153,7 @@ SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
 def _pressure(body: Contact) -> str:
-    """Which pressure the cells have."""
+    """Text that names the pressure distribution of the cells."""
     if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
         return f"FASTSIM's pressure ({body.choices['bound']} bound)"
     return "pressure"

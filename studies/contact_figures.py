@@ -65,7 +65,7 @@ def _rectangles(f: Fields) -> list[Array]:
     return list(np.array(corners).transpose(2, 0, 1))
 
 
-def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
+def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
     greatest = MEGA * max(float(f.pressure.max()) for f in patches)
     for f in patches:
         cells = PolyCollection(
@@ -75,7 +75,7 @@ def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
         axis.add_collection(cells)
     axis.autoscale_view()
     axis.figure.colorbar(cells, ax=axis, location="left", label="pressure [MPa]", shrink=0.8, aspect=25)
-    axis.set_title(f"{what[0].upper()}{what[1:]},\nlargest {greatest:,.0f} MPa")
+    axis.set_title(f"{quantity[0].upper()}{quantity[1:]},\nlargest {greatest:,.0f} MPa")
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:

@@ -41,7 +41,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def told(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """What is printed of ``rows`` rows, of which some are wrong, from the file ``name``."""
+    """Printed lines on ``rows`` rows, of which some are wrong, from the file ``name``."""
     if rows == 0:
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"

@@ -85,8 +85,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
     times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
 
-    def tell(done: Done) -> None:
-        progress(f"reference: {done}", done.done / done.paths)
+    def tell(finished: Done) -> None:
+        progress(f"reference: {finished}", finished.done / finished.paths)
 
     with TemporaryDirectory() as name, _workers(options) as pool:
         largest = write_measurement(measured, Path(name), period)

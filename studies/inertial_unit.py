@@ -206,8 +206,8 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
     ]
 
 
-def _percent(part: float) -> str:
-    return f"{100 * part:.2g}" if part < 1 else f"{100 * part:,.0f}"
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g}" if share < 1 else f"{100 * share:,.0f}"
 
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:

@@ -236,7 +236,7 @@ def _numbers(source: Source) -> dict[str, Any]:
 
 
 def _lines(source: Source, p: Parameters) -> list[str]:
-    """Verdict on the readings, then a line per way."""
+    """Lines: the verdict on the readings, then one for each method."""
     assert source.quality is not None
     numbers, kind = _numbers(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
@@ -272,7 +272,7 @@ def _verdict(quality: Quality) -> str:
 
 
 def _closing(options: Options) -> list[str]:
-    """What the filters take, and what a tilt costs."""
+    """Closing lines: time that the filters take, and the damage error by a tilt."""
     far = float(tilt_displacement(TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "

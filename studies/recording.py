@@ -29,7 +29,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     """Do all of it; the page is written even where errors in the recording stop the run."""
     from studies.recording_page import write
 
-    result = run_scene(scene, engines[-1], folder, progress, whole=True, error=scene.error)
+    result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
     exam: Examination = result.detail
     result.save(folder / "recording.nc")
     page = write(exam, folder / "recording.html", result)
@@ -49,7 +49,8 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _failed(exam: Examination) -> dict[str, str]:
-    """What makes the command end with 1: errors in the recording, or a failed run of what was to be handed on."""
+    """Reasons why the command ends with code 1: errors in the recording, or a failed run of what was to be handed
+    on."""
     if exam.stopped:
         count = sum(finding.weight == "error" for finding in exam.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}

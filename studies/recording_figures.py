@@ -113,7 +113,8 @@ def _means(evidence: Evidence, path: Path) -> Path:
 
 
 def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
-    """What a channel reads by what it should, by frequency: a delay is a slope of the phase, a factor a level."""
+    """Figure of a channel's reading divided by its true value, over frequency: a delay is a slope of the phase, a
+    factor a level."""
     agreement = evidence.agreement
     assert agreement is not None
     for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found

@@ -89,7 +89,7 @@ def _figures(exam: Examination, folder: Path) -> dict[str, Any]:
 
 
 def _forces(exam: Examination, outcome: Outcome, folder: Path) -> dict[str, Any]:
-    """What the page says of section forces: those that change, how many do not, and figures of the first ones."""
+    """The page's section on section forces: those that change, how many do not, and figures of the first ones."""
     moving = {answer: counts for answer, counts in exam.counted.items() if counts.greatest - counts.least > STILL}
     first, inside = list(moving)[:DRAWN], set(exam.rig.places.connectors)
     return {

@@ -112,7 +112,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """The scene's own, then simpler ones; a wheel in the middle is on neither of two tracks that are independent."""
+    """Cases of correlation: the scene's, then simpler ones; a wheel in the middle is on neither of two tracks that are
+    independent."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
@@ -166,7 +167,7 @@ def _answer(sweep: Sweep) -> dict[str, Any]:
 def _table(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
-    """What each output does at one speed, and how wrong simpler roads are."""
+    """Table of each output's standard deviation at one speed, and the errors of simpler roads."""
     (name, first), *others = sweeps.items()
     width = max(map(len, first.outputs))
     heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC))
@@ -209,7 +210,8 @@ def _change(other: float, value: float) -> str:
 
 
 def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free: float | None) -> list[str]:
-    """How often each travel passes the free travel (m); how fast it moves where the vehicle file asks for its rate."""
+    """Lines on how often each travel passes the free travel (m), and on its rate where the vehicle file asks for its
+    rate."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []

@@ -90,12 +90,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
 
 
-def _runs(scene: RideScene, rest: ReducedScene) -> dict[str, Result]:
+def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     """Deviations of the scene and of what a choice leaves of it, with their errors and what they take for granted."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
-    vehicle = replace(rest.vehicle, limits=rest.limits)
-    if rest != ReducedScene.whole(scene):
-        results["what is left"] = run_scene(rest.ride, "reference", vehicle=vehicle, error=scene.error)
+    vehicle = replace(reduced.vehicle, limits=reduced.limits)
+    if reduced != ReducedScene.complete(scene):
+        results["what is left"] = run_scene(reduced.ride, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 
@@ -105,7 +105,7 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
 
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
-    """What was chosen, and how right and how cheap that is."""
+    """Saved answer of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted,
         "confirmed": choice.confirmed,
@@ -138,8 +138,8 @@ def _save(
     results: dict[str, Result],
     folder: Path,
 ) -> None:
-    """What leaving out each effect alone changes, predicted and confirmed, and whether it was left out; a CSV of these
-    and one of the energy activity of every element beside."""
+    """Save the changes by leaving out each effect alone, predicted and confirmed, and whether it was left out; a CSV of
+    these and one of the energy activity of every element beside."""
     import pandas as pd
 
     told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in alone]}
@@ -207,7 +207,7 @@ def choice_figure(
 
 
 def _activity(axis: Any, watts: dict[str, float]) -> None:
-    """Shares of the finite ones; an inertia under white noise has none."""
+    """Plot the shares of the elements' finite watts; an inertia under white noise has none."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}

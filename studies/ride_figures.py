@@ -204,19 +204,19 @@ def detail_figure(
 def drive_figure(
     varied: VaryingSpeed,
     alone: np.ndarray,
-    shown: Sequence[str],
+    drawn_outputs: Sequence[str],
     kinds: Mapping[str, tuple[str, str]],
     above: Heading,
     path: Path,
 ) -> None:
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
-    groups = list(dict.fromkeys(kinds[name] for name in shown))
+    groups = list(dict.fromkeys(kinds[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = plt.subplots(
         len(heights), 1, figsize=(WIDE, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
-        columns = {name: varied.names.index(name) for name in shown if kinds[name] == (kind, unit)}
+        columns = {name: varied.names.index(name) for name in drawn_outputs if kinds[name] == (kind, unit)}
         pairs = {name: np.concatenate([varied.deviation[:, i], alone[:, i]]) for name, i in columns.items()}
         for label, both in _distinct(pairs).items():
             exact, quasi = np.split(both, 2)

@@ -82,7 +82,7 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
 
 
 def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
-    """What was found, as plain numbers in SI; None where there is no critical speed."""
+    """Critical speed and figures of the paths as plain numbers in SI; None where there is no critical speed."""
     return {
         "klingel": klingel(wheelset),
         "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
@@ -132,7 +132,7 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
 
 
 def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
-    """How each path ends, how far the implementations are apart, and where the energy goes."""
+    """Lines on how each path ends, how far the implementations differ, and where the energy goes."""
     if not paths:
         return []
     (name, first), *others = paths.items()

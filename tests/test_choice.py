@@ -147,7 +147,7 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     own.system.WINDOWED = True
     monkeypatch.setattr(choose, "Variants", lambda scene, engine: own)
     found = Chooser(None, "", ["q"], 0.05)
-    assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.own == 2
+    assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.step_factor == 2
 
 
 def hub_forces(**more):

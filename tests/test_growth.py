@@ -55,7 +55,7 @@ def test_tangent_of_a_wrong_model_and_of_wrong_forces(folder):
     assembly = assemble(force_scene(folder, duration=2.0, step=1e-3))
     p = assembly.parameters
     other = p.model_copy(update={"I": p.I * 1.0001, "k3": p.k3 * 0.9999})
-    _, columns = path_of(assembly).carry(np.zeros((1, 8)), other=other)
+    _, columns = path_of(assembly).carry(np.zeros((1, 8)), wrong_parameters=other)
     found = states(replace(assembly, parameters=other)) - states(assembly)
     assert np.abs(found - columns[:, 0]).max() < 1e-3 * np.abs(found).max()  # second order in 1e-4
     pushes = np.full((3 * 2000, 1, 2), [[0.01, -0.02]])

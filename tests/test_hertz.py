@@ -105,7 +105,7 @@ def test_aspect_solves_its_equation(curvatures):
         (lambda: by_load(1.0, 1.0, "1e4", PAIR), r"load = '1e4': must be a number"),
         (lambda: by_load(1.0, 1.0, np.ma.masked_less([1.0, -1.0], 0.0), PAIR), r"load.*must be a number"),
         (lambda: by_load(1.0, 1.0, np.array([1.0 + 1.0j]), PAIR), r"load.*must be a number"),
-        (lambda: Pair(STEEL, 0.28), r"pair.two = 0.28: must be a Material"),
+        (lambda: Pair(STEEL, 0.28), r"pair.rail = 0.28: must be a Material"),
         (lambda: Material(E=2.1e5, nu=0.28), r"E = 210000.0: must be 1e\+06 or more \(Young's modulus, not in MPa"),
         (lambda: Material(E=2.1e11, nu=0.6), r"nu = 0.6: must be at most 0.5"),
         (lambda: Material(E=float("nan"), nu=0.3), r"E = nan"),
@@ -125,7 +125,7 @@ def test_combined_constants():
     unlike = Pair(STEEL, Material(E=7e10, nu=0.33))
     assert (1 - unlike.nu) / unlike.G == pytest.approx(1 / unlike.modulus, rel=1e-14)
     # Dundurs' constant of steel on aluminium, from his own formula with kappa = 3 - 4 nu
-    (one, two), (k1, k2) = (unlike.one.G, unlike.two.G), (3 - 4 * 0.28, 3 - 4 * 0.33)
+    (one, two), (k1, k2) = (unlike.wheel.G, unlike.rail.G), (3 - 4 * 0.28, 3 - 4 * 0.33)
     dundurs = (two * (k1 - 1) - one * (k2 - 1)) / (two * (k1 + 1) + one * (k2 + 1))
     assert unlike.mismatch == pytest.approx(dundurs * (1 - unlike.nu), rel=1e-13)
 
@@ -135,7 +135,7 @@ def test_unlike_pairs_are_refused_only_where_they_rub():
     assert by_load(1.0, 1.0, 1e4, unlike).a > 0.0
     near.require_likeness()
     assert near.quasi_identity_error(0.3) == pytest.approx(0.042, abs=1e-3)  # 2 |K| / mu, K = -0.0063
-    assert near.quasi_identity_error(0.3) == Pair(near.two, near.one).quasi_identity_error(0.3)
+    assert near.quasi_identity_error(0.3) == Pair(near.rail, near.wheel).quasi_identity_error(0.3)
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
         unlike.require_likeness()
     pressed = interpenetrating(by_load(1.0, 1.0, 1e4, unlike), unlike)  # the simplified theory, too, leaves K out

@@ -255,11 +255,11 @@ SPACE = {
     "centre beyond the front axle": (lambda v: body(v, "body", position=(1.6, 0.0, 0.6)), "load"),
     "centre at the left wheels": (lambda v: body(v, "body", position=(0.0, 0.55, 0.6)), "load"),
     "a strut on the other side": (
-        lambda v: spring(v, "front left", point_one=(1.156, -0.69, 0.344), point_two=(1.156, -0.69, 0.344)),
+        lambda v: spring(v, "front left", first_point=(1.156, -0.69, 0.344), second_point=(1.156, -0.69, 0.344)),
         "strut",
     ),
     "a strut in mm": (
-        lambda v: spring(v, "front left", point_one=(1156.0, 0.69, 0.344), point_two=(1156.0, 0.69, 0.344)),
+        lambda v: spring(v, "front left", first_point=(1156.0, 0.69, 0.344), second_point=(1156.0, 0.69, 0.344)),
         "strut",
     ),
     "a corner without a strut": (

@@ -22,7 +22,7 @@ def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
     first, second = (cells._crossed(duration)[1] for duration in (front, rear))
     modes = np.vstack([first[:, : 2 * MODES], second[:, 2 * MODES :]])
     A = block_diag(*(duration * cells.at_rest + cells.length * cells.per_speed for duration in (front, rear)))
-    B = np.vstack(cells.one.B) * cells.length**0.5
+    B = np.vstack(cells.at_unit_speed.B) * cells.length**0.5
     n = len(A)
     block = expm(np.block([[-A, B @ B.T], [np.zeros((n, n)), A.T]]))
     joint = block[n:, n:].T @ block[:n, n:]

@@ -32,7 +32,7 @@ def turned():
     whole = twin()
     frames = {"left mount.x": "engine", "rear mount.z": "engine", "front left": "fl"}
     springs = tuple(
-        replace(s, frame=frames[s.name], point_two=tuple(np.add(s.point_two, (0.1, -0.2, 0.3))))
+        replace(s, frame=frames[s.name], second_point=tuple(np.add(s.second_point, (0.1, -0.2, 0.3))))
         if s.name in frames
         else s
         for s in whole.springs

@@ -10,7 +10,7 @@ import pytest
 from models.advice.choice.variants import system_of
 from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import Changed, price_list
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.reduced import FullScene
 from models.core.errors import InputError
 from models.core.scene_effects import beside, listing, own_table, rebuilt, without
 from models.core.systems import SYSTEMS, load
@@ -99,7 +99,7 @@ NEW = {
         """
     from models.contact.material import Material, Pair
 
-    soft = (Material(E=p.share * body.E, nu=body.nu) for body in (built.pair.one, built.pair.two))
+    soft = (Material(E=p.share * body.E, nu=body.nu) for body in (built.pair.wheel, built.pair.rail))
     return replace(built, pair=Pair(*soft))
 """,
         beside=("saturation",),
@@ -248,14 +248,14 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace("COST", 'NEEDS = ("delay", "dampers")\nCOST', 1))
     scene = load(SCENES / "ride_choice.toml")
-    held = ReducedScene.whole(own := beside(scene, "dampers", "tread"))
+    held = ReducedScene.complete(own := beside(scene, "dampers", "tread"))
     there = {effect.name: effect for effect in effects_of(held)}
     assert {"dampers", "tread"} <= there.keys() and there["delay front to rear"].needs == ("tread",)
     assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([there["dampers"]])
-    whole = Whole(held, 20.0)
+    whole = FullScene(held, 20.0)
     rest = whole.reduced(without_effects(held, [there["dampers"], there["tyre damping"], there["tread"]]))
-    other = ReducedScene.whole(scene)
-    known = Whole(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
+    other = ReducedScene.complete(scene)
+    known = FullScene(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
     monkeypatch.setattr(effects_of_ride, "STEPS", 20)
     monkeypatch.setattr(effects_of_ride, "absent", lambda scene: ("gravity_and_preload", "drag", "weighting"))

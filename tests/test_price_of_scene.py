@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from models.advice.price import Answer, Ladder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
-from models.advice.price.systems.pitch_plane import own
+from models.advice.price.systems.pitch_plane import priced_scene
 from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import at
 from models.core.assumptions import Assumption, judged
@@ -153,7 +153,7 @@ RELEASE = {"title": "release", "run": {"duration": 0.2}, "start": {"z3": 0.02}, 
 
 
 def test_a_recommendation_holds_beside_another_solver():
-    scene = own(build(RELEASE), None, ("mujoco",))
+    scene = priced_scene(build(RELEASE), None, ("mujoco",))
     found = recommend(scene, 0.5)
     for one in found.winners.values():
         assert true_errors(scene, [one.tried.setting])[one.tried.setting] == pytest.approx(one.error, rel=0.2)
@@ -178,7 +178,7 @@ def test_what_cannot_be_asked_is_one_message(tolerance, quantity, message):
 
 
 def test_a_tolerance_below_rounding_is_refused():
-    scene = own(build(RELEASE), "z3", ("reference",))
+    scene = priced_scene(build(RELEASE), "z3", ("reference",))
     with pytest.raises((InputError, RunFailed), match=r"finer than|differ by"):
         recommend(scene, 1e-17)
 
@@ -195,7 +195,7 @@ class Fixed:
 def test_an_integrator_of_ones_own_is_priced_by_its_tolerance():
     name = f"{__name__}:Fixed"
     register(name)
-    found = recommend(own(build(RELEASE), None, (name,)), 0.5)
+    found = recommend(priced_scene(build(RELEASE), None, (name,)), 0.5)
     best = found.winners["", "seconds"]
     assert best.tried.setting.adaptive and 0.0 < best.error <= 0.5
     assert len({one.setting.value for one in found.tried}) > 1

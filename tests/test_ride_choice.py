@@ -11,7 +11,7 @@ from models.advice.ride_choice.choose import Chooser
 from models.advice.ride_choice.march import March, stable_step
 from models.advice.ride_choice.marched import confirms, marched
 from models.advice.ride_choice.neighbourhood import Neighbourhood, changed
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.errors import InputError
 from models.engines.spatial_protocol import build as build_engine
@@ -45,7 +45,7 @@ def named(scene):
 
 def deviations(scene, *names):
     own = named(scene)
-    return stationary(Whole(scene, SPEED).reduced(without(scene, [own[name] for name in names])).system).deviation
+    return stationary(FullScene(scene, SPEED).reduced(without(scene, [own[name] for name in names])).system).deviation
 
 
 def of_vehicle(scene, vehicle):
@@ -54,7 +54,7 @@ def of_vehicle(scene, vehicle):
 
 def test_nothing_left_out_is_the_system_itself():
     scene = held("seven_freedoms", 100.0)
-    whole = Whole(scene, SPEED)
+    whole = FullScene(scene, SPEED)
     own = excited(whole.linear, whole.excitation, SPEED)
     assert np.abs(whole.full.system.A - own.A).max() < 1e-11 * np.abs(own.A).max()
     assert np.abs(whole.full.left @ whole.full.T - np.eye(len(own.A))).max() < 1e-12
@@ -114,7 +114,7 @@ def test_what_saves_no_calls_stays():
 
 def test_identity_and_screen_of_a_small_change():
     scene = held("seven_freedoms", 50.0)
-    whole, rows = Whole(scene, SPEED), [0, 2, 4]
+    whole, rows = FullScene(scene, SPEED), [0, 2, 4]
     screen, effect = Screen(whole.full, rows), named(scene)["tyre damping"]
     rest = whole.reduced(without(scene, [effect]))
     two, one = screen.identity(rest)
@@ -166,7 +166,7 @@ def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding()
         },
         "t",
     )
-    own = ReducedScene.whole(scene)
+    own = ReducedScene.complete(scene)
     with pytest.raises(InputError, match="finite standard deviation above zero"):
         Chooser(own, [SPEED], ["pitch acceleration"], 0.02)
     assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().kept
@@ -269,7 +269,7 @@ def test_spectra_near_a_scene_are_those_of_the_exact_solve():
         found = near.changes(rest, factors)
         for i in (0, len(near.speeds) // 2):
             full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (drew.scene, rest))
-            whole = Whole(full, float(near.speeds[i]))
+            whole = FullScene(full, float(near.speeds[i]))
             exact = np.sqrt(confirmed(whole.reduced(left), rows) / confirmed(whole.full, rows)) - 1
             assert found[i] == pytest.approx(exact, abs=2e-4)  # what the panels leave
     assert abs(near.changes(rest, corner)[:, 0]).max() > abs(near.changes(rest)[:, 0]).max()
@@ -278,7 +278,7 @@ def test_spectra_near_a_scene_are_those_of_the_exact_solve():
 def test_a_run_does_what_the_closed_form_of_runs_says():
     """Steps of 80 % of the stable one change deviations by per cents; a planted 10 % longer step is seen."""
     scene = held("half_car", cutoff=50.0)
-    march = March(Whole(scene, SPEED).full, SPEED, (0, 2), ())
+    march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
     step = 0.8 * march.longest
     assert confirms(march, step)
     run = marched(march, step)
@@ -294,7 +294,7 @@ def test_a_run_does_what_the_closed_form_of_runs_says():
 def test_two_closed_forms_of_runs_agree(road):
     """A sum over frequencies and a covariance of steps, under white noise from damped tyres, too."""
     scene = held("half_car", tyre_damping=300.0, **road)
-    march = March(Whole(scene, SPEED).full, SPEED, (0, 2), ())
+    march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
     for share in (0.9, 0.2):
         step = share * march.longest
         assert Sampled(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)

@@ -83,7 +83,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
 
 def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
     vehicle = load_vehicle("r19_ride")
-    names = frozenset(spring.name for spring in vehicle.springs if spring.one == "engine")
+    names = frozenset(spring.name for spring in vehicle.springs if spring.first_body == "engine")
     scene = quarter_car(vehicle={"file": "r19_ride"}, quantities=["body centre"])
     found = left(ReducedScene(scene, vehicle, rigid=names), {})
     assert len(found.coordinates()) == len(vehicle.coordinates()) - 6
@@ -103,7 +103,9 @@ def test_few_copies_find_what_all_of_them_tell():
     scene = quarter_car(options={"copies": 48, "lasting": 2.0})
     own = Chooser(scene, "reference", scene.quantities, scene.tolerance)
     copies = [one.variants.scene.samples.copies for one in (own.screen, own.teller, own.whole)]
-    assert copies == [12, 48, 48] and own.screen.variants.scene.times == own.teller.variants.scene.times == own.own
+    assert (
+        copies == [12, 48, 48] and own.screen.variants.scene.times == own.teller.variants.scene.times == own.step_factor
+    )
 
 
 def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):

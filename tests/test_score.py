@@ -11,12 +11,12 @@ from models.drift.score import (
     CHANNELS,
     Errors,
     Limits,
-    Own,
+    RunFigures,
     blind_verdict,
     consistent,
     errors,
+    figures_of_run,
     low_pass,
-    own_figures,
     rms,
     section_forces,
     verdict,
@@ -27,7 +27,7 @@ from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
 
 DURATION = 4.0
-OWN = Own(
+FIGURES = RunFigures(
     moment_rms=1.0,
     moment_max=3.0,
     moment_share=0.5,
@@ -74,7 +74,7 @@ def test_artificial_moment_is_the_multiplier_of_a_guided_run(engine, place):
     folder, _ = place
     found, p = run(folder, {"prescribed_pitch": {"file": "pitch.csv"}}, engine, I=580.0)
     # generalised-alpha's multiplier and states err by 1e-3 of I pitch'', 4 N m in 150; the others by less
-    assert own_figures(found, p).moment_rms == pytest.approx(rms(found["enforced_moment"]), rel=0.03)
+    assert figures_of_run(found, p).moment_rms == pytest.approx(rms(found["enforced_moment"]), rel=0.03)
 
 
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
@@ -83,7 +83,7 @@ def test_artificial_moment_is_that_of_the_spring(engine, place):
     found, p = run(folder, {"pitch_spring": {"stiffness": 300.0, "damping": 50.0}}, engine)
     spring = 300.0 * found["pitch"] + 50.0 * found["pitch_rate"]
     # the balance over a step errs by some 1e-4 of I pitch'', 0.3 N m in 15
-    assert own_figures(found, p).moment_rms == pytest.approx(rms(spring), rel=0.02)
+    assert figures_of_run(found, p).moment_rms == pytest.approx(rms(spring), rel=0.02)
 
 
 @pytest.mark.parametrize("frame", ["inertial", "body"])
@@ -92,7 +92,7 @@ def test_a_free_run_has_no_artificial_moment(frame, place):
     scene = force_scene(folder, duration=DURATION)
     wheels = scene.effects["wheel_forces"].model_copy(update={"frame": frame})
     found = simulate(scene.model_copy(update={"effects": {"wheel_forces": wheels}}), "reference")
-    own = own_figures(found, scene.vehicle_parameters())
+    own = figures_of_run(found, scene.vehicle_parameters())
     # rounding of the balance's order-4 rule on forces that are linear between samples
     assert own.moment_share_band < 1e-4 and own.force_share_band < 1e-4
 
@@ -154,7 +154,7 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     ],
 )
 def test_verdict_with_the_truth(own, wrong, effects, word):
-    assert verdict(replace(OWN, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
+    assert verdict(replace(FIGURES, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_verdict_with_the_truth(own, wrong, effects, word):
     ],
 )
 def test_verdict_without_the_truth(own, effects, more, word):
-    assert blind_verdict(replace(OWN, **own), effects, 10.0, Limits(), **more).word == word
+    assert blind_verdict(replace(FIGURES, **own), effects, 10.0, Limits(), **more).word == word
 
 
 @pytest.mark.parametrize(("mean", "expected"), [(1.0, True), (0.97, True), (1.3, False), (0.9, False)])
@@ -189,7 +189,7 @@ def test_a_filter_is_consistent_where_its_surprises_are_its_own(mean, expected, 
 
 
 def test_reasons_name_what_is_wrong():
-    found = verdict(replace(OWN, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
+    found = verdict(replace(FIGURES, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
     assert found.reason == "pitch wrong by 0.3 rad; artificial moment 20% of I pitch''"
 
 
@@ -197,7 +197,7 @@ def test_reasons_name_what_is_wrong():
 def test_rows_that_are_too_far_apart_are_refused(spacing, place):
     _, truth = place
     with pytest.raises(InputError, match="output_step"):
-        own_figures(truth.every(spacing), road_scene().vehicle_parameters())
+        figures_of_run(truth.every(spacing), road_scene().vehicle_parameters())
 
 
 def test_runs_at_other_times_are_refused(place):

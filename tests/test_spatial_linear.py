@@ -121,7 +121,10 @@ def deformations(vehicle, q):
             return place(vehicle, name, point, x, poses)
 
         own = dict(zip(vehicle.coordinates(), x.T, strict=True))
-        springs = [(where(s.two, s.point_two) - where(s.one, s.point_one)) @ s.axis for s in vehicle.springs]
+        springs = [
+            (where(s.second_body, s.second_point) - where(s.first_body, s.first_point)) @ s.axis
+            for s in vehicle.springs
+        ]
         risen = [(where(b.left, b.point_left) - where(b.right, b.point_right))[:, 2] for b in vehicle.bars]
         tracks = [b.point_left[1] - b.point_right[1] for b in vehicle.bars]
         bars = [own[b.body, "rx"] - up / track for b, up, track in zip(vehicle.bars, risen, tracks, strict=True)]

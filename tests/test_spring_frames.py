@@ -59,7 +59,7 @@ def test_the_closed_form_knows_frames():
     """
     loaded = replace(cut(twin(), "body").whole, side_forces=(), bars=())
     moved = tuple(
-        replace(s, point_two=tuple(np.add(s.point_two, (0.1, -0.2, 0.3))), frame="engine" if i % 2 else "body")
+        replace(s, second_point=tuple(np.add(s.second_point, (0.1, -0.2, 0.3))), frame="engine" if i % 2 else "body")
         for i, s in enumerate(loaded.springs)
     )
     car = replace(loaded, springs=moved)

@@ -108,7 +108,7 @@ def test_every_table_is_built():
 def test_a_direction_of_its_own_beside_two_points():
     vehicle = built(FULL.replace("stiffness = 3e4 }", "stiffness = 3e4, direction = [0, 0, 1] }"))
     (tilted,) = (spring for spring in vehicle.springs if spring.name == "tilted")
-    assert tilted.axis == (0, 0, 1) and tilted.point_two == (-1.4, 0.5, 0.3)
+    assert tilted.axis == (0, 0, 1) and tilted.second_point == (-1.4, 0.5, 0.3)
 
 
 def test_children_may_come_before_their_parents():

@@ -1,4 +1,4 @@
-"""What users call: load, run, compare, price, choose, export, validate; thin, on what the command line has, too.
+"""Functions for users: load, run, compare, price, choose, export, validate; thin layers on what the command line uses.
 
 Heavy packages are imported by the functions that use them.
 """

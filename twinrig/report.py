@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What ``compare``, ``price``, ``choose``, ``export`` and ``validate`` answer.
+    """Report that ``compare``, ``price``, ``choose``, ``export``, ``validate`` return: printed lines, values, detail.
 
     lines : as the command line prints them; values : plain values, those of ``--json``; detail : in the types of the
     module that computed it.

@@ -26,7 +26,7 @@ class Scene:
 
     @property
     def title(self) -> str:
-        """What the scene shows."""
+        """Title of the scene."""
         return str(self.checked.title)
 
     @property
@@ -42,7 +42,8 @@ class Scene:
         return of_table(self.table, self.file, self.folder, changes)
 
     def plan(self) -> str:
-        """What will be computed: bodies, effects, channels, what each engine builds, what all that assumes."""
+        """Text of what the scene will compute: bodies, effects, channels, what each engine builds, what all that
+        assumes."""
         from studies.command.asked import plan_of
 
         return str(plan_of(self.checked).describe(self.checked))

@@ -1,1 +1,1 @@
-"""What twinrig claims, measured: cases, their rows, and the report that reads them."""
+"""Validation of twinrig's claims: cases, their rows, and the report that reads them."""

@@ -77,7 +77,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
 
 
 def _told(rows: Iterator[Row]) -> Iterator[Row]:
-    """The same rows, each printed as it comes: a slow engine takes minutes."""
+    """The rows, each printed as soon as it is there: a slow engine takes minutes."""
     for row in rows:
         print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}", flush=True)
         yield row

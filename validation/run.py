@@ -185,7 +185,8 @@ def _lasting(name: str) -> float:
 
 
 def _in(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a process of the pool makes of this, which has its imports done; this process, once one of them died."""
+    """Value of a function that a prepared process of the pool runs; this process runs it once a process of the pool
+    died."""
     try:
         return pool.submit(function, *arguments).result()
     except BrokenProcessPool:

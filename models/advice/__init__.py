@@ -1,1 +1,1 @@
-"""What users ask before they decide: which setting is the cheapest, and which effects are needed."""
+"""Advice before a decision: which setting is the cheapest, and which effects are needed."""

@@ -42,8 +42,9 @@ def ended(motion, plane):
 
 @inlined
 def parts_of(state, regular):
-    """How many parts of a step keep the speed ``regular`` (m/s), below which slip angles are too small, below that of
-    the vehicle: otherwise it would yield sideways, and yaw on split friction, by as much too far."""
+    """Number of parts into which a step is cut to keep the speed ``regular`` (m/s), below which slip angles are too
+    small, below that of the vehicle: otherwise it would yield sideways, and yaw on split friction, by as much too
+    far."""
     speed = math.hypot(state[1, 0], state[1, 1])
     return 1 if speed == 0.0 else int(min(math.ceil(regular / speed), MOST_PARTS))
 
@@ -135,7 +136,7 @@ def _lifted(loads: np.ndarray) -> bool:
 
 
 def _acceleration(plane: Plane, first: int, motion: Motion) -> tuple[float, float]:
-    """Of the body on four wheels, along and across it (m/s^2)."""
+    """Acceleration of the body on four wheels, along and across it (m/s^2)."""
     accelerations = motion.accelerations
     k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
@@ -144,7 +145,9 @@ def _acceleration(plane: Plane, first: int, motion: Motion) -> tuple[float, floa
 
 
 def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
-    """By moments about the wheels that stay on the road: statics of a body whose loads follow its accelerations."""
+    """Sentence on how a vehicle tips over, by moments about the wheels that stay on the road.
+
+    Statics of a body whose loads follow its accelerations."""
     body, (ahead, aside) = BODIES[four.start // 4], rates
     static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
     if status == PITCHED:

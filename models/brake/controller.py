@@ -1,4 +1,5 @@
-"""What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
+"""The port between a vehicle and a brake controller, which is asked once per sample and answers with commands to
+valves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ LARGEST_PRESSURE = 300.0
 
 
 class Sample(NamedTuple):
-    """What goes to the controller.
+    """The signals that a controller is given at a sample.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
     radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the
@@ -32,21 +33,21 @@ class Sample(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What comes back: states (W,) of the valves, or pressures (W,) in bar instead."""
+    """The controller's answer to a sample: states (W,) of the valves, or pressures (W,) in bar instead."""
 
     valves: np.ndarray | None = None
     pressures: np.ndarray | None = None
 
 
 class Controller(Protocol):
-    """A controller, whatever it runs in.
+    """Protocol of a brake controller, whatever program or process it runs in.
 
     A class that has ``steady = True`` beside its ``sample`` answers alike to every sample in which the switch is
     closed, and is asked once.
     """
 
-    def sample(self, given: Sample) -> Command:
-        """Answer to one sample."""
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample."""
         ...
 
 
@@ -65,8 +66,8 @@ class Pressures:
     pressures: np.ndarray
     steady: ClassVar[bool] = True
 
-    def sample(self, given: Sample) -> Command:
-        """Always the same."""
+    def sample(self, sample: Sample) -> Command:
+        """The same pressures at every sample."""
         return Command(pressures=self.pressures)
 
 
@@ -77,6 +78,6 @@ class AllApplied:
     wheels: int
     steady: ClassVar[bool] = True
 
-    def sample(self, given: Sample) -> Command:
-        """Apply."""
-        return Command(valves=np.full(self.wheels, APPLY if given.brake else RELEASE))
+    def sample(self, sample: Sample) -> Command:
+        """Commands that open all valves."""
+        return Command(valves=np.full(self.wheels, APPLY if sample.brake else RELEASE))

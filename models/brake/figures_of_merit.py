@@ -1,4 +1,4 @@
-"""What test engineers call a stop: decelerations, distances, adhesion utilisation, split friction, turns.
+"""Figures that test engineers state of a stop: decelerations, distances, adhesion utilisation, split friction, turns.
 
 Formulas of UN Regulation 13, of ISO 21994, 16552 and 14794 as they are commonly quoted: not checked against the text of
 the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration by g.
@@ -31,7 +31,7 @@ class Axles:
 
     @property
     def weight(self) -> float:
-        """Of the vehicle (N)."""
+        """Weight of the vehicle (N)."""
         return self.front + self.rear
 
     def dynamic(self, z: float) -> tuple[float, float]:
@@ -50,17 +50,17 @@ def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     return float(times[i - 1] + share * (times[i] - times[i - 1]))
 
 
-def way_at(times: np.ndarray, way: np.ndarray, speeds: np.ndarray, time: float) -> float:
+def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
     """Way (m) at a time between two samples, at constant deceleration within that sample."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
     rate = (speeds[i + 1] - speeds[i]) / long
     whole = long * (speeds[i] + 0.5 * rate * long)
     some = passed * (speeds[i] + 0.5 * rate * passed)
-    return float(way[i] + (way[i + 1] - way[i]) * (some / whole if whole > 0.0 else 0.0))
+    return float(distance[i] + (distance[i + 1] - distance[i]) * (some / whole if whole > 0.0 else 0.0))
 
 
-def mean_fully_developed(times: np.ndarray, way: np.ndarray, speeds: np.ndarray) -> float:
+def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray) -> float:
     """MFDD (m/s^2): (vb^2 - ve^2) / (2 (s_e - s_b)) between vb = 0.8 v0 and ve = 0.1 v0.
 
     Source: UN R13, Annex 4, d_m = (vb^2 - ve^2) / (25.92 (s_e - s_b)) in km/h and m; not checked against the text of
@@ -70,7 +70,7 @@ def mean_fully_developed(times: np.ndarray, way: np.ndarray, speeds: np.ndarray)
     begin, end = (crossing(times, speeds, speed) for speed in (high, low))
     if not np.isfinite(begin + end):
         return float("nan")
-    covered = way_at(times, way, speeds, end) - way_at(times, way, speeds, begin)
+    covered = way_at(times, distance, speeds, end) - way_at(times, distance, speeds, begin)
     return float((high**2 - low**2) / (2.0 * covered))
 
 
@@ -150,7 +150,7 @@ def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
 
 @dataclass(frozen=True)
 class Locks:
-    """Of each wheel (W,): time locked (s), share of the time, longest lock (s), above a speed of the vehicle."""
+    """Locks of each wheel (W,): time locked (s), share of the time, longest lock (s), above a speed of the vehicle."""
 
     time: np.ndarray
     share: np.ndarray

@@ -1,4 +1,4 @@
-"""What a step of a vehicle in the plane reads and writes: its motion and its wheels, W of them, n coordinates.
+"""Records that a time step of a vehicle in the plane reads and writes: motion and wheels, W of them, n coordinates.
 
 Compiled functions pass few arrays on, and name their rows where they are read: two dozen arrays that are passed
 everywhere double the time of compiling.
@@ -13,7 +13,7 @@ from models.machine.compiled import inlined
 
 
 class Report(NamedTuple):
-    """What the wheels did in a step, each (W,), in a whole run (samples, W).
+    """Forces, loads and slips of the wheels in a step, each (W,), in a whole run (samples, W).
 
     force_x, force_y : mean forces on the wheel in its own axes (N); load : N; slip : the mean one; slip_angle : rad;
     locked : time (s) for which the wheel was locked; turning : speed of turning at the end (rad/s).
@@ -41,7 +41,7 @@ def report_of(rows):
 
 
 class Motion(NamedTuple):
-    """A vehicle that moves, all of it moved in place.
+    """State of a vehicle in the plane, stepped in place.
 
     state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
     which the next one searches on; report (7, W) : the rows of the last step's ``Report``.
@@ -59,7 +59,7 @@ def motion_of(state: np.ndarray, turning: np.ndarray) -> Motion:
 
 
 class Wheels(NamedTuple):
-    """What is known of each wheel within a step, each (W,).
+    """State and geometry of each wheel within a time step, each (W,).
 
     start : speed of its centre along it at the start (m/s); rate : what that one's rate has besides the accelerations
     of the coordinates (m/s^2); along, aside : speeds of its centre along it, from 0 on, and across it where slip angles
@@ -91,7 +91,7 @@ def wheels_of(rows):
 
 
 class Frame(NamedTuple):
-    """What the rounds of a step have in common.
+    """Arrays that all iterations within a time step share.
 
     along, across, press (W, n) : see ``plane_chain.rows``, and load by accelerations; units (U, 2) : see ``headings``;
     mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' ones; out, out_before, off

@@ -93,7 +93,7 @@ def slide(i, u, v, regular, lag, angles, wheels):
 
 
 @inlined
-def tyre(i, given, wheel, tables, wheels, surfaces, report):
+def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     """Fill the report of wheel i, of known slip angle and load, by a ``StepInput`` of speeds along it."""
     v, along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
@@ -101,7 +101,9 @@ def tyre(i, given, wheel, tables, wheels, surfaces, report):
     j, q = place(tables.loads, load)
     cells = Cells(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
-        StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
+        StepInput(
+            sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
+        ),
         Wheel(wheel.radius, wheel.inertia, sign * wheel.turning),
         Grip(first, second, share, cells, load, tables.slips, tables.mu_x),
     )
@@ -197,7 +199,7 @@ def stage(motion, before, after, step, most, vehicle, frame):
 
 @lean
 def by_means(motion, before, after, step, vehicle, frame):
-    """As ``stage``, where loads jump between two answers and have one only as a mean of them.
+    """Accelerations as from ``stage``, where wheel loads jump between two answers and have one only as a mean of them.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of

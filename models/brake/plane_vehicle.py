@@ -41,7 +41,7 @@ class Truck(Strict):
 
 
 class Plane(NamedTuple):
-    """What compiled functions read of a vehicle of U units and W wheels.
+    """Numbers that compiled functions read of a vehicle in the plane, of U units and W wheels.
 
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
     whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;

@@ -21,7 +21,7 @@ NONE = np.zeros(0)
 
 
 class Chambers(NamedTuple):
-    """How chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
+    """How brake chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
 
     volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
     keeps its pressure and asks for no volumes. delay : of the valves (s). slow (W,) : time constants (s) of filling by
@@ -38,7 +38,7 @@ class Chambers(NamedTuple):
 
 
 class Air(NamedTuple):
-    """What pressures go on from, all of it moved in place.
+    """State of the brake's air system, from which pressures are stepped in place.
 
     pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
     states of the valves as they were commanded, the latest last, d the whole samples of the valves' delay.

@@ -35,7 +35,7 @@ class Path(NamedTuple):
 
 
 class Quarter(Strict):
-    """One wheel and the mass upon it."""
+    """A quarter vehicle: one wheel and the mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
     radius: float = quantity("m", "of the wheel")
@@ -50,7 +50,8 @@ class Quarter(Strict):
 
     @property
     def plane(self) -> Plane:
-        """As compiled functions take it: unit and group are the only ones, the wheel is at the centre."""
+        """The vehicle of this wheel as compiled functions take it: unit and group are the only ones, the wheel is at
+        the centre."""
         none, unit = np.zeros(1, dtype=np.int64), np.ones(1)
         return Plane(
             self.mass * unit,

@@ -20,7 +20,7 @@ from models.machine.compiled import lean, named, njit
 
 
 class Row(NamedTuple):
-    """The row and its parts, which are views of it.
+    """A recorded row of a run and its parts, which are views of the row.
 
     time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
     see ``Motion``.
@@ -35,7 +35,7 @@ class Row(NamedTuple):
     report: np.ndarray
 
     def motion(self, accelerations: np.ndarray) -> Motion:
-        """Of the vehicle that has these ones (2 + U,)."""
+        """``Motion`` of the vehicle at these accelerations (2 + U,)."""
         return Motion(self.state, self.turning, accelerations, self.report)
 
 
@@ -49,7 +49,7 @@ def row(coordinates: int, wheels: int) -> Row:
 
 
 def parts(rows: list[np.ndarray], like: Row) -> Row:
-    """Of blocks of rows that are like one, each part with an axis for the rows before its own."""
+    """``Row`` of blocks of rows laid out as ``like``, each part with an axis for the rows before its own."""
     ends = np.cumsum([part.size for part in like[1:]])
     whole = np.concatenate(rows)
     columns = np.split(whole, ends[:-1], axis=1)
@@ -62,9 +62,9 @@ def parts(rows: list[np.ndarray], like: Row) -> Row:
     )
 
 
-class Told(NamedTuple):
-    """What holds for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,) in bar,
-    of which the first is not a number where valves hold, and steer angles (W,) in rad."""
+class Commands(NamedTuple):
+    """Commands that hold for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,)
+    in bar, of which the first is not a number where valves hold, and steer angles (W,) in rad."""
 
     samples: np.ndarray
     valves: np.ndarray
@@ -72,9 +72,10 @@ class Told(NamedTuple):
     steer: np.ndarray
 
 
-class Kept(NamedTuple):
-    """What is recorded: now (k,), the moment as numbers of which the first is the time (s); rows (m, k), such moments,
-    of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or after."""
+class Record(NamedTuple):
+    """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
+    such moments, of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or
+    after."""
 
     now: np.ndarray
     rows: np.ndarray
@@ -95,24 +96,24 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def some_samples(told, kept, sample, braking, motion, time, *others):
+def some_samples(commands, record, sample, braking, motion, time, *others):
     """Move a vehicle that is at a time (s) on by as many samples as it is told for, less only where it does not move
     any further, by ``go``, which is ``advance`` or stands in for it. How the last sample ended, and the time (s)."""
     air, chambers, brakes, torques = braking
     status, step = FINE, sample / (torques.shape[0] - 1)
-    for _ in range(told.samples[0]):
-        if math.isnan(told.pressures[0]):
-            by_valves(told.valves, sample, air, chambers, brakes, torques)
+    for _ in range(commands.samples[0]):
+        if math.isnan(commands.pressures[0]):
+            by_valves(commands.valves, sample, air, chambers, brakes, torques)
         else:
-            by_pressures(told.pressures, air, brakes, torques)
-        status, used = go(motion, torques, step, told.steer, *others)
+            by_pressures(commands.pressures, air, brakes, torques)
+        status, used = go(motion, torques, step, commands.steer, *others)
         time += used
         if status not in (FINE, AT_REST):
             break
-        kept.now[0] = time
-        moved_to(kept.now, kept.rows[kept.left[0]])
-        kept.left[0] += 1
-        if status == AT_REST or time >= kept.until:
+        record.now[0] = time
+        moved_to(record.now, record.rows[record.left[0]])
+        record.left[0] += 1
+        if status == AT_REST or time >= record.until:
             break
     return status, time
 
@@ -121,7 +122,7 @@ some: Callable[..., Any] = some_samples
 """Stands here for what ``moved`` puts in its place."""
 
 
-def samples(told, kept, sample, braking, motion, *others):
+def samples(commands, record, sample, braking, motion, *others):
     """Generator of a vehicle that ``some_samples`` moves on.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
@@ -130,7 +131,7 @@ def samples(told, kept, sample, braking, motion, *others):
     status, time = FINE, 0.0
     while True:
         yield status, time, math.hypot(motion.state[1, 0], motion.state[1, 1]), braking.air.supply[0]
-        status, time = some(told, kept, sample, braking, motion, time, *others)
+        status, time = some(commands, record, sample, braking, motion, time, *others)
 
 
 def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:

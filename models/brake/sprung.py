@@ -37,7 +37,7 @@ class Sprung:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates of the vehicle on its suspension."""
         return len(self.handling.vehicle.coordinates())
 
     @property
@@ -70,15 +70,15 @@ def centre(vehicle: SpatialVehicle) -> np.ndarray:
     return masses @ np.array([body.position for body in vehicle.bodies]) / masses.sum()
 
 
-PLACES = ("position", "point", "point_one", "point_two", "point_left", "point_right")
+PLACES = ("position", "point", "first_point", "second_point", "point_left", "point_right")
 """What parts of a vehicle call their places."""
 
 
-def _moved(vehicle: SpatialVehicle, way: np.ndarray) -> SpatialVehicle:
+def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     """The vehicle drawn elsewhere on the ground."""
 
     def at(part: Any, name: str) -> Vector:
-        x, y, z = np.add(getattr(part, name), (way[0], way[1], 0.0))
+        x, y, z = np.add(getattr(part, name), (distance[0], distance[1], 0.0))
         return float(x), float(y), float(z)
 
     parts: dict[str, Any] = {
@@ -88,7 +88,7 @@ def _moved(vehicle: SpatialVehicle, way: np.ndarray) -> SpatialVehicle:
         )
         for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
     }
-    return replace(vehicle, **parts, axles=tuple(float(x + way[0]) for x in vehicle.axles))
+    return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
 
 
 def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:

@@ -5,9 +5,8 @@ step, to which half a step by the accelerations leads; the engine then marches t
 method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
-then what the wheels hold, see ``Held``. What the road has beside the moment that speeds up a wheel's turning is on the
-chassis: brakes hold on to it, and locked wheels do.
-"""
+then what the wheels hold, see ``WheelForces``. What the road has beside the moment that speeds up a wheel's turning is
+on the chassis: brakes hold on to it, and locked wheels do."""
 
 from collections.abc import Callable
 from types import FunctionType
@@ -53,9 +52,9 @@ HELD = 4
 """Numbers that each wheel holds."""
 
 
-class Held(NamedTuple):
-    """What the wheels hold over a step, each (W,): steer angle (rad), mean forces on the tyre along and across it (N),
-    and the mean moment that speeds up the wheel's turning (N m)."""
+class WheelForces(NamedTuple):
+    """Wheel quantities that are constant over a step, each (W,): steer angle (rad), mean forces on the tyre along and
+    across it (N), and the mean moment that speeds up the wheel's turning (N m)."""
 
     steer: np.ndarray
     force_x: np.ndarray
@@ -73,22 +72,23 @@ class Contacts(NamedTuple):
 
 
 class AtWheels(NamedTuple):
-    """What is at the wheels: what they hold, what is known of them, and what they are on.
+    """Data at the wheels: quantities that are constant over a step, the state of each wheel, and the surfaces under
+    them.
 
     The wheels' rates are the changes of the speeds along them, kept from step to step.
     """
 
-    held: Held
+    held: WheelForces
     wheels: Wheels
     surfaces: Surfaces
 
 
 @lean
-def held_of(numbers):
-    """What the wheels hold by the end of a table of numbers."""
+def wheel_forces_of(numbers):
+    """Views of the constant wheel quantities, which are the last numbers of a table for compiled forces."""
     wheels = int(numbers[TYRES])
     rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
-    return Held(rows[0], rows[1], rows[2], rows[3])
+    return WheelForces(rows[0], rows[1], rows[2], rows[3])
 
 
 @lean
@@ -102,7 +102,7 @@ def held_forces(numbers, q, v, f, contacts):
     )
     way, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
     vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
-    waves, held = numbers[int(numbers[OF_WAVES]) :], held_of(numbers)
+    waves, held = numbers[int(numbers[OF_WAVES]) :], wheel_forces_of(numbers)
     creeping[2], tyres = 0.0, beyond(start(numbers), int(numbers[OF_TYRES]))
     for i in range(int(numbers[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)
@@ -170,7 +170,7 @@ UPRIGHT = 0.5
 
 
 class OnEngine(NamedTuple):
-    """What steps need besides what those in the plane need.
+    """Data that a step of a vehicle on its suspension needs beside those of a step in the plane.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -205,7 +205,8 @@ def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
 
 
 def advance(motion, torques, step, steer, vehicle, course):
-    """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+    """Advance the vehicle on its suspension as ``models.brake.advance.advance`` does in the plane, the state (2, n)
+    having all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.

@@ -46,7 +46,8 @@ class Response:
 
 
 def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> Response | None:
-    """Of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it is not.
+    """Step response of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it
+    is not.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
     vehicles); not checked against the text of the standard.

@@ -42,8 +42,8 @@ class OnRoad(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What each wheel is on, each (W,): its two tables and the share of the second; lag: tan of a slip angle that lags
-    behind the motion of the wheel, not a number where none does."""
+    """Surfaces under the wheels, each (W,): two tyre tables and the share of the second; lag: tan of a slip angle that
+    lags behind the motion of the wheel, not a number where none does."""
 
     first: np.ndarray
     second: np.ndarray
@@ -52,20 +52,20 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(wheels: int) -> Surfaces:
-    """Of so many wheels, the first table under all of them, whose tyres do not lag as long as nobody says so."""
+    """``Surfaces`` of so many wheels: the first table under all of them, without lag of the tyres."""
     return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
 @inlined
 def surfaces_of(rows):
-    """The same in rows (4, W) of a compiled function, and never of Python, which would let go of them twice."""
+    """``Surfaces`` as views of rows (4, W); for compiled functions only, as Python would free the rows twice."""
     rows[3, :] = math.nan
     return Surfaces(rows[0], rows[1], rows[2], rows[3])
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """From x (m) on, the numbers of the surfaces left and right of the line."""
+    """A stretch of road that begins at x (m): numbers of the surfaces left and right of the line."""
 
     x: float
     left: int
@@ -91,15 +91,15 @@ EVEN = road([Stretch(0.0, 0, 0)])
 """The same surface everywhere."""
 
 
-def check_way(road: Road, way: float) -> None:
+def check_way(road: Road, distance: float) -> None:
     """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
     shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
-    if way > shortest:
+    if distance > shortest:
         raise InputError(
             "",
             "stretches",
             shortest,
-            f"must be at least as long as the way in a step, {way:.3g} m: take longer stretches or more substeps",
+            f"must be at least as long as the way in a step, {distance:.3g} m: take longer stretches or more substeps",
         )
 
 

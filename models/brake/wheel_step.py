@@ -52,7 +52,7 @@ class Grip(NamedTuple):
 
 
 class StepInput(NamedTuple):
-    """What is done to a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
+    """Drive of a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
     on), both at the step's two ends and linear in time between."""
 
     speed0: float
@@ -79,14 +79,14 @@ def phi_1(z):
 
 
 @lean
-def passed(way, rate, decay, time):
+def passed(distance, rate, decay, time):
     """Integral over a time of what covers a way with a rate that decays as exp(-decay t).
 
     With z = decay t it is t way (1 / (1 - exp(-z)) - 1 / z), whose series 1/2 + z/12 - z^3/720 ends with an error of
     z^5/30240: both branches lose at most 1e-13 of it, the other one by the difference of two like numbers.
     """
     z = decay * time
-    return time * way * (0.5 + z / 12.0 - z**3 / 720.0) if abs(z) < 0.01 else (rate * time - way) / decay
+    return time * distance * (0.5 + z / 12.0 - z**3 / 720.0) if abs(z) < 0.01 else (rate * time - distance) / decay
 
 
 @lean
@@ -105,8 +105,8 @@ def node_force(k, grip):
 
 
 @lean
-def roll(slip, left, kappa, fade, held, grip):
-    """A wheel at a slip from -1 to 1 for at most ``left`` seconds or until it leaves them.
+def roll(slip, remaining, kappa, fade, held, grip):
+    """A wheel at a slip from -1 to 1 for at most ``remaining`` seconds or until it leaves them.
 
     kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N. Returns the time used, slip then and
     integral of the slip (s).
@@ -124,7 +124,7 @@ def roll(slip, left, kappa, fade, held, grip):
         target, turn = (top, 1) if rate > 0.0 else (bottom, -1)
         if rate != 0.0 and target == slip:
             if turned == -turn:  # either cell sends it into the other one: by rounding, it rests on their node
-                return left, slip, area + slip * (left - used)
+                return remaining, slip, area + slip * (remaining - used)
             cell, turned = cell + turn, turn
             if cell == last or cell < -last:
                 return used, slip, area
@@ -135,11 +135,11 @@ def roll(slip, left, kappa, fade, held, grip):
             continue
         decay = kappa * slope + fade
         time = _way(decay, rate, target - slip)
-        if used + time >= left:
-            some = left - used
+        if used + time >= remaining:
+            some = remaining - used
             way = rate * some * phi_1(-decay * some)
             end = min(slip + way, target) if turn > 0 else max(slip + way, target)  # not beyond it by rounding
-            return left, end, area + some * slip + passed(way, rate, decay, some)
+            return remaining, end, area + some * slip + passed(way, rate, decay, some)
         area += time * slip + passed(target - slip, rate, decay, time)
         used, slip, turned = used + time, target, 0
     return used, math.nan, area
@@ -159,11 +159,11 @@ def _way(decay, rate, way):
 
 
 @lean
-def wheel_step(given, wheel, grip):
-    """What becomes of a ``Wheel`` by a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
-    torque0, torque1, step = given.torque0, given.torque1, given.step
+def wheel_step(step_input, wheel, grip):
+    """Step a ``Wheel`` through a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
+    torque0, torque1, step = step_input.torque0, step_input.torque1, step_input.step
     radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
-    u0, u1 = max(given.speed0, SLOWEST), max(given.speed1, 0.0)
+    u0, u1 = max(step_input.speed0, SLOWEST), max(step_input.speed1, 0.0)
     mean = max(0.5 * (u0 + u1), SLOWEST)
     kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1
     sliding = node_force(last, grip)

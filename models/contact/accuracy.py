@@ -1,4 +1,4 @@
-"""How far the forces of a contact are off: what its cells leave, and what the theory itself does.
+"""Errors of a contact's forces: those of its cells, and those of the theory itself.
 
 Cells
     The same contact is rolled again on about half as many cells along each axis. An error of order p then changes by
@@ -72,12 +72,12 @@ class Error:
 
     @property
     def total(self) -> float:
-        """Of the force, both together (N)."""
+        """Error of the force by cells and theory together (N)."""
         return self.cells + self.theory
 
     @property
     def moment(self) -> float:
-        """Of the moment, both together (N m)."""
+        """Error of the moment by cells and theory together (N m)."""
         return self.moment_cells + self.moment_theory
 
 
@@ -164,12 +164,12 @@ def slenderness(a: Array, b: Array) -> Array:
 
 
 def used_with_moment(used: Array, moment: Array) -> Array:
-    """How far friction is used where moments count: force by mu N and moment by mu N times the lever."""
+    """Share of friction that is used where moments count: force by mu N and moment by mu N times the lever."""
     return np.hypot(used, moment)
 
 
 def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
-    """How far a motion (3, ...) counts as one with spin, 0 to 1: all from a third of the linear work on."""
+    """Weight of a motion (3, ...) as one with spin, 0 to 1: 1 from a third of the linear work on."""
     c = coefficients(a / b, nu)
     parts = np.stack([c.c11 * motion[0], c.c22 * motion[1], np.sqrt(a * b) * c.c23 * motion[2]]) ** 2
     whole = parts.sum(axis=0)

@@ -30,7 +30,7 @@ import numpy as np
 
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, ONE, THREE, point
+from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBILITIES, point
 from models.contact.fastsim_many import forces as march_all
 from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
@@ -41,7 +41,7 @@ from models.core.errors import InputError
 
 Flexibilities = Literal["blended", "one", "three"]
 March = Literal["second-order", "plain"]
-KINDS = {"blended": BLENDED, "one": ONE, "three": THREE}
+KINDS = {"blended": BLENDED, "one": ONE_FLEXIBILITY, "three": THREE_FLEXIBILITIES}
 MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
 FLEXIBILITIES = ("l1", "l2", "l3")
 """Fields of CONTACT."""

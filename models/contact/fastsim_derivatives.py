@@ -1,4 +1,4 @@
-"""How FASTSIM's forces change with creepages, spin and load: the march differentiated along with itself.
+"""Derivatives of FASTSIM's forces by creepages, spin and load: the march differentiated along with itself.
 
 A sticking traction changes as the sum that it is. A slipping one keeps its size and only turns, so its derivative is
 that of its angle: with phi the angle of -w, psi from there to the traction, and z = |w| step / g,
@@ -17,7 +17,15 @@ import numpy as np
 from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
 from models.contact.fastsim_kernels import LONGEST, STILL, advance, cut, lateness
-from models.contact.fastsim_many import ONE, add_strip, blend, mean_flexibility, rigid_slip, stiffness, touches
+from models.contact.fastsim_many import (
+    ONE_FLEXIBILITY,
+    add_strip,
+    blend,
+    mean_flexibility,
+    rigid_slip,
+    stiffness,
+    touches,
+)
 from models.contact.fastsim_records import FORCES
 from models.contact.inputs import Array
 from models.contact.material import Pair
@@ -109,7 +117,7 @@ def _scale_slopes(contact, cells, kind, scale):
         unit = c if j == 2 else 1.0
         if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
-            if kind == ONE:
+            if kind == ONE_FLEXIBILITY:
                 d_mean = (sign * flexible[j] - mean * creep[j] / size) / size
             else:
                 d_mean = 2.0 * creep[j] * (flexible[j] - mean) / (size * size)
@@ -171,7 +179,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 
 @compiled
 def _turning(px, py, u, v, before, rate):
-    """What ``advance`` does to a slipping traction: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
+    """Turning of a slipping traction by ``advance``: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
     size = math.sqrt(u * u + v * v)
     h = min(size * rate, LONGEST)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))

@@ -16,7 +16,7 @@ from models.machine.compiled import compiled
 
 @compiled
 def forces_falling(contacts, strips, cells, kind, law, answers):
-    """As ``fastsim_many.forces`` with the second-order march, and friction that falls; law : of ``Falling``."""
+    """FASTSIM's forces of many contacts by the second-order march, with falling friction; law : of ``Falling``."""
     n, area, slip = cells.centre.size, 0.0, np.empty(1, SLIP)[0]
     left, tractions = np.empty((2, n)), np.empty((3, n))
     for s in range(strips.y.size):

@@ -35,7 +35,7 @@ class Grid:
 
     @property
     def records(self) -> tuple[Strips, Cells]:
-        """The same by name."""
+        """The grid's strips and cells as records with named fields."""
         y, half, spread, part = self.strips
         centre, bound, middle, before, rate = self.cells
         return Strips(y, half, spread, part), Cells(centre, bound, middle, before, rate, self.middle)

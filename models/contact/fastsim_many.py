@@ -14,7 +14,7 @@ from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU = range(4)
 """Places of the first fields of CONTACT, for who keeps contacts in a table of doubles."""
-ONE, THREE, BLENDED = 0, 1, 2
+ONE_FLEXIBILITY, THREE_FLEXIBILITIES, BLENDED = 0, 1, 2
 OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
 """Of the blend: what xi_x and spin count by xi_y, how much of it lateral creepage against spin takes away, the reach at
@@ -68,7 +68,7 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """What the march needs of the creepages (x, y, spin).
+    """Rigid slip of every cell by the creepages (x, y, spin), for the march.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
@@ -101,7 +101,7 @@ def blend(contact, bound, kind):
     the rest slides. A second term ends the blend where all slides, so that force and slip have one direction there.
     """
     if kind != BLENDED:
-        return 1.0 if kind == ONE else 0.0, 0.0, 0.0, 0.0
+        return 1.0 if kind == ONE_FLEXIBILITY else 0.0, 0.0, 0.0, 0.0
     ratio, unit = math.log(min(max(contact.a / contact.b, RATIOS[0]), RATIOS[1])), contact.a / bound
     of_x, of_y, of_z = unit / contact.l1, unit / contact.l2, unit / contact.l3
     x, y, z = of_x * contact.xi_x, of_y * contact.xi_y, of_z * contact.spin * math.sqrt(contact.a * contact.b)
@@ -136,7 +136,7 @@ def mean_flexibility(contact, turn, kind):
         return contact.l1
     x, y, z = x / most, y / most, z / most
     square = x * x + y * y + z * z
-    if kind == ONE:
+    if kind == ONE_FLEXIBILITY:
         return (x * contact.l1 + y * contact.l2 + z * contact.l3) / math.sqrt(square)
     return (x * x * contact.l1 + y * y * contact.l2 + z * z * contact.l3) / square
 
@@ -214,14 +214,14 @@ def strip_tractions(slip, cells, march, left, answers):
 
 
 @compiled
-def point(given, unit, strips, cells, choices):
+def point(motion, unit, strips, cells, choices):
     """fx, fy, mz of one ellipse of the shape of ``unit``, NaN for bad input.
 
-    given : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
+    motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
     choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of
     the time of records.
     """
-    (a, load, mu, xi_x, xi_y, spin), (peak, kind, march) = given, choices
+    (a, load, mu, xi_x, xi_y, spin), (peak, kind, march) = motion, choices
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
     contacts, answers = np.empty(1, CONTACT), np.empty(1, FORCES)

@@ -1,4 +1,4 @@
-"""What FASTSIM's compiled functions read and write, by name: contacts and forces row by row, the net, the work space.
+"""Records of FASTSIM's compiled functions: contacts and forces row by row, the net, the workspace.
 
 Records lie in memory as their fields follow, without gaps: a table of doubles becomes an array of records, or rows of a
 net, at no cost.

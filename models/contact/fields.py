@@ -1,4 +1,4 @@
-"""What happens inside a contact area, cell by cell, and FASTSIM's cells: its march with nothing summed up."""
+"""Fields inside a contact area, cell by cell, and FASTSIM's cells: its march with nothing summed up."""
 
 from dataclasses import dataclass
 

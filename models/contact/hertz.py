@@ -125,14 +125,14 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     return answer
 
 
-def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, whole: Array, pair: Pair) -> Hertz:
-    """The contact from its short axis; ``whole`` is K = B + D. Where it is zero, so is everything."""
+def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, pair: Pair) -> Hertz:
+    """The contact from its short axis; ``curvature_sum`` is K = B + D. Where it is zero, so is everything."""
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
     along = A <= B  # the long axis lies along the smaller curvature
     a, b = np.where(along, long, short), np.where(along, short, long)
-    fields = (a, b, p0, p0 * short * whole / pair.modulus, load, A, B)
+    fields = (a, b, p0, p0 * short * curvature_sum / pair.modulus, load, A, B)
     return Hertz(*(field[()] for field in fields))  # numbers from numbers
 
 

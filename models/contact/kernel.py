@@ -69,21 +69,21 @@ def net(cells: int) -> Array:
 
 
 @compiled
-def contact(given, inputs, table, outputs):
+def contact(kind, inputs, table, outputs):
     """Status of one contact, FINE or another; fills ``outputs``.
 
-    given : BY_LOAD or another; inputs : pointer to an INPUT; table : pointer to a ``net`` or to the table of a
+    kind : BY_LOAD or another; inputs : pointer to an INPUT; table : pointer to a ``net`` or to the table of a
     distance; outputs : pointer to an OUTPUT. A load or an approach of zero or less has zeros all over.
     """
     values, out, head = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0], records(table, 1, OTHER)[0]
     any_shape, answers = head.cells < 0.0, array(outputs, (OUTPUTS,))
-    status = _status(given, values, array(inputs, (INPUTS,)), any_shape)
+    status = _status(kind, values, array(inputs, (INPUTS,)), any_shape)
     answers[:] = 0.0 if status == FINE else math.nan
     if status != FINE or (values.pressing <= 0.0 and not any_shape):
         return status
     if any_shape:
         return ask(int(head.law), inputs, table, outputs)
-    if not _press(given, values, out):
+    if not _press(kind, values, out):
         answers[:] = math.nan
         return NOT_PLAUSIBLE
     if head.cells == 0.0:
@@ -94,18 +94,18 @@ def contact(given, inputs, table, outputs):
 
 
 @compiled
-def _status(given, values, numbers, any_shape):
+def _status(kind, values, numbers, any_shape):
     """Whether the inputs, by name and as an array, are numbers, and numbers in SI."""
-    if not BY_LOAD <= given <= AXES_BY_APPROACH or (any_shape and given != BY_APPROACH):
+    if not BY_LOAD <= kind <= AXES_BY_APPROACH or (any_shape and kind != BY_APPROACH):
         return NOT_KNOWN
     for value in numbers:
         if not math.isfinite(value):
             return NOT_FINITE
-    most = LARGEST_LOAD if given in (BY_LOAD, AXES_BY_LOAD) else LARGEST_APPROACH
+    most = LARGEST_LOAD if kind in (BY_LOAD, AXES_BY_LOAD) else LARGEST_APPROACH
     small, large = min(values.shape_x, values.shape_y), max(values.shape_x, values.shape_y)
     if any_shape:
         shaped = True
-    elif given in (BY_LOAD, BY_APPROACH):
+    elif kind in (BY_LOAD, BY_APPROACH):
         shaped = small > 0.0 and FLATTEST <= large <= LARGEST_CURVATURE
     else:  # without a load the axes may be none
         shaped = (small >= LEAST_AXIS or values.pressing <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
@@ -123,16 +123,16 @@ def _status(given, values, numbers, any_shape):
 
 
 @compiled
-def _press(given, values, out):
+def _press(kind, values, out):
     """Axes, approach and load by Hertz; whether the ellipse is one that the theories of rolling take."""
     x, y, elastic = values.shape_x, values.shape_y, values.G / (1.0 - values.nu)
     small, large = min(x, y), max(x, y)
-    if given in (BY_LOAD, BY_APPROACH):
+    if kind in (BY_LOAD, BY_APPROACH):
         if large > SLENDEREST**1.6 * small:  # beyond it a/b, about the power 2/3 of this, is so in any case
             return False
         ratio, cosine, sine = aspect(small / large)
         whole = cosine + sine
-        if given == BY_LOAD:
+        if kind == BY_LOAD:
             load = values.pressing
             short = np.cbrt(1.5 * load * cosine / (math.pi * elastic * large) * ratio)
         else:
@@ -143,7 +143,7 @@ def _press(given, values, out):
     else:
         cosine, sine = integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
         whole, short, long = cosine + sine, small, large
-        by_load = given == AXES_BY_LOAD
+        by_load = kind == AXES_BY_LOAD
         load = values.pressing if by_load else 2.0 / 3.0 * math.pi * x * y * values.pressing * elastic / (small * whole)
         out.a, out.b = x, y
     out.load = load

@@ -57,7 +57,7 @@ def _compiled() -> Any:
     """A shell about ``contact``, whose machine code is kept on disk: compiled anew in each process, for it is short."""
 
     @cfunc(SIGNATURE, error_model="numpy")
-    def twinrig_contact(given, table, inputs, outputs):
-        return contact(given, inputs, table, outputs)
+    def twinrig_contact(kind, table, inputs, outputs):
+        return contact(kind, inputs, table, outputs)
 
     return twinrig_contact

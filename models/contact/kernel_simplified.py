@@ -99,7 +99,7 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
 
 @compiled
 def surface_at(numbers, depth):
-    """What compiled functions read of the patch at a depth (m), as ``Patch.surface`` has it."""
+    """Numbers of the patch at a depth (m) for compiled functions, as ``Patch.surface`` has it."""
     head = records(numbers, 1, HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))

@@ -1,4 +1,4 @@
-"""How far the theories of contact reach: what an elastic, half-infinite body of dry steel still stands for.
+"""Limits of the theories of contact: what an elastic, half-infinite body of dry steel still represents.
 
 Johnson, Contact Mechanics (1985): half-spaces stand for bodies that are large beside the contact (section 4.1); where
 the mean pressure is three times the yield stress all around the contact flows (section 6.3), which for rails of 600 MPa

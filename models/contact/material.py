@@ -43,30 +43,30 @@ STEEL = Material(E=2.1e11, nu=0.28)
 
 @dataclass(frozen=True)
 class Pair:
-    """Two bodies in touch, ``one`` the wheel and ``two`` the rail; constants of a pair of equals are their own."""
+    """Two bodies in touch, ``wheel`` and ``rail``; a pair of equal materials has that material's constants."""
 
-    one: Material = STEEL
-    two: Material = STEEL
+    wheel: Material = STEEL
+    rail: Material = STEEL
 
     def __post_init__(self) -> None:
-        for name, body in (("one", self.one), ("two", self.two)):
+        for name, body in (("wheel", self.wheel), ("rail", self.rail)):
             if not isinstance(body, Material):
                 raise InputError("", f"pair.{name}", body, "must be a Material(E=..., nu=...)")
 
     @cached_property
     def modulus(self) -> float:
         """E* in Pa of normal contact: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, which is (1 - nu)/G."""
-        return 1.0 / ((1.0 - self.one.nu**2) / self.one.E + (1.0 - self.two.nu**2) / self.two.E)
+        return 1.0 / ((1.0 - self.wheel.nu**2) / self.wheel.E + (1.0 - self.rail.nu**2) / self.rail.E)
 
     @cached_property
     def G(self) -> float:
         """Combined shear modulus in Pa: 1/G = (1/G1 + 1/G2) / 2."""
-        return 2.0 / (1.0 / self.one.G + 1.0 / self.two.G)
+        return 2.0 / (1.0 / self.wheel.G + 1.0 / self.rail.G)
 
     @cached_property
     def nu(self) -> float:
         """Combined Poisson's ratio: nu/G = (nu1/G1 + nu2/G2) / 2."""
-        return self.G * (self.one.nu / self.one.G + self.two.nu / self.two.G) / 2.0
+        return self.G * (self.wheel.nu / self.wheel.G + self.rail.nu / self.rail.G) / 2.0
 
     @cached_property
     def mismatch(self) -> float:
@@ -74,8 +74,8 @@ class Pair:
 
         Dundurs' second constant is K / (1 - nu).
         """
-        first, two = self.one, self.two
-        return self.G / 4.0 * ((1.0 - 2.0 * first.nu) / first.G - (1.0 - 2.0 * two.nu) / two.G)
+        wheel, rail = self.wheel, self.rail
+        return self.G / 4.0 * ((1.0 - 2.0 * wheel.nu) / wheel.G - (1.0 - 2.0 * rail.nu) / rail.G)
 
     def quasi_identity_error(self, friction: float) -> float:
         """Force, as a share of mu N, that leaving K out may cost at this coefficient of friction: 2 |K| / mu.

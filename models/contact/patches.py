@@ -77,7 +77,7 @@ class Patch:
         return tables[0], tables[1]
 
     def surface(self, depth: float) -> Surface:
-        """What compiled functions read of the patch at a depth (m)."""
+        """Numbers of the patch at a depth (m) for compiled functions."""
         known = self.distance
         origin = float(known.x[0]), float(known.y[0])
         return Surface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)

@@ -91,12 +91,11 @@ def substitute(factors, spans, values):
 
 
 @njit(cache=True, nogil=True)
-def turned(column, turns, left):
+def turned(column, turns, components):
     """The image's components (count + 1,) by Givens' rotations that leave a triangle, (count,).
 
-    turns (most, 2) : cosine and sine of the rotations, of which the last is added; left (most + 1,) : what the residual
-    was turned to, its last component the residual's size.
-    """
+    turns (most, 2) : cosine and sine of the rotations, of which the last is added; components (most + 1,) : what the
+    residual was turned to, its last component the residual's size."""
     count = len(column) - 1
     for i in range(count - 1):
         low, high = column[i], column[i + 1]
@@ -104,7 +103,10 @@ def turned(column, turns, left):
     size = np.hypot(column[count - 1], column[count])
     turns[count - 1, 0], turns[count - 1, 1] = column[count - 1] / size, column[count] / size
     column[count - 1] = size
-    left[count], left[count - 1] = -turns[count - 1, 1] * left[count - 1], turns[count - 1, 0] * left[count - 1]
+    components[count], components[count - 1] = (
+        -turns[count - 1, 1] * components[count - 1],
+        turns[count - 1, 0] * components[count - 1],
+    )
     return column[:count]
 
 

@@ -50,7 +50,7 @@ class SlipOperator:
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
 
     @cached_property
-    def own(self) -> Array:
+    def own_slip(self) -> Array:
         """Slip of a cell by its own traction, (2,)."""
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
@@ -94,7 +94,9 @@ class FreeSystem:
     def __init__(self, operator: SlipOperator, free: Array, stiff: Array) -> None:
         """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
         self.operator, self.free, self.stiff = operator, free, stiff[..., None]
-        self.scale = 1.0 / (operator.own.max() + self.stiff)  # a cell near the edge is many times stiffer than others
+        self.scale = 1.0 / (
+            operator.own_slip.max() + self.stiff
+        )  # a cell near the edge is many times stiffer than others
         self.factors = self._strips()
         inside = np.any(free, axis=(2, 3))
         first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)

@@ -144,7 +144,7 @@ class _State:
     def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
         self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
         self.slip = rigid + operator(traction)
-        self.trial = traction - self.slip / operator.own.max()
+        self.trial = traction - self.slip / operator.own_slip.max()
         self.size = np.linalg.norm(self.trial, axis=-1)
         cut = np.where(self.size > bound, bound / np.where(self.size > 0, self.size, 1.0), 1.0)
         needed = self.trial * cut[..., None] - traction

@@ -112,7 +112,7 @@ def _by(source: Net, target: Net, pair: Pair) -> Array:
 
 
 def _product(net: Net, first: Array, second: Array, kind: int) -> float:
-    """What least squares sum up: products of the slopes, or of what differs from the mean."""
+    """Sum over the net for least squares: products of the slopes, or of what differs from the mean."""
     if kind == GRADIENT:
         return float(slope_products(first, second, net.cover, *net.step, True)[0])
     return float(covariances(first, second, net.cover)[1])

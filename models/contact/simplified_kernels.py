@@ -247,7 +247,8 @@ def push(x, y, force, at_x, at_y):
 
 @compiled
 def drag(x, y, force, at_x, at_y, nu):
-    """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
+    """Tangential displacements at points by tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson,
+    section 3.6)."""
     sums = np.zeros((2, at_x.size))
     for k in range(at_x.size):
         for m in range(x.size):

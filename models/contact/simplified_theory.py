@@ -70,7 +70,7 @@ FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 @dataclass(frozen=True)
 class Options:
-    """How the theory is used.
+    """Options of the simplified theory: net, shape, fit, patches together or apart.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
     d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to
@@ -260,10 +260,10 @@ def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, opt
     return NormalContact(approach, _total(parts), area, peak, parts, pair, options)
 
 
-def _area(part: PatchPressure, rows: int = 100) -> float:
+def _area(patch: PatchPressure, rows: int = 100) -> float:
     """Area (m^2) of one patch."""
-    net = strips(part.patch.surface(part.depth), rows, 1, PARABOLIC)
-    return float((net.high_x - net.low_x).sum() * (part.box[3] - part.box[2]) / rows) if net.y.size else 0.0
+    net = strips(patch.patch.surface(patch.depth), rows, 1, PARABOLIC)
+    return float((net.high_x - net.low_x).sum() * (patch.box[3] - patch.box[2]) / rows) if net.y.size else 0.0
 
 
 def roll(
@@ -299,11 +299,11 @@ def roll(
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine(part: PatchPressure, options: Options, cells: int) -> FineNet:
+def _fine(patch: PatchPressure, options: Options, cells: int) -> FineNet:
     """Strips of a patch as ``march`` takes them."""
-    net = strips(part.patch.surface(part.depth), cells, cells, SHAPES[options.shape])
+    net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
-    net.pressure[:] *= part.load / carried  # full sliding gives mu N exactly
+    net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
     return net
 
 

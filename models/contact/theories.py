@@ -95,7 +95,7 @@ class Linear(OnEllipse):
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """What is said against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    """Sentence against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""
@@ -141,7 +141,7 @@ class OnPatches(Contact):
 
     @property
     def lever(self) -> float:
-        """Of the patch that reaches farthest (m)."""
+        """Lever of the moment (m), of the patch that reaches farthest."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
     def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
@@ -200,18 +200,18 @@ MARGINS = (1.2, 1.6, 2.2)
 """Sides of the grid of the exact normal problem by those of the simplified theory's area, until it fits."""
 
 
-def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
+def _solved(patch: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
     """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
-    (x0, x1, y0, y1), known = part.box, part.patch.distance
+    (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:
         dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free
         x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
         inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
         try:
-            return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
+            return replace(solve_normal(known.at(*inside), dx, dy, pair, load=patch.load), x=x, y=y)
         except InputError as error:  # the contact reaches the edge of the grid
             refused = error
-    if not any(part.patch.cut):
+    if not any(patch.patch.cut):
         raise refused
     allowed = (
         "does not take patches of wheel and rail that have grown together: use simplified, a smaller load or "

@@ -57,7 +57,7 @@ class Wheelset:
 
     @property
     def arm(self) -> float:
-        """From the middle of the axle to a taping line (m)."""
+        """Distance from the middle of the axle to a taping line (m)."""
         return self.back_to_back / 2.0 + self.taping
 
 

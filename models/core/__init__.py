@@ -1,1 +1,1 @@
-"""What every system shares: scene files, strict reading, effects, results, tables, signals, errors."""
+"""Common parts of every system: scene files, strict reading, effects, results, tables, signals, errors."""

@@ -1,4 +1,4 @@
-"""What a vehicle, an effect or a law takes for granted, and whether a run kept to it."""
+"""Assumptions of a vehicle, an effect or a law, and whether a run kept to them."""
 
 import json
 import math
@@ -76,7 +76,7 @@ class Broken:
         return f"assumption broken: {self.fact()}"
 
     def fact(self) -> str:
-        """The same where it is known that an assumption was broken."""
+        """Sentence that the assumption was broken, for readers who know the assumption."""
         return f"{self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
 
     @property
@@ -163,7 +163,7 @@ def watching(note: Callable[[Result], None]) -> Iterator[None]:
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
-    """What ``twinrig show`` says that a scene assumes, a line each."""
+    """Lines of ``twinrig show`` on what a scene assumes."""
     return [f"  {'assumes':<{width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
 
 

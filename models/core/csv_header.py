@@ -45,7 +45,7 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class Head:
-    """What stands above the numbers.
+    """The headings of a table: the lines above the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
     left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
@@ -134,8 +134,8 @@ def find_head(lines: Sequence[Line], known: Callable[[str], bool], separators: S
 
 
 def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
-    """The same of the first line with a heading that is known, whatever is beneath it: what is wrong there has to be
-    told by whoever reads the rows."""
+    """The headings in the first line that has a known heading, whatever is beneath it: errors there are left to the
+    reader of the rows."""
     for i, line in enumerate(lines):
         parted = {sign: trimmed(split(line.text, sign)) for sign in separators}
         heads = [
@@ -168,7 +168,8 @@ def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator
 
 
 def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
-    """The same table with commas between columns, decimal points and units in the headings, each line in its place.
+    """The text of a table with commas between columns, decimal points and units in the headings, each line in its
+    place.
 
     ``wanted`` are names of columns, by which the headings are known. Titles become comments; a separator that ends the
     lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the

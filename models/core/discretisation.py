@@ -1,4 +1,4 @@
-"""How far its steps leave a run from the answer of steps without length, told by a second run in longer ones.
+"""Step errors of a run against steps without length, told by a second run in longer steps.
 
 With steps twice as long a method of order p errs 2^p times as much: the difference of both runs, divided by 2^p - 1, is
 the error of the finer one (Richardson). Roads, switches and contacts lower the order, so that it is observed, where a
@@ -57,7 +57,7 @@ class Estimate:
         return not self.share <= WARNED
 
     def advice(self, of: str) -> str:
-        """What to do about it, ``of`` the unit of steps."""
+        """Advice on reducing the estimated error, ``of`` the unit of steps."""
         if self.of:
             return f"use at least {self.step:g} {self.of}"
         return f"use at most {self.step:g} {of}".rstrip() if self.step else "no shorter step mends it"
@@ -69,7 +69,8 @@ class Estimate:
 
 
 def size_of(values: np.ndarray) -> float:
-    """What the share of an error is of: the standard deviation over the first axis, or the size of what is still."""
+    """Size of a channel, to which its error is relative: the standard deviation over the first axis, or the size of
+    what is still."""
     largest = float(np.abs(values).max(initial=0.0))
     deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
     return deviation if deviation > STILL * largest else largest
@@ -253,7 +254,8 @@ def of_tolerance(
 
 
 def by_cells(error: float, size: float, unit: str, cells: int, order: float, most: int) -> Estimate:
-    """What a grid of ``cells`` leaves, as an estimate; ``step`` is the number of cells, at most so many, for GOAL."""
+    """Estimate of the error that a grid of ``cells`` leaves; ``step`` is the number of cells, at most so many, for
+    GOAL."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
@@ -270,16 +272,16 @@ def summed(first: Estimate, other: Estimate) -> Estimate:
     return Estimate(first.error + other.error, first.unit, first.share + other.share, order, step, larger.of)
 
 
-def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:
+def stated(run: Result, estimates: Mapping[str, Estimate], method: str, of: str = "s") -> Result:
     """The result that says its error, channel by channel, and how that was told; ``of``: the unit of steps or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    channels = {name: asdict(estimate) for name, estimate in told.items()}
-    run.data.attrs["error"] = json.dumps({"how": how, "of": of, "channels": channels})
-    worst = max(told, key=lambda name: told[name].share, default=None)
-    if worst is not None and told[worst].refused:
-        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
+    channels = {name: asdict(estimate) for name, estimate in estimates.items()}
+    run.data.attrs["error"] = json.dumps({"how": method, "of": of, "channels": channels})
+    worst = max(estimates, key=lambda name: estimates[name].share, default=None)
+    if worst is not None and estimates[worst].refused:
+        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], estimates[worst]
         why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(of)}"
         fault = "cells are too few" if estimate.of else "steps are too long" if estimate.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
@@ -300,24 +302,25 @@ def not_estimated(run: Result, why: str) -> Result:
     return run
 
 
-def of_theory(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
-    """The result with what a theory itself leaves, beside what was said of its cells; ``how``: words that say whence.
+def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
+    """The result with what a theory itself leaves, beside what was said of its cells; ``method``: words that say
+    whence.
 
     No grid lessens it, so that it is neither warned of nor refused.
     """
     said = json.loads(run.data.attrs["error"])
-    said["theory"] = {"how": how, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
+    said["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 
 
-def of_chance(run: Result, told: Mapping[str, Estimate], samples: int) -> Result:
+def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
     """The result of an ensemble with the standard errors of its channels, of ``samples`` paths.
 
     Beside it stands what was said of the steps before.
     """
     said = json.loads(run.data.attrs["error"])
-    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
+    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 
@@ -335,7 +338,7 @@ def worst_of(run: Result) -> Estimate | None:
 
 
 def error_lines(run: Result) -> list[str]:
-    """What is printed of a result's error: the worst channel of steps and of cells, the worst of both first, with a
+    """Printed lines on a result's error: the worst channel of steps and of cells, the worst of both first, with a
     warning and what to use where one is due; then what its theory and its sample leave."""
     said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
     text = [f"error not estimated: {said['why']}"] if "why" in said else []

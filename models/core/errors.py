@@ -31,7 +31,7 @@ class InputError(ValueError):
         super().__init__(f"{where}{_shown(value)}: {allowed}{nearest(name, choices)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How the error crosses the border of a process: by what made it."""
+        """Parts from which the error is made again in another process."""
         return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
 
 
@@ -86,7 +86,7 @@ class RunFailed(RuntimeError):
         super().__init__(f"{engine}: {reason}{since}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How the error crosses the border of a process: by what made it, with what was recorded."""
+        """Parts from which the error is made again in another process, with the recorded state."""
         return type(self), (self.engine, self.reason, self.time, self.state), vars(self)
 
 
@@ -98,5 +98,5 @@ class Refused(InputError):
         super().__init__(file, f"engines.{engine}" if file else engine, None, why)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How the error crosses the border of a process: by what made it."""
+        """Parts from which the error is made again in another process."""
         return type(self), (self.engine, self.why, self.file), vars(self)

@@ -31,7 +31,7 @@ class Finding:
 
 
 def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """As plain values, for JSON."""
+    """Findings as plain values, for JSON."""
     return [
         {"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
         for f in findings
@@ -44,7 +44,7 @@ def lines(findings: Iterable[Finding]) -> list[str]:
 
 
 def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """The same, but where more than FEW of one check and weight were found only the worst, which says so."""
+    """The findings, but where more than FEW of one check and weight were found only the worst, which says so."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)

@@ -12,7 +12,7 @@ MOVED: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml").read_t
 
 
 class Moved(MetaPathFinder):
-    """Asked for what nobody else has found."""
+    """Finder of imports by old module names, asked after all others."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> None:
         """Raise ModuleNotFoundError with the new name for an old one."""

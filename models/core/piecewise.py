@@ -31,7 +31,7 @@ def evaluate(coefficients, period, start, step, count, derivatives):
 
 
 @njit(cache=True, nogil=True)
-def interpolate(values, index, part):
+def interpolate(values, index, fraction):
     """Values (n, columns) the given parts of a period after the samples ``index``, linear up to the next sample."""
     rows, columns = values.shape
     out = np.empty((len(index), columns))
@@ -39,5 +39,5 @@ def interpolate(values, index, part):
         row = index[i]
         after = min(row + 1, rows - 1)
         for column in range(columns):
-            out[i, column] = values[row, column] + part[i] * (values[after, column] - values[row, column])
+            out[i, column] = values[row, column] + fraction[i] * (values[after, column] - values[row, column])
     return out

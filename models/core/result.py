@@ -34,7 +34,7 @@ class Channel(NamedTuple):
     meaning: str = ""
 
     def labelled(self) -> tuple[Any, ...]:
-        """As xarray takes it."""
+        """Dimensions, values and attributes of the channel, as xarray takes them."""
         return self.axes, self.values, {"units": self.unit, "long_name": self.meaning}
 
 
@@ -70,7 +70,7 @@ class Result:
         return json.loads(self.data.attrs["counts"])
 
     def every(self, spacing: float) -> "Result":
-        """The same with rows ``spacing`` (s) apart, or all of them where they already are."""
+        """A copy of the result with rows ``spacing`` (s) apart; all rows where they are that far apart already."""
         step = max(1, round(spacing / float(self.times[1] - self.times[0])))
         return replace(self, data=self.data.isel(time=slice(None, None, step)))
 

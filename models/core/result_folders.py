@@ -89,6 +89,6 @@ def _made(path: Path) -> bool:
     return True
 
 
-def _unusable(folder: Path, what: str, error: OSError) -> Exception:
+def _unusable(folder: Path, reason: str, error: OSError) -> Exception:
     """A full disk is no mistake of what the user wrote."""
-    return error if error.errno in FULL else InputError("--out", "", str(folder), f"{what}: {error.strerror}")
+    return error if error.errno in FULL else InputError("--out", "", str(folder), f"{reason}: {error.strerror}")

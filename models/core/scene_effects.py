@@ -219,7 +219,7 @@ def with_own(scene: Any) -> Any:
 
 
 def extended(built: Any, scene: Any) -> Any:
-    """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
+    """The object that a system built of a scene, extended by the scene's tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
         built = _extend(name, module_of(scene.system, name), built, table)
     return built
@@ -255,22 +255,22 @@ def check(scene: Any) -> None:
     legal(named(scene), scene)
 
 
-def legal(there: Iterable[str], scene: Any) -> None:
-    """The same of effects that are known to be there."""
-    there = tuple(there)
-    for name in there:
+def legal(present: Iterable[str], scene: Any) -> None:
+    """Check that effects of a scene may stand together, of names that are known to exist."""
+    present = tuple(present)
+    for name in present:
         module = module_of(scene.system, name)
         why = f", {module.WHY}" if module.WHY else ""
         for other in module.NEEDS:
-            if other not in there:
+            if other not in present:
                 raise InputError(
                     scene.file,
                     _place(module, name),
                     None,
-                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, there)}{_at(scene, other)}",
+                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, present)}{_at(scene, other)}",
                 )
         for other in module.EXCLUDES:
-            if other in there:
+            if other in present:
                 raise InputError(
                     scene.file,
                     _place(module, name),
@@ -279,9 +279,9 @@ def legal(there: Iterable[str], scene: Any) -> None:
                 )
 
 
-def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
-    """What must be dropped for an effect's sake."""
-    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in there]
+def _instead(scene: Any, name: str, present: tuple[str, ...]) -> str:
+    """Phrase on what must be dropped for an effect's sake."""
+    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in present]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
@@ -297,7 +297,7 @@ def _at(scene: Any, name: str) -> str:
 
 
 def own_table(scene: Any) -> Table:
-    """What the scene's file says, as nested tables that may be edited; no defaults."""
+    """The scene's file as nested tables that may be edited, without defaults."""
     table: Table = deepcopy(scene.model_dump(exclude_unset=True))
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
@@ -325,7 +325,7 @@ def without(scene: Any, *left_out: str) -> Any:
 
 
 def _depth(name: str, system: str) -> int:
-    """How long the longest chain of needs is; who needs another one leaves before it."""
+    """Length of the longest chain of effects that need each other; an effect leaves before those that it needs."""
     return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
@@ -367,7 +367,7 @@ def rebuilt(table: Table, scene: Any) -> Any:
 
 
 def lines(scene: Any, width: int = 10) -> list[str]:
-    """What ``twinrig show`` says: a line per effect of the scene with what it takes, and one of all that are absent."""
+    """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
     said = {name: module_of(scene.system, name).COST for name in named(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
     return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]

@@ -13,7 +13,7 @@ from models.core.strict import Strict, read
 
 
 class SceneFile(Strict):
-    """What the scenes of all systems have in common; ``options`` is checked by the study that owns it."""
+    """Keys that the scenes of all systems share; ``options`` is checked by the study that owns it."""
 
     CHOOSING: ClassVar[str] = "choice"
     """The study that chooses among the effects of a scene of this system."""
@@ -206,5 +206,5 @@ BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]
 
 
 def _with_digits(number: re.Match) -> str:
-    """The same number with both."""
+    """The number with a digit on both sides of its decimal point."""
     return f"{number[1] or '0'}.{number[2] or '0'}"

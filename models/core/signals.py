@@ -21,7 +21,7 @@ SNAP = 1e-6
 
 
 class Signal(Protocol):
-    """What an engine may ask of an input."""
+    """Protocol of an engine's input signal."""
 
     @property
     def channels(self) -> int:
@@ -178,7 +178,7 @@ class Smooth:
         return self.sample(time, self.period, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:
-        """None that a solver of moderate order must stop at."""
+        """Times at which a solver must stop: none for a solver of moderate order."""
         return np.empty(0)
 
 
@@ -213,12 +213,12 @@ class Stacked:
 
     @property
     def period(self) -> float | None:
-        """Period of the first sampled part."""
+        """Period (s) of the first sampled signal in the stack."""
         return next((part.period for part in self.parts if part.period is not None), None)
 
     @property
     def held(self) -> bool:
-        """True if any part is constant over each step."""
+        """True if any of the stacked signals is constant over each sampling period."""
         return any(part.held for part in self.parts)
 
     @property
@@ -235,5 +235,5 @@ class Stacked:
         return np.concatenate([part.at(time) for part in self.parts])
 
     def knots(self, duration: float) -> np.ndarray:
-        """Times at which any part is not smooth."""
+        """Times at which any of the stacked signals is not smooth."""
         return np.unique(np.concatenate([part.knots(duration) for part in self.parts]))

@@ -51,7 +51,7 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
 
 
 def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
-    """One message for all that was found."""
+    """One error with all faults that pydantic listed."""
     first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]
@@ -89,7 +89,7 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
 
 
 def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
-    """What would have been accepted, in plain words."""
+    """Phrase that says which keys or values would have been accepted."""
     fields = {} if owner is None else owner.model_fields
     key = keys[-1] if keys else ""
     kind, facts = first["type"], _facts(fields.get(key))

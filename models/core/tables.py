@@ -286,12 +286,12 @@ def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
-def _block(path: Path, part: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:
-    lines, wrong = [line for line, _ in part], {}
-    values = _all(part, len(names))
+def _block(path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:
+    lines, wrong = [line for line, _ in block], {}
+    values = _all(block, len(names))
     if values is None:
-        values = np.full((len(part), len(names)), np.nan)
-        for i, (line, text) in enumerate(part):
+        values = np.full((len(block), len(names)), np.nan)
+        for i, (line, text) in enumerate(block):
             try:
                 values[i] = _row(path, line, text, titles, (False,) * len(titles))
             except InputError as error:
@@ -300,13 +300,13 @@ def _block(path: Path, part: list[tuple[int, str]], names: list[str], factors: n
     return Block(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
 
 
-def _all(part: list[tuple[int, str]], width: int) -> np.ndarray | None:
+def _all(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
     """All rows at once, where none of them needs a closer look."""
-    rows = [text for _, text in part]
+    rows = [text for _, text in block]
     if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):
         return None
     try:
         values = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
     except ValueError:
         return None
-    return values if values.shape == (len(part), width) and np.isfinite(values).all() else None
+    return values if values.shape == (len(block), width) and np.isfinite(values).all() else None

@@ -38,13 +38,13 @@ def read_time_series(
 
 
 def other_unit(lasts: float, needed: float) -> str:
-    """What to say of a file that lasts for so little (s) of what is needed that its times may be of another unit."""
+    """Sentence on a file that lasts for so little (s) of the needed time that its times may be in another unit."""
     wrong = lasts < needed / SHORT
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
 def sparse(count: int, period: float, needed: float, apart: float = WHEEL) -> str:
-    """What to say of so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
+    """Sentence on so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
     ``apart`` (s) for what moves: their times may be of another unit; "" of others."""
     lasts = period * (count - 1)
     if count < MANY or lasts < SHORT * needed or period < apart:

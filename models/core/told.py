@@ -1,4 +1,4 @@
-"""What readers are told of results: the error of each, and every assumption that was broken."""
+"""Texts for readers of results: the error of each, and every assumption that was broken."""
 
 import json
 from collections.abc import Mapping
@@ -67,7 +67,7 @@ def remarks(results: Results) -> list[str]:
     return [*steps[:EACH], *(breach.brief() for _, breach in breaches(results))]
 
 
-def gathered(whole: Result, parts: Results) -> Result:
+def gathered(joined: Result, parts: Results) -> Result:
     """A result that joins others, with what each of them says of its error and all assumptions that any broke."""
     said = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
     first = next(iter(said.values()))
@@ -76,19 +76,19 @@ def gathered(whole: Result, parts: Results) -> Result:
         for name, each in said.items()
         for channel, values in each.get("channels", {}).items()
     }
-    whole.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
+    joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
     assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
     kept = [replace(breach, where=f"{names}, {breach.where}") for names, breach in breaches(parts)]
-    whole.data.attrs["assumptions"] = json.dumps(
+    joined.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in kept]}
     )
     broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
-    whole.data.attrs["status"] = next(broke, whole.data.attrs["status"])
-    return whole
+    joined.data.attrs["status"] = next(broke, joined.data.attrs["status"])
+    return joined
 
 
-def inherited(derived: Result, results: Results, how: str) -> Result:
-    """What was computed of results with their errors, ``how``, the worst of each channel, and what they broke.
+def inherited(derived: Result, results: Results, method: str) -> Result:
+    """A derived result with the errors of its source results, ``method`` they add, and the assumptions that they broke.
 
     Without estimates in the results it has none.
     """
@@ -99,7 +99,7 @@ def inherited(derived: Result, results: Results, how: str) -> Result:
         derived.data.attrs["status"] += ", assumptions broken"
     pairs = [pair for run in results.values() for pair in errors_of(run).items()]
     worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
-    return stated(derived, worst, how) if worst else derived
+    return stated(derived, worst, method) if worst else derived
 
 
 def as_json(results: Results) -> dict[str, Any]:
@@ -129,7 +129,7 @@ SAID = ("engine", "error", "assumptions")
 
 
 def attributes(results: Results) -> dict[str, dict[str, str]]:
-    """What results say, without their channels, as JSON keeps it; ``speaking`` reads it."""
+    """Attributes of results without their channels, for JSON; ``speaking`` reads them."""
     return {name: {key: run.data.attrs[key] for key in SAID} for name, run in results.items()}
 
 

@@ -1,4 +1,4 @@
-"""What a run of a vehicle is, in every engine and every system."""
+"""Trajectory of a vehicle, as every engine and every system returns it."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""What a run that takes its time is at, for a bar that someone may watch; nothing is computed unless one does."""
+"""Progress of a long run for a bar that someone may watch; nothing is computed unless someone does."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,8 @@ MARCHES: list[Callable[[], float]] = []
 
 @contextmanager
 def marching(share: Callable[[], float]) -> Iterator[None]:
-    """For the block a march is under way; share : what is done of it, 0 to 1, asked from another thread at any time."""
+    """Context in which a march is under way; share : the part that is done, 0 to 1, asked from another thread at any
+    time."""
     MARCHES.append(share)
     try:
         yield

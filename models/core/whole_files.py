@@ -59,6 +59,6 @@ def _at_work(process: int) -> bool:
 
 
 def reason_of(error: OSError) -> str:
-    """What the system says of a file that could not be written, as a phrase with the file."""
+    """The operating system's reason why a file could not be written, as a phrase with the file."""
     reason = "the disk is full" if error.errno in FULL else error.strerror or str(error)
     return " ".join(reason.split()) + (f" ({error.filename})" if error.filename else "")

@@ -133,7 +133,7 @@ def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
 
 
 def _lines_of_legends(figure: Figure) -> int:
-    """How many lines of a remark the legends take that lie below a figure's axes."""
+    """Number of lines that the legends below a figure's axes take, in units of a remark's line."""
     if figure.legends:
         figure.draw_without_rendering()
     tops = [legend.get_window_extent().y1 for legend in figure.legends]
@@ -154,12 +154,12 @@ SHARP = 0.05
 """Ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, where a tenth is told, logarithmic far from it."""
 
 
-def about_one(axis: Axes, which: str, ticks: Sequence[float]) -> None:
+def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
     """Make an axis (x or y) show ratios, so that both 5 % and many decades are seen; ticks : the marked ratios."""
     scale = (lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u)))
-    getattr(axis, f"set_{which}scale")("function", functions=scale)
-    getattr(axis, f"set_{which}ticks")(ticks, [f"{tick:g}" for tick in ticks])
-    getattr(axis, f"{which}axis").set_minor_locator(NullLocator())
+    getattr(axis, f"set_{axis_name}scale")("function", functions=scale)
+    getattr(axis, f"set_{axis_name}ticks")(ticks, [f"{tick:g}" for tick in ticks])
+    getattr(axis, f"{axis_name}axis").set_minor_locator(NullLocator())
 
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -204,7 +204,7 @@ class PlainLogScale(LogScale):
         super().__init__(**options)
 
     def set_default_locators_and_formatters(self, axis: Any) -> None:
-        """As matplotlib asks of a scale; called for every axis that takes it."""
+        """Set the axis' tick marks and labels, as matplotlib asks of a scale; called for every axis that takes it."""
         super().set_default_locators_and_formatters(axis)
         if self.base == 10:
             axis.set_major_formatter(_Powers())

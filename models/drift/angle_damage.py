@@ -1,4 +1,4 @@
-"""What a wrong pitch does to the damage of a component: paths of a gyro's angle error, and damage over such an error.
+"""Damage of a component by a wrong pitch: paths of a gyro's angle error, and damage over such an error.
 
 A vehicle that is guided by a gyro's pitch stands wrong by its angle error, and a slow angle turns the section forces
 and changes nothing else: the component along the chassis is f3 sin(pitch + error). So the damage of a run, driven again

@@ -32,11 +32,11 @@ class Figure:
 
     @property
     def inside(self) -> bool:
-        """Whether it is as a right filter's."""
+        """Whether the figure is within a right filter's interval."""
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:
-        """With its interval, for an engineer."""
+        """The figure with its interval, as text for an engineer."""
         return f"{self.name} {self.value:.3g} ({self.low:.3g} to {self.high:.3g})"
 
 
@@ -63,8 +63,8 @@ class Consistency:
 
 
 def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
-    """Of normalised innovations (n, columns), independent and of deviation 1 where the filter is right; NaN where
-    nothing was measured."""
+    """Consistency figures of normalised innovations (n, columns), independent and of deviation 1 where the filter is
+    right; NaN where nothing was measured."""
     known = np.isfinite(innovations)
     tail = LEVEL / (1 + 2 * len(names)) / 2
     count = int(known.sum())
@@ -79,7 +79,7 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
 
 
 def _mean(name: str, column: np.ndarray, tail: float) -> Figure:
-    """In deviations of an innovation."""
+    """Mean of the innovations in units of their standard deviation."""
     known = column[np.isfinite(column)]
     wide = float(norm.isf(tail)) / math.sqrt(len(known))
     return Figure(f"mean of {name}", float(known.mean()), -wide, wide)

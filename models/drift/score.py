@@ -1,12 +1,11 @@
-"""What a stabilised run is worth: what it costs by itself, how wrong it is beside the true one, and a verdict.
+"""Score of a stabilised run: the cost of the stabilisation, its error beside the true run, and a verdict.
 
 Two kinds of figures are kept apart, because an engineer has only one of them.
 
-`Own` needs the run alone: the artificial moment, that is the part of I pitch'' that no suspension force explains,
-and what the run cost. `Errors` needs the true run, which only a virtual measurement has: pseudo-damage of the
-body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among
-them as a warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good.
-"""
+`RunFigures` needs the run alone: the artificial moment, that is the part of I pitch'' that no suspension force
+explains, and what the run cost. `Errors` needs the true run, which only a virtual measurement has: pseudo-damage of the
+body-frame section forces, rms error of these forces, pitch error. The vertical suspension force is kept among them as a
+warning: f3 = f1 - m1 g + m1 z1'' holds at every pitch, so it calls a tumbling vehicle good."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -61,8 +60,8 @@ class Limits(Strict):
 
 
 @dataclass(frozen=True)
-class Own:
-    """What a run says of itself.
+class RunFigures:
+    """Figures of a stabilised run that need no true run: moments and forces of the stabiliser, pitch, cost.
 
     Attributes
     ----------
@@ -86,7 +85,7 @@ class Own:
 
 @dataclass(frozen=True)
 class Errors:
-    """What a run is beside the true one.
+    """Errors of a stabilised run against the true run.
 
     Attributes
     ----------
@@ -107,13 +106,13 @@ class Errors:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A word and the reason for it."""
+    """Verdict on a run: a word and its reason."""
 
     word: Word
     reason: str
 
 
-def own_figures(run: Result, p: Parameters) -> Own:
+def figures_of_run(run: Result, p: Parameters) -> RunFigures:
     """Figures of a run with the vehicle's parameters p; raises InputError if its rows are not a uniform fine grid.
 
     The artificial moment is the mean over each step of I pitch'' less the suspension's moment, so it counts whatever
@@ -128,7 +127,7 @@ def own_figures(run: Result, p: Parameters) -> Own:
         for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
     }
     counts = run.counts()
-    return Own(
+    return RunFigures(
         moment_rms=rms(moment),
         moment_max=float(np.abs(moment).max()),
         moment_share=_share(moment, inertia),
@@ -160,7 +159,7 @@ def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
     )
 
 
-def verdict(figures: Own, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict(figures: RunFigures, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
     """The verdict of a virtual measurement, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED or LEVEL among
@@ -191,12 +190,13 @@ def consistent(run: Result) -> bool | None:
 
 
 def uncertainty(run: Result) -> float:
-    """What a Kalman filter itself says of its pitch: twice the largest standard deviation (rad); 0 without one."""
+    """Uncertainty of a Kalman filter's pitch by its own statement: twice the largest standard deviation (rad); 0
+    without a filter."""
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
 
 def blind_verdict(
-    figures: Own,
+    figures: RunFigures,
     effects: Iterable[str],
     duration: float,
     limits: Limits,
@@ -228,7 +228,7 @@ def blind_verdict(
     return Verdict("accepted", f"held to the measured pitch by {figures.moment_share_band:.1%} of I pitch''")
 
 
-def _tumbled(figures: Own) -> Verdict:
+def _tumbled(figures: RunFigures) -> Verdict:
     return Verdict("rejected", f"tumbled: pitch of {figures.pitch_max:.2g} rad; none of its forces mean anything")
 
 
@@ -241,7 +241,7 @@ def _free(duration: float, trusted: float | None) -> Verdict:
 
 
 def _beyond(deviations: Errors, limits: Limits) -> list[str]:
-    """What the true run shows to be wrong."""
+    """Sentences on errors against the true run that are above their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
         for name, ratio in deviations.damage.items()
@@ -252,8 +252,8 @@ def _beyond(deviations: Errors, limits: Limits) -> list[str]:
     )
 
 
-def _burden(figures: Own, limits: Limits) -> list[str]:
-    """What the run itself shows to be wrong."""
+def _burden(figures: RunFigures, limits: Limits) -> list[str]:
+    """Sentences on figures of the run itself that are above their limits."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
         f"artificial {name} {share:.0%} of {whole}"
@@ -274,9 +274,9 @@ def low_pass(values: np.ndarray, step: float) -> np.ndarray:
     return sosfiltfilt(butter(ORDER, BAND, fs=1.0 / step, output="sos"), values)
 
 
-def _share(part: np.ndarray, whole: np.ndarray) -> float:
-    """Rms of a part by that of the whole; nothing of nothing is nothing."""
-    size, all_of_it = rms(part), rms(whole)
+def _share(values: np.ndarray, total: np.ndarray) -> float:
+    """Rms of a part divided by that of the total; 0 where both are 0."""
+    size, all_of_it = rms(values), rms(total)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 

@@ -1,4 +1,4 @@
-"""What engines are given of the pitch-plane vehicle, bodies, struts, input and settings, and what they give: a path."""
+"""The pitch-plane system that engines are given, bodies, struts, input and settings, and the path that they return."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -20,7 +20,7 @@ Channels = dict[str, tuple[str, str, np.ndarray]]
 
 @dataclass(frozen=True)
 class Assembly:
-    """What a run computes. Effects extend it; engines read it.
+    """A pitch-plane system to compute: effects extend it, engines read it.
 
     Attributes
     ----------
@@ -55,28 +55,29 @@ class Assembly:
         return GUIDED.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
-        """The same, driven by ``signal``."""
+        """A copy of the assembly that is driven by ``signal``."""
         return replace(self, mode=mode, input=signal)
 
     def with_moment(self, signal: Signal) -> "Assembly":
-        """The same, with a pitch moment added on the chassis; it stands beside any forces, held ones too."""
+        """A copy of the assembly with a pitch moment added on the chassis; it stands beside any forces, held ones
+        too."""
         assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
         return replace(self, moment=signal)
 
     def with_spring(self, spring: PitchSpring) -> "Assembly":
-        """The same, with one more rotational spring to the ground."""
+        """A copy of the assembly with one more rotational spring from chassis to ground."""
         springs = (*self.vehicle.pitch_springs, spring)
         return replace(self, vehicle=replace(self.vehicle, pitch_springs=springs))
 
     def without_tyres(self) -> "Assembly":
-        """The same, cut off the road."""
+        """A copy of the assembly that is cut off the road."""
         struts = tuple(strut for strut in self.vehicle.struts if strut.lower.body is not None)
         return replace(self, vehicle=replace(self.vehicle, struts=struts))
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to integrate: integrator by its engine's name, step and duration in s."""
+    """Settings of the time integration: integrator by its engine's name, step and duration in s."""
 
     integrator: str
     step: float

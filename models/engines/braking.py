@@ -25,9 +25,10 @@ HEADER, HELD = 2, 6
 """Numbers at the head of the table, those of units and of wheels, and numbers of each wheel."""
 
 
-class Held(NamedTuple):
-    """What the wheels hold over a step, each (W,): unit, place (m) in its axes and steer angle (rad) of the wheel, and
-    the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the units."""
+class WheelForces(NamedTuple):
+    """Wheel quantities that are constant over a step, each (W,): unit, place (m) in its axes and steer angle (rad)
+    of the wheel, and the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the
+    units."""
 
     unit: np.ndarray
     x: np.ndarray
@@ -44,7 +45,7 @@ def held(numbers, time, q, v, f):
     units, wheels = int(head[0]), int(head[1])
     reach = array(beyond(numbers, HEADER), (units, units))
     rows = array(beyond(numbers, HEADER + units * units), (HELD, wheels))
-    wheel = Held(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+    wheel = WheelForces(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
     position, force = array(q, (2 + units,)), array(f, (2 + units,))
     for i in range(wheels):
         k, heading = int(wheel.unit[i]), wheel.steer[i]
@@ -100,13 +101,13 @@ class Carried:
         numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
         driven = Driven(bodies(plane), np.zeros(3), numbers, held, set_held)
         self._model: FreeModel = free_model(engine, driven)
-        self._held = Held(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
+        self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
 
     def advance(
         self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, or ``advance_lagging`` with its ``Lag``, a step at a time, each moved by
-        the engine."""
+        """Advance a braked vehicle as ``models.brake.advance.advance`` (with a ``Lag``, ``advance_lagging``) does, each
+        step moved by the engine."""
         time, report, go = 0.0, Report(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
@@ -122,7 +123,7 @@ class Carried:
         return FINE, time
 
     def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``."""
+        """March a braked vehicle as ``models.brake.samples.samples`` does, each step moved by the engine."""
         return moved(self.advance)(*given)
 
     def _moved(self, before: np.ndarray, step: float) -> np.ndarray:

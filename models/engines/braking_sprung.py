@@ -19,8 +19,8 @@ from models.brake.sprung_step import (
     UPRIGHT,
     AtWheels,
     Contacts,
-    Held,
     OnEngine,
+    WheelForces,
     advance,
     advance_with,
     held,
@@ -90,8 +90,8 @@ class OnSprings:
         return go, moved(go)
 
     @cached_property
-    def _own(self) -> OnEngine:
-        """What steps need, of tyres that answer at once."""
+    def _on_engine(self) -> OnEngine:
+        """Data that steps need with tyres that answer at once."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,
@@ -105,9 +105,11 @@ class OnSprings:
         )
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
-        """Of the wheels that hold what is at the end of a table."""
+        """``AtWheels`` of the wheel quantities at the end of a table."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
-        return AtWheels(Held(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels))
+        return AtWheels(
+            WheelForces(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels)
+        )
 
     def advance(
         self,
@@ -118,36 +120,37 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+        """Advance the vehicle as ``models.brake.advance.advance`` does, the state (2, n) having all coordinates and
+        their rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
         """
         go, _ = self._go(lag is not None)
         with self._model.at_step(step):
-            status, time = go(motion, torques, step, steer, vehicle, self._own._replace(lag=lag or ()))
+            status, time = go(motion, torques, step, steer, vehicle, self._on_engine._replace(lag=lag or ()))
         return self._sound(status, time), time
 
     def moving(
         self,
-        told: Any,
-        kept: Any,
+        commands: Any,
+        record: Any,
         sample: float,
         braking: Any,
         motion: Motion,
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
-        RunFailed as ``advance``."""
+        """March the vehicle as ``models.brake.samples.samples`` does, lag being of tyres that lag; Refused for a step
+        that is too long, RunFailed as ``advance``."""
         _, by_steps = self._go(lag is not None)
-        step, on_engine = sample / (braking.torques.shape[0] - 1), self._own
+        step, on_engine = sample / (braking.torques.shape[0] - 1), self._on_engine
         self.check_step(step)
         if lag is not None:
             from models.brake.sprung_relaxation import ContactLag
 
             on_engine = on_engine._replace(lag=ContactLag(*lag, np.zeros(1)))
-        rows = by_steps(told, kept, sample, braking, motion, vehicle, on_engine)
+        rows = by_steps(commands, record, sample, braking, motion, vehicle, on_engine)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)
@@ -173,7 +176,7 @@ class OnSprings:
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
-        on_engine, none = self._own, np.zeros(steer.size)
+        on_engine, none = self._on_engine, np.zeros(steer.size)
         known = self._at_wheels(on_engine.numbers)
         for part in known.held:
             part[:] = 0.0

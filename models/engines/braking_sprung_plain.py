@@ -15,7 +15,7 @@ from models.brake.plain.pressure import Pressures
 from models.brake.plain.step import BLINK, OVER, UPRIGHT, Course, Moving, Steps
 from models.brake.plain.suspension import Suspension
 from models.brake.plane_records import Motion
-from models.brake.samples import Braking, Kept, Told
+from models.brake.samples import Braking, Commands, Record
 from models.brake.sprung import Sprung
 from models.brake.surfaces import OnRoad
 from models.core.errors import RunFailed
@@ -48,7 +48,8 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "Lagging | None" = None,
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+        """Advance the vehicle in plain code as ``models.brake.advance.advance`` does, the state (2, n) having all
+        coordinates and their rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
@@ -67,21 +68,21 @@ class PlainOnSprings:
         return FINE, time
 
     def _moving(self, motion: Motion, lag: "Lagging | None") -> Moving:
-        """The same arrays as plain code reads them: a row of the report for each wheel."""
+        """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
         return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3], lag)
 
     def moving(
         self,
-        told: Told,
-        kept: Kept,
+        commands: Commands,
+        record: Record,
         sample: float,
         braking: Braking,
         motion: Motion,
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
-        RunFailed as ``advance``."""
+        """March the vehicle in plain code as ``models.brake.samples.samples`` does, lag being of tyres that lag;
+        Refused for a step that is too long, RunFailed as ``advance``."""
         torques, time, status, lagging = braking.torques, 0.0, FINE, None
         if lag is not None:
             from models.brake.plain.relaxation import Lagging
@@ -92,17 +93,17 @@ class PlainOnSprings:
         pressures = Pressures(braking.chambers, braking.brakes, sample, braking.air)
         while True:
             yield status, time, float(np.hypot(*motion.state[1, :2])), float(braking.air.supply[0])
-            for _ in range(int(told.samples[0])):
-                if math.isnan(told.pressures[0]):
-                    pressures.by_valves(told.valves, torques)
+            for _ in range(int(commands.samples[0])):
+                if math.isnan(commands.pressures[0]):
+                    pressures.by_valves(commands.valves, torques)
                 else:
-                    pressures.by_pressures(told.pressures, torques)
-                status, used = self.advance(motion, torques, step, told.steer, vehicle, lagging)
+                    pressures.by_pressures(commands.pressures, torques)
+                status, used = self.advance(motion, torques, step, commands.steer, vehicle, lagging)
                 time += used
-                kept.now[0] = time
-                kept.rows[kept.left[0]] = kept.now
-                kept.left[0] += 1
-                if status == AT_REST or time >= kept.until:
+                record.now[0] = time
+                record.rows[record.left[0]] = record.now
+                record.left[0] += 1
+                if status == AT_REST or time >= record.until:
                     break
 
     def check_step(self, step: float) -> None:

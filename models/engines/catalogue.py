@@ -8,7 +8,7 @@ Nodes = Literal["start", "half-steps", "any"]
 
 @dataclass(frozen=True)
 class Integrator:
-    """What is known of one integrator.
+    """Properties of one integrator.
 
     order : of its global error; nodes : when within a step it reads the input; adaptive : picks its own
     steps; constraints : gives correct moments of a prescribed pitch; holds : takes a held sample as constant

@@ -119,7 +119,7 @@ class Rolling:
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
     def _before(self, of: Listed) -> None:
-        """Forces of the step's start, held over it."""
+        """Compute the forces at the step's start, which are constant over the step."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
         def hold(mbs: Any, t: float) -> bool:

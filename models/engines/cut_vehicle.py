@@ -161,7 +161,8 @@ def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
 
 @dataclass(frozen=True)
 class NativeShare:
-    """Of a built model: names of the elements that are the engine's own, count of its joints; why others are not."""
+    """Native elements of a built model: names of the elements that are the engine's own, count of its joints; why
+    others are not."""
 
     elements: tuple[str, ...]
     joints: int
@@ -169,7 +170,8 @@ class NativeShare:
 
 
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
-    """What "exudyn" or "mujoco" has as its own of a vehicle, counted in a model that is built without a callback."""
+    """Parts of a vehicle that "exudyn" or "mujoco" computes by native elements, counted in a model that is built
+    without a callback."""
     division = divide(vehicle, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
     elements, joints = built_share(engine, driven)

@@ -32,14 +32,15 @@ class Exported:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a file is of. title : of the scene; source : the scene's file; axes : a sentence on directions and zero."""
+    """The system that an exported file describes. title : of the scene; source : the scene's file; axes : a sentence on
+    directions and zero."""
 
     title: str
     source: str
     axes: str
 
     def comment(self, has: Sequence[str], left_out: Sequence[str]) -> str:
-        """What stands at the head of a file."""
+        """Comment lines for the head of an exported file."""
         from importlib.metadata import version
 
         lines = [

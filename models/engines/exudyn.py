@@ -84,15 +84,15 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
     return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
 
 
-def _to_ground(built: Build, place: tuple[str, str], part: Strut | PitchSpring, law: Any = None) -> None:
+def _to_ground(built: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
     """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
     built.callbacks += len(keywords)
     built.mbs.AddObject(
         items.CoordinateSpringDamper(
             markerNumbers=[ground_marker(built.mbs), built.places[place]],
-            stiffness=part.stiffness,
-            damping=part.damping,
+            stiffness=element.stiffness,
+            damping=element.damping,
             **keywords,
         )
     )
@@ -269,7 +269,7 @@ class ExudynModel:
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The same with nothing enforced on prescribed coordinates."""
+        """Accelerations with nothing enforced on the prescribed coordinates."""
         self._set_state(q, v)
         if self.assembly.input is not None:
             self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
@@ -304,7 +304,7 @@ class ExudynModel:
         return Trajectory(times, states, enforced, counts)
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the prescribed coordinates take at one row of a run, and their inertia terms (N, N m)."""
+        """Forces that enforce the prescribed coordinates at one row of a run, and their inertia terms (N, N m)."""
         wanted, free = (
             self._wanted(time),
             self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],

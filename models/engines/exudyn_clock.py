@@ -45,6 +45,6 @@ class Clock:
         return self.latest[1]
 
     def advance(self, mbs: Any, t: float) -> bool:
-        """Before each step: t is its end, so the step is the one before it."""
+        """Called before each step: t is the step's end, so the step is the one before it."""
         self.step = min(round(t * self.per_time / 2) - 1, len(self.steps[0]) - 1)
         return True

@@ -76,14 +76,14 @@ def script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
 
 
 def counts(mbs: Any) -> Sequence[str]:
-    """What the script of a system builds, in words."""
+    """Numbers of items that the exported script of a system builds, in words."""
     writer = _Writer(mbs)
     writer.system()
     return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
 
 
 def functions(mbs: Any) -> tuple[str, ...]:
-    """What does not leave with a script, by the names of items: those whose law is a function, and what one adds."""
+    """Items that an exported script lacks, by name: those whose law is a function, and what one adds."""
     writer, data = _Writer(mbs), mbs.systemData
     places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
     acting = ((kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _acts(item))

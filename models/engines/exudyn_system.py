@@ -1,4 +1,5 @@
-"""What models in Exudyn share: items, states, mass matrix and residual, packed forces, and marches by its solvers."""
+"""Functions that all models in Exudyn share: items, states, mass matrix and residual, packed forces, and marches by its
+solvers."""
 
 import struct
 from collections.abc import Callable, Collection

@@ -58,7 +58,7 @@ class Build:
         if body is None:
             return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
         tree, link, origin = self.links[body]
-        local = self.own(body, np.subtract(point, origin))
+        local = self.in_body_axes(body, np.subtract(point, origin))
         if link is None:
             kind = items.MarkerBodyRigid if turning else items.MarkerBodyPosition
             return kind(bodyNumber=tree, localPosition=local)
@@ -74,10 +74,10 @@ class Build:
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
-        """How many coordinates a node has."""
+        """Number of coordinates of a node."""
         return sum(node == each for each, _ in self.places.values())
 
-    def own(self, body: str | None, vector: np.ndarray) -> np.ndarray:
+    def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
         """A vector (3,) of the design position in the axes that Exudyn gives a body."""
         if body is None or self.links[body][1] is not None:
             return vector

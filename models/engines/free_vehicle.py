@@ -47,7 +47,7 @@ class Driven:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates of the driven vehicle."""
         return len(self.vehicle.coordinates())
 
 
@@ -68,12 +68,12 @@ class FreeModel(ABC):
 
     @contextmanager
     def at_step(self, step: float) -> Iterator[None]:
-        """For the block only the engine is ready to be marched from outside by steps (s)."""
+        """Context in which the engine is ready to be marched from outside by steps (s)."""
         self.step = step
         yield
 
     def compiled(self) -> Any:
-        """What compiled code calls the engine by; None where it cannot."""
+        """The handle by which compiled code calls the engine; None where the engine has none."""
         return None
 
     @abstractmethod
@@ -141,7 +141,7 @@ def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
 
 
 def joints_alone(vehicle: SpatialVehicle) -> tuple[tuple[str, str], ...]:
-    """What engines have as their own of a vehicle whose springs keep to the heading of its carrier, and why no more:
+    """Native joints of each engine for a vehicle whose springs keep to the heading of its carrier, and why no more:
     heads and texts of a plan. Joints are counted in built models.
 
     Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it.

@@ -1,4 +1,4 @@
-"""What an engine is to every system: one protocol, which comparisons, prices, choices and sweeps go by."""
+"""The engine protocol that every system shares; comparisons, prices, choices and sweeps go by."""
 
 from typing import Protocol
 

@@ -94,7 +94,7 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
 
 @dataclass
 class Drive:
-    """How the input enters: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
+    """How a model's input acts: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
 
     Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
     """
@@ -152,7 +152,8 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 
 def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """What prescribed coordinates add to the strut forces on the free heave coordinates, shape (rows, 2 or 3)."""
+    """Generalised forces that prescribed coordinates add to those of the struts on the free heave coordinates, shape
+    (rows, 2 or 3)."""
     count = len(assembly.guided)
     path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
     z, pitch, dz, turn = (
@@ -251,7 +252,7 @@ class MujocoModel:
         return out
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
-        """Of the coordinates that are not prescribed, within a step of the run."""
+        """Accelerations of the coordinates that are not prescribed, within a step of the run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]

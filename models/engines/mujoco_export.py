@@ -91,6 +91,6 @@ def _all_digits() -> Iterator[None]:
 
 
 def counts(model: mujoco.MjModel) -> Sequence[str]:
-    """What a model has, in words."""
+    """Numbers of the elements of a MuJoCo model, in words."""
     kinds = (("bodies", model.nbody - 1), ("joints", model.njnt), ("tendons", model.ntendon), ("actuators", model.nu))
     return [f"{count} {kind}" for kind, count in kinds if count]

@@ -18,7 +18,7 @@ FORCE_CALLS = {"RK4": 4}
 
 
 def warnings(data: mujoco.MjData) -> str:
-    """What MuJoCo itself noticed, as a phrase; empty if nothing."""
+    """MuJoCo's own warnings as a phrase; empty if there are none."""
     names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
     return f"; MuJoCo warned {', '.join(names)}" if names else ""
 
@@ -48,7 +48,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
 
 
 def _chunks(steps: int) -> Iterator[tuple[int, int]]:
-    """First and last row of each part of a run."""
+    """First and last row of each part into which a run is cut."""
     for first in range(0, steps, CHUNK):
         yield first, min(first + CHUNK, steps)
 

@@ -49,7 +49,7 @@ def _call(typing_context, function, model, data):
 
 @cache
 def _library() -> ctypes.CDLL:
-    """MuJoCo as it is loaded already."""
+    """The MuJoCo library that this process has loaded."""
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
 
 

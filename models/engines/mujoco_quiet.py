@@ -1,4 +1,4 @@
-"""What is global to a process that runs MuJoCo: its callbacks, and its own words on what it warns of."""
+"""MuJoCo's state that is global to a process: its callbacks and its warnings."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

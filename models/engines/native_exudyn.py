@@ -49,14 +49,14 @@ def add_ground_spring(built: Build, spring: GroundSpring) -> None:
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
-    """Those of these names that an assembled system has an object of."""
+    """The element names for which an assembled system has an object."""
     objects = [mbs.GetObject(i)["name"] for i in range(mbs.systemData.NumberOfObjects())]
     listed = {name for each in objects if each.startswith(LAW) for name in each.removeprefix(LAW).split(NEXT)}
     return tuple(name for name in elements if _plain(name) in listed)
 
 
 def _name(*elements: Element) -> str:
-    """Name of the object that is these elements."""
+    """Name of the Exudyn object that stands for these elements."""
     return LAW + NEXT.join(_plain(element.name) for element in elements)
 
 
@@ -180,7 +180,8 @@ class _Trees:
         )
 
     def _tree(self, frame: str) -> Any:
-        """What a body carries, hung on the ground where it lies in the design position; no other link carries any."""
+        """The tree of links that a body carries, hung on the ground where the body lies in the design position; no
+        other link carries any."""
         if frame not in self.trees:
             self.trees[frame] = self.built.mbs.AddObject(self._new_tree(frame))
         return self.trees[frame]

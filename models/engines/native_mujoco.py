@@ -98,13 +98,13 @@ def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.split(BREAK, 1)[1] for name in (*tendons, *actuators)))
 
 
-def affine_forces(part: NativePart) -> list[Affine]:
+def affine_forces(element: NativePart) -> list[Affine]:
     """Forces on the length L of a part, d = L less its design value, that a tendon's own spring does not have.
 
     They draw it together: where the element presses with F, they are -F.
     """
-    axial, e = isinstance(part.travel, AxialTravel), part.element
-    design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
+    axial, e = isinstance(element.travel, AxialTravel), element.element
+    design = element.travel.design if isinstance(element.travel, AxialTravel) else 0.0
     stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
     held = e.held if axial or not e.stiffness else 0.0
     line = np.array([held, stiffness, damping]) + sum(_lines(e), np.zeros(3))

@@ -1,4 +1,4 @@
-"""What an engine makes of the springs, mounts and bars of a cut vehicle: its own elements, and what is left of them.
+"""Split of a cut vehicle's springs, mounts and bars into an engine's native elements and the forces left to a callback.
 
 A travel d that is a sum of coordinates is one for every engine. So is d = a . (p2 - p1), where the axis a is fixed in
 the body of one end and that body carries the other end. What an engine lacks stays in the compiled forces that act for
@@ -104,7 +104,8 @@ def divide(vehicle: CutVehicle, engine: str) -> Division:
 
 
 def _divided(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
-    """What the engine's element has, what is left, and why; a preload goes with what bears it."""
+    """The native part of an element, the part left to a callback, and the reasons; a preload goes with the part that
+    bears it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
     left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
     if curved and engine not in CURVES:
@@ -123,18 +124,22 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element as an engine may have it; None where it is neither."""
-    first, two = (_behind(tree, end, element.frame) for end in (element.one, element.two))
+    first, two = (_behind(tree, end, element.frame) for end in (element.first_body, element.second_body))
     if first is not None and two is not None and not any(_turns(tree, body) for body in (*first, *two)):
         return _along_coordinates(tree, element, first, two)
-    if element.frame == element.two and first is not None:
-        return AxialTravel(element.two, element.point_two, element.one, element.point_one, -element.axis)
-    if element.frame == element.one and two is not None:
-        return AxialTravel(element.one, element.point_one, element.two, element.point_two, element.axis)
+    if element.frame == element.second_body and first is not None:
+        return AxialTravel(
+            element.second_body, element.second_point, element.first_body, element.first_point, -element.axis
+        )
+    if element.frame == element.first_body and two is not None:
+        return AxialTravel(
+            element.first_body, element.first_point, element.second_body, element.second_point, element.axis
+        )
     return None
 
 
 def _turns(tree: SpatialVehicle, body: str) -> bool:
-    """Whether a body turns beside what it rides on."""
+    """Whether a body turns against the body that carries it."""
     return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
 
 
@@ -145,12 +150,12 @@ def _behind(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | No
 
 
 def _along_coordinates(
-    tree: SpatialVehicle, element: Element, first: tuple[str, ...], two: tuple[str, ...]
+    tree: SpatialVehicle, element: Element, first: tuple[str, ...], second: tuple[str, ...]
 ) -> CoordinateTravel:
     """Slides of the bodies behind the frame to either end, along its axes; those that move both ends drop out."""
     factors = dict[int, float]()
     for number, (body, freedom) in enumerate(tree.coordinates()):
-        ends = int(body in two) - int(body in first)
+        ends = int(body in second) - int(body in first)
         if factor := ends * float(element.axis[FREEDOMS.index(freedom) % 3]):
             factors[number] = factor
     return CoordinateTravel(tuple(factors), tuple(factors.values()))

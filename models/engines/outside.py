@@ -103,24 +103,25 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     return Guarded(name, _asked(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
-def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
-    """What foreign code answers; RunFailed if it raises anything but the project's own errors."""
+def _asked(name: str, question: str, function: Callable, *arguments: Any) -> Any:
+    """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
+    errors."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{what} raised {_said(error)}") from error
+        raise RunFailed(name, f"{question} raised {_said(error)}") from error
 
 
-def _numbers(name: str, what: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _numbers(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An answer as an array of this shape; RunFailed if it is none."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
-        raise RunFailed(name, f"{what} gave {type(value).__name__} instead of numbers") from None
+        raise RunFailed(name, f"{question} gave {type(value).__name__} instead of numbers") from None
     if numbers.shape != shape:
-        raise RunFailed(name, f"{what} gave the shape {numbers.shape} instead of {shape}")
+        raise RunFailed(name, f"{question} gave the shape {numbers.shape} instead of {shape}")
     return numbers
 
 
@@ -180,7 +181,7 @@ class Guarded:
     settings: Settings
 
     def run(self) -> Trajectory:
-        """What the engine's own run gives, checked."""
+        """The trajectory of the outside engine's run, checked."""
         answer = _asked(self.name, "run", self.model.run)
         if not (hasattr(answer, "times") and hasattr(answer, "states")):
             raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
@@ -199,7 +200,7 @@ class Guarded:
         return _numbers(self.name, "acceleration", answer, (4,))
 
     def plan(self) -> dict[str, int]:
-        """What was built, as far as the engine says."""
+        """Counts of what an outside engine built, as far as it states them."""
         blank = {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
         return blank | dict(getattr(self.model, "plan", dict)())
 

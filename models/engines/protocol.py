@@ -94,11 +94,11 @@ def _sampling(engine: str, integrator: Integrator, settings: Settings, period: f
         _whole(engine, settings.step, "the sampling period", period)
 
 
-def _whole(engine: str, step: float, whole: str, length: float) -> None:
+def _whole(engine: str, step: float, multiple: str, length: float) -> None:
     if not divides(step, length):
         raise Refused(
             engine,
-            f"the step {step:g} s does not divide {whole} {length:g} s; use for example {fitting(step, length)} s",
+            f"the step {step:g} s does not divide {multiple} {length:g} s; use for example {fitting(step, length)} s",
         )
 
 

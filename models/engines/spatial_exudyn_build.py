@@ -30,7 +30,7 @@ from models.vehicles.spatial_linear import preloads
 
 @dataclass
 class RoadForces:
-    """What callbacks hand over: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
+    """Road forces for callbacks: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
 
     by_road: np.ndarray
     rows: list[list[float]]
@@ -65,13 +65,13 @@ class RoadTable:
 
 def _spring(built: Build, spring: SpringDamper) -> None:
     """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
-    axis, ends, held = np.array(spring.axis), [spring.one, spring.two], built.held.parts[spring.name]
+    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], built.held.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
     first, two = (
         built.marker(end, point, not upright)
-        for end, point in zip(ends, (spring.point_one, spring.point_two), strict=True)
+        for end, point in zip(ends, (spring.first_point, spring.second_point), strict=True)
     )
-    rest = np.subtract(spring.point_two, spring.point_one)
+    rest = np.subtract(spring.second_point, spring.first_point)
     curved = spring.travel_force or spring.rate_force or spring.friction
     if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
         return built.connect(f"spring {spring.name!r}", first, two, _law(spring, axis, rest, held))
@@ -80,12 +80,12 @@ def _spring(built: Build, spring: SpringDamper) -> None:
         diagonal = axis**2
         law = {"stiffness": spring.stiffness * diagonal, "damping": spring.damping * diagonal}
         return built.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
-    sign = -1 if built.vehicle.turns(spring.one) else 1  # the axis is one of the first marker's body
+    sign = -1 if built.vehicle.turns(spring.first_body) else 1  # the axis is one of the first marker's body
     built.mbs.AddObject(
         items.LinearSpringDamper(
             name=f"spring {spring.name!r}",
             markerNumbers=[first, two][::sign],
-            axisMarker0=sign * built.own(ends[::sign][0], axis),
+            axisMarker0=sign * built.in_body_axes(ends[::sign][0], axis),
             stiffness=spring.stiffness,
             damping=spring.damping,
             offset=float(axis @ rest) - sunk,
@@ -93,16 +93,18 @@ def _spring(built: Build, spring: SpringDamper) -> None:
     )
 
 
-def _law(spring: SpringDamper, axis: np.ndarray, rest: np.ndarray, held: float) -> Callable[[Any, Any], list[float]]:
+def _law(
+    spring: SpringDamper, axis: np.ndarray, length_at_rest: np.ndarray, preload: float
+) -> Callable[[Any, Any], list[float]]:
     """All terms of a spring-damper's force."""
-    (ax, ay, az), design = axis.tolist(), float(axis @ rest)
+    (ax, ay, az), design = axis.tolist(), float(axis @ length_at_rest)
     k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
     travel_force, rate_force = spring.travel_force, spring.rate_force
 
     def law(apart: Any, rates: Any) -> list[float]:
         travel = ax * apart[0] + ay * apart[1] + az * apart[2] - design
         rate = ax * rates[0] + ay * rates[1] + az * rates[2]
-        force = held + k * travel + c * rate
+        force = preload + k * travel + c * rate
         if travel_force is not None:
             force += travel_force(travel)
         if rate_force is not None:
@@ -122,7 +124,7 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
     k, c = bar.stiffness, bar.damping
 
     def moment(apart: float, rate: float) -> float:
-        """From the right point's height and its rate beside the left one's."""
+        """Moment of a bar by the height of its right point above the left, and the rate of that."""
         twisting = c * (rate / track + turning()) if c else 0.0
         return held + k * ((apart - rest) / track + roll()) + twisting
 

@@ -38,7 +38,9 @@ LENGTH, STIFFNESS, DAMPING, HELD, TYRE, REST, ONE_SIDED, MORE, SHARES = range(9)
 it only pushes, where it has more of a law than a line, 0 if nowhere, and its shares up to there or to its end."""
 JOINT, SHARE, PER_SHARE = range(3)
 """Numbers of a share: a joint, and what its coordinate adds to the travel."""
-FRICTION, FRICTION_RATE, ONE, ONE_GAIN, TWO, TWO_GAIN, ON_TRAVEL, ON_RATE, CURVES = range(9)
+FRICTION, FRICTION_RATE, FIRST_COORDINATE, FIRST_GAIN, SECOND_COORDINATE, SECOND_GAIN, ON_TRAVEL, ON_RATE, CURVES = (
+    range(9)
+)
 """More of a law: dry friction, two coordinates (-1: none) that add to the force, points of the curves, these."""
 TURNS, SHIFTS, MOMENTS, FORCES, OF_BODY = 0, 3, 6, 9, 12
 """Of a body while the callback runs: turning, velocity at the origin of space, moment about it, force."""
@@ -62,7 +64,7 @@ class Parts(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What MuJoCo knows of the state, pointers to its doubles: coordinates and rates of the joints; of each body its
+    """MuJoCo's kinematic state as pointers to its doubles: coordinates and rates of the joints; of each body its
     centre and rotation (rows); of each joint its anchor and axis in space."""
 
     positions: Any
@@ -179,14 +181,14 @@ def _on_curve(pairs, size, argument):
 
 @register_jitable
 def _more(law, travel, rate, q):
-    """What of a force is no line."""
+    """The nonlinear rest of a force law: its value less that of the law's straight line."""
     force = 0.0
     if law[FRICTION] != 0.0:
         force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])
-    if law[ONE] >= 0.0:
-        force += law[ONE_GAIN] * q[int(law[ONE])]
-    if law[TWO] >= 0.0:
-        force += law[TWO_GAIN] * q[int(law[TWO])]
+    if law[FIRST_COORDINATE] >= 0.0:
+        force += law[FIRST_GAIN] * q[int(law[FIRST_COORDINATE])]
+    if law[SECOND_COORDINATE] >= 0.0:
+        force += law[SECOND_GAIN] * q[int(law[SECOND_COORDINATE])]
     over_travel, over_rate = 2 * int(law[ON_TRAVEL]), 2 * int(law[ON_RATE])
     if over_travel > 0:
         force += _on_curve(beyond(law, CURVES), over_travel, travel)
@@ -263,7 +265,7 @@ def spatial_law() -> Any:
 
 @dataclass(frozen=True)
 class Element:
-    """A force F against the travel s = own coordinate + sum of axis . point - value at rest, less the tyre's road.
+    """A force F against the travel s = added coordinate + sum of axis . point - value at rest, less the tyre's road.
 
     F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
     every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
@@ -275,7 +277,7 @@ class Element:
     held: float = 0.0
     friction: tuple[float, float] = (0.0, 1.0)
     tyre: int = -1
-    own: tuple[str, str] | None = None
+    added_coordinate: tuple[str, str] | None = None
     steered: tuple[tuple[tuple[str, str], float], ...] = ()
     on_travel: Curve | None = None
     on_rate: Curve | None = None
@@ -286,13 +288,15 @@ def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
     """Everything that acts in a vehicle besides weights and inertia."""
     held, v, acting = preloads(vehicle), float(speed or 0.0), list[Element]()
     for s in vehicle.springs:
-        points = ((s.two, s.point_two, s.axis), (s.one, s.point_one, _scaled(s.axis, -1.0)))
+        points = ((s.second_body, s.second_point, s.axis), (s.first_body, s.first_point, _scaled(s.axis, -1.0)))
         law = (s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate))
         acting.append(Element(points, *law, on_travel=s.travel_force, on_rate=s.rate_force))
     for bar in vehicle.bars:
         down, up = (_scaled(UP, sign / bar.track) for sign in (-1.0, 1.0))
         points = ((bar.left, bar.point_left, down), (bar.right, bar.point_right, up))
-        acting.append(Element(points, bar.stiffness, bar.damping, held.parts[bar.name], own=(bar.body, "rx")))
+        acting.append(
+            Element(points, bar.stiffness, bar.damping, held.parts[bar.name], added_coordinate=(bar.body, "rx"))
+        )
     for i, tyre in enumerate(vehicle.tyres):
         gains = (tyre.stiffness, tyre.damping, -held.tyres[tyre.name])
         acting.append(Element(((tyre.body, tyre.point, UP),), *gains, tyre=i, one_sided=tyre.pushes_only))
@@ -312,7 +316,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 def packed(
     vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: Numbers
 ) -> tuple[tuple[int, int, int], list[float]]:
-    """How many bodies, elements and points there are, and all numbers that the callback reads of them."""
+    """Counts of bodies, elements and points, and all their numbers for the callback."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
     moving = [body.name for body in vehicle.bodies if body.name in carrying]
     bodies, points = list[list[float]](), list[list[float]]()
@@ -349,8 +353,8 @@ def _points_of(acting: list[Element], vehicle: SpatialVehicle, name: str) -> lis
 def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> list[float]:
     """An element: its law, the shares of coordinates in its travel, and what of its law is no line."""
     shares, rest = dict[int, float](), 0.0
-    if element.own in numbers.joints:
-        shares[numbers.joints[element.own]] = 1.0
+    if element.added_coordinate in numbers.joints:
+        shares[numbers.joints[element.added_coordinate]] = 1.0
     for name, point, axis in element.points:
         if vehicle.turns(name):
             rest += float(np.dot(point, axis))
@@ -366,7 +370,7 @@ def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> lis
 
 
 def _rest_of_law(element: Element, numbers: Numbers) -> list[float]:
-    """What of a law is no line; nothing where there is nothing."""
+    """Numbers of the nonlinear rest of an element's law; none where the law is a straight line."""
     steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):

@@ -1,4 +1,4 @@
-"""What an engine is to a vehicle in space: it is linearised there and runs in time on a given road.
+"""The engine protocol for a vehicle in space: the vehicle is linearised there and runs in time on a given road.
 
 An engine's module ``spatial_NAME`` has a class ``SpatialName`` of (vehicle, settings, speed, road). Rides march in both
 with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; METHODS has the others.
@@ -143,7 +143,7 @@ def difference_step(vehicle: SpatialVehicle) -> float:
 
 
 def curves(vehicle: SpatialVehicle) -> int:
-    """How many curves and dry frictions a vehicle has."""
+    """Number of curves and dry frictions of a vehicle."""
     return sum((s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs)
 
 
@@ -227,6 +227,6 @@ def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearV
 def sound(
     engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
 ) -> Trajectory:
-    """The run, where it passes the guard of all runs."""
+    """The trajectory, checked by the guard of all runs; raises RunFailed."""
     guard(engine, times, states, settings.duration, note)
     return Trajectory(times, states, counts=counts)

@@ -127,7 +127,7 @@ class SpatialReference:
         return out
 
     def _spring(self, s: SpringDamper) -> np.ndarray:
-        travel, row = self._travel((s.one, s.point_one), (s.two, s.point_two), s.axis, s.frame)
+        travel, row = self._travel((s.first_body, s.first_point), (s.second_body, s.second_point), s.axis, s.frame)
         rate = row @ self.v
         force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
         force += (s.travel_force(travel) if s.travel_force else 0.0) + (s.rate_force(rate) if s.rate_force else 0.0)

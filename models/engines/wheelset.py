@@ -23,7 +23,8 @@ CENTRE = (0.0, 0.0, 0.0)
 
 
 def driven_by(equations: Equations) -> Driven:
-    """What an engine builds: bodies in the order of the joints, the suspension of both ends, the table of the rails."""
+    """The wheelset as engines build it: bodies in the order of the joints, the suspension of both ends, the table of
+    the rails."""
     body = equations.body
     across, along = body.across, body.along
     inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))

@@ -33,7 +33,8 @@ LIVES = 3
 
 
 class Blocks(NamedTuple):
-    """How paths are cut: ``size`` paths per block, of which at most ``ahead`` are under way at once."""
+    """How an ensemble's paths are cut into blocks: ``size`` paths per block, of which at most ``ahead`` are under way
+    at once."""
 
     size: int = BLOCK
     ahead: int = AHEAD
@@ -48,7 +49,7 @@ BLOCKS = Blocks()
 
 
 class Job(Protocol):
-    """What an ensemble computes; it must survive pickling to run in other processes."""
+    """The computation that an ensemble repeats for each path; it must survive pickling to run in other processes."""
 
     def __call__(self, paths: range) -> Arrays:
         """Named arrays of these paths, first axis len(paths)."""
@@ -71,7 +72,7 @@ class PathFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an ensemble is: paths done of all, paths per second, seconds left (infinite before the first block)."""
+    """Progress of an ensemble: paths done of all, paths per second, seconds left (infinite before the first block)."""
 
     done: int
     paths: int
@@ -85,7 +86,8 @@ class Progress:
 
 @dataclass(frozen=True)
 class _Failure:
-    """What a worker says instead of an answer: many exceptions do not survive the way between processes."""
+    """Failure that a worker returns in place of its answer: many exceptions do not survive the way between
+    processes."""
 
     reason: str
     full: bool = False
@@ -208,7 +210,7 @@ def _full(reason: str, store: Store | _Memory) -> RunFailed:
 
 
 def _submitted(executor: Executor, job: Job, paths: range) -> Future:
-    """A block on its way; on a pool that has lost its workers, a future that says so."""
+    """Future of a block of paths; of a pool that has lost its workers, a failed future."""
     try:
         return executor.submit(_attempt, job, paths)
     except BrokenExecutor as error:

@@ -47,7 +47,8 @@ class Store:
             yield
 
     def _claim(self, described: dict[str, Any]) -> None:
-        """Note down whose blocks these are; raises InputError if the folder belongs to another job."""
+        """Write into the folder which job its blocks belong to; raises InputError if the folder belongs to another
+        job."""
         file = self.folder / JOB
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())
@@ -111,7 +112,7 @@ def _read_note(file: Path) -> dict[str, Any]:
 
 
 def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
-    """What names a job: its facts as dotted keys, arrays by their checksum, the code and the packages.
+    """The facts that identify a job: its settings as dotted keys, arrays by their checksum, the code and the packages.
 
     Bits depend on all of these (and on the processor's own rounding of sines, which is left out).
     """

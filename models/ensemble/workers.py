@@ -46,7 +46,7 @@ class Processes(Executor):
         return pool
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
-        """As of any executor; fresh workers take it where the old ones have died."""
+        """Submit a function to the pool, as any executor does; fresh workers take it where the old ones have died."""
         try:
             return self._pool.submit(function, *args, **options)
         except BrokenExecutor:
@@ -55,7 +55,7 @@ class Processes(Executor):
             return self._pool.submit(function, *args, **options)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As of any executor."""
+        """Shut the pool down, as any executor does."""
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
         self._ours.close()
         self._theirs.close()

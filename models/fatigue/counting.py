@@ -1,4 +1,4 @@
-"""What a fatigue group counts of a section force: pseudo-damage, level crossings, range pairs.
+"""Counts of a section force as fatigue groups use them: pseudo-damage, level crossings, range pairs.
 
 Conventions: rainflow after ASTM E1049-85 with the residue as half cycles (``models.fatigue.damage``). Level
 crossings: how often the load rises through a level, from below it to it or beyond. Range pairs: how many rainflow
@@ -56,8 +56,8 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """How often a load (n,), or its turning points, rises through each level (l,), in any order; raises InputError for
-    a load as ``count`` does, and for a level that is no number."""
+    """Number of times that a load (n,), or its turning points, rises through each level (l,), in any order; raises
+    InputError for a load as ``count`` does, and for a level that is no number."""
     load, given = checked(load), np.asarray(levels, float)
     if np.isnan(given).any():
         raise InputError("", "levels", None, "must be numbers")
@@ -70,7 +70,7 @@ def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
 
 
 def range_pairs(spans: np.ndarray, counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """How many cycles of these spans and counts (c,) have at least each range (r,)."""
+    """Number of cycles of these spans and counts (c,) have at least each range (r,)."""
     order = np.argsort(spans)
     above = np.concatenate((np.cumsum(counts[order][::-1])[::-1], [0.0]))
     return above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]

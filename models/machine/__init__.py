@@ -1,1 +1,1 @@
-"""What is near to the machine: compilation, room on the stack, threads, the processor's clock."""
+"""Helpers close to the machine: compilation, room on the stack, threads, the processor's clock."""

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def duration(seconds: float) -> str:
-    """A time (s) in the unit that fits it."""
+    """Text of a time (s) in a fitting unit."""
     for factor, unit in ((1.0, "s"), (1e3, "ms")):
         if factor * seconds >= 1.0:
             return f"{factor * seconds:.3g} {unit}"
@@ -14,7 +14,7 @@ def duration(seconds: float) -> str:
 
 
 def cost(seconds: Sequence[float] | np.ndarray) -> str:
-    """What runs of these seconds cost: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
+    """Text that states the seconds of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
     values = np.asarray(seconds, float)
     middle = duration(float(np.median(values)))
     if values.size == 1:

@@ -52,7 +52,8 @@ def interleave(
 
 
 def _repeats(job: Callable[[], Any], least: float, clock: Clock) -> int:
-    """How often a job fits into a turn: timed on the warm-up, or after it where that was short."""
+    """Number of repeats of a job that fill one timed turn: measured on the warm-up, or after it where that was
+    short."""
     if _timed(job, 1, clock) >= least:
         return 1
     return max(1, math.ceil(0.9 * least / max(_timed(job, 1, clock), 1e-9)))

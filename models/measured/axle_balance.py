@@ -78,7 +78,7 @@ class AxleForces:
 
     @property
     def empty(self) -> np.ndarray:
-        """Which axles (2,) have a mean that is nothing beside their load and beside their own variation."""
+        """Which axles (2,) have a mean force that is negligible beside their load and their variation."""
         return (np.abs(self.means) < EMPTY * self.loads) & (np.abs(self.means) <= self.forces.std(axis=0))
 
     @property
@@ -88,7 +88,7 @@ class AxleForces:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all signals."""
+        """Names of all signals."""
         return tuple(s.name for axle in self.signals for s in axle)
 
     @cached_property
@@ -169,17 +169,17 @@ class Steady:
 
     @property
     def shares(self) -> np.ndarray:
-        """Accelerations (2,) by those of a whole load."""
+        """Accelerations (2,) divided by those of a whole load."""
         return self.accelerations / self.units
 
     @property
     def seen(self) -> np.ndarray:
-        """Which of the two (2,) is beyond what is known."""
+        """Which of the two steady accelerations (2,) is beyond its uncertainty."""
         return np.abs(self.accelerations) > self.known
 
 
 def steady(axles: AxleForces) -> Steady:
-    """What is left of equilibrium over the whole record.
+    """Residual of the equilibrium over the whole record.
 
     A rise counts only as far as neither a level road nor a climb with the pitch that the forces give explains it.
     """

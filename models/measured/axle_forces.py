@@ -61,7 +61,7 @@ def _sparse(axles: AxleForces) -> list[Finding]:
 
 
 def _explained(axles: AxleForces) -> list[Finding]:
-    """What a common mistake explains to a few per cent, at both axles."""
+    """Findings on a common mistake that explains the imbalance to a few per cent, at both axles."""
     p = axles.parameters
     if p.g == 0:
         return []
@@ -146,7 +146,7 @@ def _balance(axles: AxleForces) -> list[Finding]:
 
 
 def _far(axles: AxleForces, motion: Steady) -> np.ndarray:
-    """Which steady acceleration (2,) moves the vehicle further in the run than a road does."""
+    """Which of the two steady accelerations (2,) moves the vehicle further in the run than a road does."""
     return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEP])
 
 
@@ -241,7 +241,8 @@ def _delay(axles: AxleForces) -> tuple[float, float, float]:
 
 
 def unchecked(axles: AxleForces) -> str:
-    """What these forces alone do not show of the time from axle to axle, and what would; "" of constant forces."""
+    """Sentence on why these forces alone do not show the delay from axle to axle, and what would; "" for constant
+    forces."""
     if not np.ptp(axles.forces, axis=0).any():
         return ""
     late, alike, _ = _delay(axles)

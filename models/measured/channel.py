@@ -1,4 +1,5 @@
-"""What a measurement file says of itself: channels, their groups of one clock each, and samples block by block."""
+"""A measurement file as its format describes it: channels, their groups of one clock each, and samples block by
+block."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ class Source(Protocol):
 
     @property
     def noticed(self) -> tuple[Finding, ...]:
-        """What had to be said in opening it: cut off, repeated names, channels left out, how numbers are written."""
+        """Findings on opening the file: cut off, repeated names, channels left out, how numbers are written."""
 
     def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
         """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.

@@ -47,10 +47,10 @@ class Columns(Readable):
                 file.truncate(len(names) * count * ITEM.itemsize)
             self.close(0)
 
-    def close(self, done: int) -> None:
-        """Say that the first ``done`` samples of every signal are complete."""
-        self.done = done
-        text = json.dumps({"names": list(self.names), "count": self.count, "done": done})
+    def close(self, completed: int) -> None:
+        """Say that the first ``completed`` samples of every signal are complete."""
+        self.done = completed
+        text = json.dumps({"names": list(self.names), "count": self.count, "done": completed})
         write_whole(self._journal, text)
 
     def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:
@@ -80,7 +80,7 @@ class Columns(Readable):
 
 
 class MemoryColumns(Readable):
-    """The same of samples (count, signals) that are in memory, to be read only."""
+    """Columns of samples (count, signals) in memory, read only."""
 
     def __init__(self, names: tuple[str, ...], samples: np.ndarray) -> None:
         self.names, self.count, self._samples = names, len(samples), samples

@@ -1,4 +1,4 @@
-"""What a real measurement adds to the truth: gain, bias, delay, noise, quantisation, dropouts, each by its name.
+"""Errors that a real measurement adds to the truth: gain, bias, delay, noise, quantisation, dropouts, each by its name.
 
 Nothing that is not named acts. An amount is given to a channel, to all channels of a transducer (what a signal is
 ``at``) or to all of a quantity; the closest name counts. Every channel has its own stream of noise, so that a further
@@ -50,7 +50,8 @@ class Faults(Strict):
 
 
 def amount(amounts: Amounts, signal: Signal) -> float:
-    """What is named for a signal: its channel before its transducer before its quantity; 0 if nothing is."""
+    """Amount of a fault that a scene gives for a signal: by its channel before its transducer before its quantity; 0 if
+    nothing is."""
     return next((amounts[name] for name in _names(signal) if name in amounts), 0.0)
 
 

@@ -1,4 +1,4 @@
-"""What a file is, by its first bytes or its extension, and what to do with one whose samples cannot be read here."""
+"""Kind of a file by its first bytes or its extension, and what to do with a kind whose samples cannot be read here."""
 
 import re
 import zipfile
@@ -145,7 +145,8 @@ def is_text(head: bytes) -> bool:
 
 
 def usual_of(suffix: str, form: str) -> str:
-    """What files of an extension usually are; ``form``, what this one is, where tables have that extension, too."""
+    """Text on what files of an extension usually are; ``form``, the kind of this file, where tables have that
+    extension, too."""
     if suffix in EXTENSIONS or suffix == ".asc":
         return EXTENSIONS.get(suffix, form)
     return next((kind.name for kind in KINDS if suffix in kind.extensions), form)
@@ -172,7 +173,7 @@ def is_measurement(path: Path) -> bool:
 
 
 def _of_archive(path: Path) -> Kind | None:
-    """What a zip archive is the packing of: a workbook or arrays."""
+    """The kind of data in a zip archive: a workbook or arrays."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()

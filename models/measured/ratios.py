@@ -1,4 +1,4 @@
-"""What a channel that reads so many times the true value has wrong: its sign, its unit, or its calibration factor."""
+"""Causes of a channel's wrong factor against the true value: its sign, its unit, or its calibration factor."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -48,7 +48,7 @@ def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
 def sentence(
     ratio: float, signal: Signal, against: str, remedies: Mapping[Wrong, str] | None = None
 ) -> tuple[Wrong, str]:
-    """What is wrong, and a complete sentence; ``against`` says what the true value was taken from.
+    """The cause of a wrong factor and a sentence about it; ``against`` names the source of the true value.
 
     remedies : what to do about each, None for those of a channel map.
     """

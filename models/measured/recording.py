@@ -63,8 +63,8 @@ class Recording:
             yield first, self.columns.block(names, first, length)
 
     def changed(self, change: Callable[[Signal, np.ndarray], np.ndarray]) -> "Recording":
-        """The same with other samples: ``change`` gives those (count,) of a signal by its own, SI, NaN where nothing
-        was measured. They lie in a new file beside the old one, so that nothing is changed twice."""
+        """A copy of the recording with other samples: ``change`` gives those (count,) of a signal by its own, SI, NaN
+        where nothing was measured. They lie in a new file beside the old one, so that nothing is changed twice."""
         assert isinstance(self.columns, Columns)
         path = self.columns.path.with_stem(f"{self.columns.path.stem}_changed")
         path.with_suffix(".json").unlink(missing_ok=True)

@@ -84,7 +84,7 @@ def _no_times(times: np.ndarray) -> np.ndarray:
 
 
 def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing:
-    """The same, of what can be times."""
+    """The timing of values that can be times."""
     findings, whole = list[Finding](), len(times)
 
     def say(check: str, weight: Weight, text: str, size: float, unit: str, at: Iterable[float]) -> None:

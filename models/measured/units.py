@@ -130,7 +130,7 @@ def _parsed(unit: str, quantity: Quantity) -> Any:
 
 
 def _kind(unit: Any) -> str:
-    """What a unit is of, in an engineer's words."""
+    """The kind of quantity that a unit measures, in an engineer's words."""
     if "volt" in str(unit) or "ampere" in str(unit):
         return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
     same = [name for name in UNITS if unit.is_compatible_with(_si(name))]

@@ -59,7 +59,17 @@ columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s
 FRAMES = ("hub", "body", "inertial")
 NONE, PULLED, HELD = range(3)
 """Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
-ONE, POINT_ONE, TWO, POINT_TWO, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING = 0, 1, 4, 5, 8, 11, 12, 13, 14
+FIRST_BODY, FIRST_POINT, SECOND_BODY, SECOND_POINT, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING = (
+    0,
+    1,
+    4,
+    5,
+    8,
+    11,
+    12,
+    13,
+    14,
+)
 AXIS_JOINT, FRICTION, FRICTION_RATE, ON_TRAVEL, ON_RATE, PER_ELEMENT = range(15, 21)
 """Numbers of an element: last joint and point of both ends, axis, travel at rest, preload, N/m, N s/m; the last joint
 of the body in which the axis is fixed, N, m/s, and where the table has its curves (0: nowhere)."""
@@ -82,8 +92,8 @@ class JointMotion(NamedTuple):
 
 
 class ForceReport(NamedTuple):
-    """What ``forces`` tells of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the declared
-    frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
+    """Forces that ``forces`` reports of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
+    declared frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
 
     elements: np.ndarray
     wrenches: np.ndarray
@@ -97,8 +107,8 @@ def _element(e, numbers, motion, chassis, row):
     axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
     for side in range(2):
-        sign, j = 2.0 * side - 1.0, int(e[TWO * side])
-        end = locate(m[j + 1], e, TWO * side + 1)
+        sign, j = 2.0 * side - 1.0, int(e[SECOND_BODY * side])
+        end = locate(m[j + 1], e, SECOND_BODY * side + 1)
         for k in range(3):
             travel += sign * axis[k] * end[k]
         while j > chassis:
@@ -120,8 +130,11 @@ def _element(e, numbers, motion, chassis, row):
 
 @lean
 def ends_apart(e, m):
-    """From the first to the second point of an element."""
-    return plus(locate(m[int(e[TWO]) + 1], e, POINT_TWO), times(locate(m[int(e[ONE]) + 1], e, POINT_ONE), -1.0))
+    """Vector from the first to the second point of an element."""
+    return plus(
+        locate(m[int(e[SECOND_BODY]) + 1], e, SECOND_POINT),
+        times(locate(m[int(e[FIRST_BODY]) + 1], e, FIRST_POINT), -1.0),
+    )
 
 
 @lean

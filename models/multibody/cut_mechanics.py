@@ -72,7 +72,7 @@ def locate(link, arms, i):
 
 @lean
 def column(turns, link, place):
-    """How a point at ``place`` moves by the rate of the joint of a row of ``m``, which carries it."""
+    """Velocity of a point at ``place`` per unit rate of a joint that carries the point (a row of ``m``)."""
     along = three(link, ALONG)
     if turns == 0.0:
         return along

@@ -1,4 +1,4 @@
-"""What is felt inside a cut vehicle along a run, compiled: springs, guides of bodies, hubs, points.
+"""Section forces and motion inside a cut vehicle along a run, compiled: springs, guides of bodies, hubs, points.
 
 A row of answers, in this order: force and travel of every element; position, heading, pitch, roll of the chassis and
 its angular velocity in its own axes; the stabiliser's moments; force and moment that each guide exerts on its body;
@@ -18,11 +18,11 @@ from models.multibody.cut_kernel import (
     AXIS_JOINT,
     CHASSIS,
     DESIGN,
+    FIRST_BODY,
     GRAVITY,
     LAST,
-    ONE,
     PER_TIME,
-    TWO,
+    SECOND_BODY,
     WRENCH,
     ForceReport,
     ends_apart,
@@ -113,7 +113,7 @@ def _load_elements(elements, m, inside, acting, travels):
         travels[i] = -e[DESIGN]
         for side in range(2):
             row, sign = acting[3 * i + side], 2.0 * side - 1.0
-            place = locate(m[int(e[ONE + TWO * side]) + 1], e, TWO * side + 1)
+            place = locate(m[int(e[FIRST_BODY + SECOND_BODY * side]) + 1], e, SECOND_BODY * side + 1)
             for k in range(3):
                 travels[i] += sign * axis[k] * place[k]
             put(row, 0, place)

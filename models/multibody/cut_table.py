@@ -14,7 +14,7 @@ from models.vehicles.spatial import Vector
 
 @dataclass(frozen=True)
 class Drive:
-    """What drives and steadies a cut vehicle, at half steps: rows i at the time i step / 2.
+    """Drive of a cut vehicle and its stabiliser, at half steps: rows i at the time i step / 2.
 
     hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
         (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)
@@ -93,9 +93,12 @@ def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray
 
 
 def _element(e: Element, joined: Joints) -> list[float]:
-    first, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
+    first, two = (
+        np.subtract(e.first_point, joined.origin[e.first_body]),
+        np.subtract(e.second_point, joined.origin[e.second_body]),
+    )
     law = (e.held, e.stiffness, e.damping, joined.last[e.frame], e.friction, e.friction_rate, 0.0, 0.0)
-    return [joined.last[e.one], *first, joined.last[e.two], *two, *e.axis, e.design, *law]
+    return [joined.last[e.first_body], *first, joined.last[e.second_body], *two, *e.axis, e.design, *law]
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:

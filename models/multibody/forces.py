@@ -172,7 +172,7 @@ def _load(tyre, deflection, rising, ledger):
 
 @lean
 def touch(tyre, waves, count, steer, steering, vehicle, wheel):
-    """How a tyre presses on a road of ``count`` waves, and where and how it slides: fills the ``WheelContact``.
+    """Load, place and sliding velocity of a tyre on a road of ``count`` waves: fills the ``WheelContact``.
 
     steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
     """
@@ -257,7 +257,7 @@ def _hold(torque, axle, link, carrying):
 
 @lean
 def room(head):
-    """How many doubles of room a vehicle's tree needs."""
+    """Number of doubles in the workspace of a vehicle's tree."""
     return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
 
 

@@ -33,7 +33,7 @@ class Tree(NamedTuple):
 
 
 class MovingVehicle(NamedTuple):
-    """What each force of a vehicle reads and adds to.
+    """State and arrays that each force of a vehicle reads and adds to.
 
     rates, forces (n,) : of the coordinates; ledger (LEDGER,) : see ``forces``; chassis (PER_LINK,) : its link.
     """

@@ -21,7 +21,7 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Tyres:
-    """What the tyres and wheels have beside the vehicle file's stiffness, damping and cornering stiffness.
+    """Parameters of tyres and wheels beside the vehicle file's stiffness, damping and cornering stiffness.
 
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
     axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
@@ -103,7 +103,7 @@ class Handling:
         return self.numbers[first : first + at.PER_TYRE]
 
     def changed(self, **changes: object) -> "Handling":
-        """The same with other fields."""
+        """A copy of the car with other values in some fields."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
@@ -168,7 +168,7 @@ class _Points:
         self.vehicle, self.rows = vehicle, list[tuple[float, ...]]()
 
     def number(self, body: str, point: Vector) -> int:
-        """Of a point on a body, in the design position."""
+        """Number of a point on a body, in the design position."""
         joint, place = _place(self.vehicle, body, point)
         row = (float(joint), *place.tolist())
         if row not in self.rows:
@@ -200,15 +200,15 @@ _Part = tuple[list[float], tuple[Curve | None, ...]]
 
 def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
     for s in handling.vehicle.springs:
-        if s.two is None:
+        if s.second_body is None:
             raise InputError(
                 handling.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
             )
         if s.frame != CARRIER:
             allowed = "must be left out: in handling the axes of springs are fixed in the carrier, which only yaws"
             raise InputError(handling.vehicle.name, f"springs[{s.name}].frame", s.frame, allowed)
-        ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
-        rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
+        ends = points.number(s.first_body, s.first_point), points.number(s.second_body, s.second_point)
+        rest = float(np.dot(np.subtract(s.second_point, s.first_point), s.axis))
         law = [s.stiffness, s.damping, handling.held.parts[s.name], s.friction, s.friction_rate, rest]
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0], (s.travel_force, s.rate_force)
 

@@ -20,10 +20,10 @@ from models.vehicles.spatial import Curve
     FRICTION,
     FRICTION_RATE,
     REST,
-    OWN,
-    OWN_GAIN,
-    ONE,
-    TWO,
+    ADDED_COORDINATE,
+    ADDED_GAIN,
+    FIRST_POINT,
+    SECOND_POINT,
     AXIS,
     ON_TRAVEL,
     ON_RATE,
@@ -42,12 +42,16 @@ def press(numbers, first, count, spots, q, v, f):
     energy = power = 0.0
     for i in range(count):
         e = row(beyond(numbers, first), PER_PART, i)
-        from_spot, to_spot, axis = row(spots, PER_SPOT, int(e[ONE])), row(spots, PER_SPOT, int(e[TWO])), three(e, AXIS)
+        from_spot, to_spot, axis = (
+            row(spots, PER_SPOT, int(e[FIRST_POINT])),
+            row(spots, PER_SPOT, int(e[SECOND_POINT])),
+            three(e, AXIS),
+        )
         travel = dot(axis, plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))) - e[REST]
         rate = dot(axis, plus(three(to_spot, RATE), times(three(from_spot, RATE), -1.0)))
-        coordinate = int(e[OWN])
+        coordinate = int(e[ADDED_COORDINATE])
         if coordinate >= 0:
-            travel, rate = travel + e[OWN_GAIN] * q[coordinate], rate + e[OWN_GAIN] * v[coordinate]
+            travel, rate = travel + e[ADDED_GAIN] * q[coordinate], rate + e[ADDED_GAIN] * v[coordinate]
         spring, other = e[HELD] + e[STIFFNESS] * travel, e[DAMPING] * rate
         if e[FRICTION] != 0.0:
             other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
@@ -58,7 +62,7 @@ def press(numbers, first, count, spots, q, v, f):
         energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
         power -= other * rate
         if coordinate >= 0:
-            f[coordinate] -= (spring + other) * e[OWN_GAIN]
+            f[coordinate] -= (spring + other) * e[ADDED_GAIN]
         force = times(axis, spring + other)
         add(from_spot, PUSH, force)
         add(to_spot, PUSH, times(force, -1.0))

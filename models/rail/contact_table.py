@@ -146,7 +146,8 @@ class Carried:
         return [0.0 if part is None else part.load for part in map(self.part, self.touches)]
 
     def part(self, touch: Touch) -> PatchPressure | None:
-        """What the simplified theory finds in a patch, None where that leaves it without contact."""
+        """The pressure on one patch by the simplified theory; None where that theory leaves the patch without
+        contact."""
         return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
 
 
@@ -206,7 +207,7 @@ class Contact:
         return self._balanced(by_normal, self.load)
 
     def _exact(self, near: Carried) -> Carried:
-        """The same wheel with the exact normal contact."""
+        """The pressed wheel, its normal contact solved exactly in place of the simplified theory."""
         patches = [touch.patch for touch in near.touches]
 
         def by_normal(normal: float) -> Carried:
@@ -270,12 +271,12 @@ class Contact:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
     def _arm(self, pose: Pose, touch: Touch) -> Array:
-        """From the wheelset's centre to a place of first touch, in the track (m)."""
+        """Vector from the wheelset's centre to a place of first touch, in the track (m)."""
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 
     def _places(self, wheel: Carried) -> tuple[Place, ...]:
-        """What a wheel's patches report, those that carry something; patches that have grown together as one."""
+        """The reports of a wheel's patches, those that carry something; patches that have grown together as one."""
         rows = [
             row
             for row in zip(wheel.touches, wheel.creepages, wheel.forces, wheel.shares, strict=True)

@@ -13,7 +13,7 @@ SLOW = 0.2
 
 
 def free(wheelset: Wheelset) -> Wheelset:
-    """The same wheelset without suspension."""
+    """A copy of the wheelset without suspension."""
     return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 
 
@@ -46,7 +46,8 @@ def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) ->
 
 
 def hunting(values: np.ndarray) -> np.ndarray:
-    """Of eigenvalues (..., 9), the least damped one with an imaginary part above 0; NaN if there is none."""
+    """The hunting mode: of eigenvalues (..., 9) the least damped with an imaginary part above 0; NaN if there is
+    none."""
     oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
     root = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
     return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

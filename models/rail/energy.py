@@ -34,7 +34,7 @@ class Ledger:
 
     @cached_property
     def residual(self) -> Array:
-        """What the sums do not account for (n,), 0 at the start (J)."""
+        """The energy that the sums leave unaccounted for at each time (n,), 0 at the start (J)."""
         stored = self.kinetic + self.springs + self.gravity + self.contacts
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 

@@ -104,7 +104,8 @@ def rates(state, speed, body, rails, out, report):
 
 @inlined
 def set_rates(state, speed, body, rails, out, report, room):
-    """The same with ``Room`` made beforehand; a report of no rows where nobody asks."""
+    """Write the rates of the state into ``out``, with a workspace made beforehand; a report of no rows where nobody
+    asks."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -169,7 +170,8 @@ def march(state, parameters, steps, path, reports):
 
 @lean
 def _march(state, parameters, steps, path, reports, room, stages):
-    """The same with all arrays made: it counts no references to them, which takes 5 % of a bare wheelset's time."""
+    """March the state over all steps with arrays made by the caller: it counts no references to them, which takes 5 %
+    of a bare wheelset's time."""
     (speed, body, rails), (step, count, every), (total, rate, here, none) = parameters, steps, stages
     for i in range(count + 1):
         row = i // every
@@ -239,12 +241,12 @@ class Equations:
 
     @cached_property
     def rails(self) -> Rails:
-        """What the wheels roll on."""
+        """The compiled record of the rails or profiles that the wheels roll on."""
         return rails_of(self.wheelset, self.law, self.cells)
 
     @cached_property
     def parameters(self) -> tuple[float, tuple[Any, ...], tuple[Any, ...]]:
-        """What the compiled functions take after the state: speed, body and rails.
+        """Arguments of the compiled functions after the state: speed (m/s), body and rails.
 
         The last two as plain tuples: numba asks Python for the type of a NamedTuple, in three times a call's own time.
         """
@@ -331,7 +333,7 @@ class Equations:
         return path
 
     def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
-        """States and contacts of a path that are kept; ``state`` (10,) is moved."""
+        """States and contacts of a path at every ``every``-th step; ``state`` (10,) is moved."""
         kept = count // every + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
         done = march(state, self.parameters, (step, count, every), states, contacts)

@@ -50,7 +50,8 @@ class Profiles(Strict):
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
     def located(self, scene: SceneFile) -> "Profiles":
-        """The same with the paths of the files that a scene names; InputError for what is neither file nor built in."""
+        """These profiles with the paths of the files that a scene names; InputError for what is neither file nor built
+        in."""
         files = {}
         for kind, known in BUILT_IN.items():
             name = getattr(self, kind)
@@ -87,7 +88,7 @@ def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
 
 @cache
 def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
-    """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
+    """The arrays that ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
     y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
@@ -104,7 +105,7 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
 
 
 def no_profile() -> LaidProfile:
-    """That of a wheelset on cones: without a zone, a node or a knot."""
+    """The empty profile of a wheelset on cones: without a zone, a node or a knot."""
     return LaidProfile(np.zeros(1, PROFILE), np.empty(0, NODE), np.empty(0, KNOT))
 
 

@@ -79,17 +79,17 @@ class Orbit:
 
     @property
     def speed(self) -> float:
-        """m/s."""
+        """Speed of the wheelset (m/s)."""
         return self.equations.speed
 
     @property
     def amplitude(self) -> float:
-        """Of the lateral displacement (m)."""
+        """Amplitude of the lateral displacement (m)."""
         return float(self.state[Y])
 
     @property
     def frequency(self) -> float:
-        """Hz."""
+        """Frequency of the limit cycle (Hz)."""
         return 1.0 / self.period
 
     @property
@@ -205,7 +205,7 @@ def _end(equations: Equations, state: Array, period: float, steps: int) -> Array
 
 
 def _linearised(orbit: Orbit) -> Orbit:
-    """The orbit with its own slopes."""
+    """The orbit with slopes from its own linearisation."""
     eq, T, n, state, signs = orbit.equations, orbit.period, orbit.steps, orbit.state, (-1.0, 1.0)
     ends = [
         *([_end(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs] for k in RETURNS),

@@ -21,7 +21,7 @@ SHIFTS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class Equilibrium:
     """z (m) and roll (rad) of the wheelset; touches, TOUCH (patches,), loads (patches,) in N, right wheel first."""
 
     z: float
@@ -38,7 +38,7 @@ class Held:
         return weighed / loads
 
 
-def held(wheelset: Wheelset, shift: float) -> Held:
+def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
     """The wheelset at a lateral displacement (m), without yaw, half its load on each wheel.
 
     Raises InputError for a wheelset without profiles or a displacement at which not both wheels touch.
@@ -48,13 +48,13 @@ def held(wheelset: Wheelset, shift: float) -> Held:
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
-    def pose(unknown: Array) -> Held:
+    def pose(unknown: Array) -> Equilibrium:
         touches = np.zeros(patches(rails.profile), TOUCH)
         here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
         contact_points(Pose(shift, *here, 0.0), rails, touches)
         modulus = rails.wheels["modulus"][0]
         loads = np.array([pressed(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches])
-        return Held(*here, touches, loads)
+        return Equilibrium(*here, touches, loads)
 
     def off(unknown: Array) -> Array:
         now = pose(unknown)
@@ -69,7 +69,7 @@ def held(wheelset: Wheelset, shift: float) -> Held:
 def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     """The wheelset with the cones that steer as its profiles do at an amplitude (m): for ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
-    differences = np.array([0.0, *(-np.diff(held(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
+    differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
     return wheelset.coned(equivalent_conicity(shifts, differences, amplitude)).changed(profiles=None)
 
 

@@ -81,8 +81,8 @@ BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
 
 
 class Rails(NamedTuple):
-    """What wheels roll on, and by which law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's net
-    (``Grid``); law : LINEAR or FASTSIM."""
+    """The rails under the wheels and their law of creep forces: WHEELS (1,); profiles, without a node for cones; tables
+    of FASTSIM's net (``Grid``); law : LINEAR or FASTSIM."""
 
     wheels: Array
     profile: LaidProfile
@@ -96,15 +96,15 @@ class Room(NamedTuple):
     """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
 
     wheelset : WHEELSET (1,); touches : TOUCH (patches,); of those in contact, first to last, contacts : CONTACT,
-    motion : MOTION, creep forces found and other ones : FORCES.
+    motion : MOTION, creep forces of one rolling direction, and the creep forces that act : FORCES.
     """
 
     wheelset: Array
     touches: Array
     contacts: Array
     motion: Array
-    other: Array
-    found: Array
+    directed: Array
+    forces: Array
 
 
 class Place(NamedTuple):
@@ -118,8 +118,8 @@ class Place(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Of a patch: slip along, velocity across the track, slip across (m/s), turning about the normal (1/s), speed of
-    approach (m/s)."""
+    """Motion of a contact patch: slip along, velocity across the track, slip across (m/s), turning about the normal
+    (1/s), speed of approach (m/s)."""
 
     vx: float
     vy: float
@@ -244,23 +244,23 @@ def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
 
 @lean
 def _both_ways(forwards, contacts, slip, speed, rails, room):
-    """Fill fx, fy, mz, found of the room, of wheels that roll forwards by a share."""
+    """Fill the forces fx, fy, mz in the room of wheels that roll forwards by a share."""
     for k in range(len(contacts)):
-        room.found[k].fx = room.found[k].fy = room.found[k].mz = 0.0
-    other = room.other[: len(contacts)]
+        room.forces[k].fx = room.forces[k].fy = room.forces[k].mz = 0.0
+    directed = room.directed[: len(contacts)]
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
-            _one_way(sign, contacts, slip, speed, rails, other)
+            _one_way(sign, contacts, slip, speed, rails, directed)
             for k in range(len(contacts)):
-                room.found[k].fx += share * sign * other[k].fx
-                room.found[k].fy += share * other[k].fy
-                room.found[k].mz += share * sign * other[k].mz
+                room.forces[k].fx += share * sign * directed[k].fx
+                room.forces[k].fy += share * directed[k].fy
+                room.forces[k].mz += share * sign * directed[k].mz
 
 
 @inlined
 def creep(contacts, slip, speed, rails, room):
-    """Fill fx, fy, mz, found of the room, of contacts (CONTACT) from their slip (MOTION).
+    """Fill the forces fx, fy, mz in the room of contacts (CONTACT) from their slip (MOTION).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
     """
@@ -270,7 +270,7 @@ def creep(contacts, slip, speed, rails, room):
             c = contacts[k]
             c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
     if speed >= REGULAR:
-        _one_way(1.0, contacts, slip, speed, rails, room.found[: len(contacts)])
+        _one_way(1.0, contacts, slip, speed, rails, room.forces[: len(contacts)])
     else:
         _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, room)
 
@@ -323,7 +323,7 @@ def patch_by_patch(pose, rails, report, room):
     for k in range(len(report)):
         _blank(report[k])
     for i in range(count):
-        contact, m, answer = room.contacts[i], room.motion[i], room.found[i]
+        contact, m, answer = room.contacts[i], room.motion[i], room.forces[i]
         touch = touches[int(m.patch)]
         press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz

@@ -82,7 +82,7 @@ class Wheelset(Strict):
         return self.tilt * (self.half_gauge + self.head_radius * self.slant[0])
 
     def coned(self, equivalent: float) -> "Wheelset":
-        """The same wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
+        """A copy of the wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
         most = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
         conicity = brentq(
             lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most, xtol=1e-15
@@ -90,7 +90,7 @@ class Wheelset(Strict):
         return self.changed(conicity=float(conicity))
 
     def changed(self, **values: Any) -> "Wheelset":
-        """The same wheelset but for some values, read as strictly."""
+        """A copy of the wheelset with some values changed, checked as strictly as a file."""
         return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | values)
 
     @property

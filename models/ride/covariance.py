@@ -196,7 +196,7 @@ is enough but where a motion hardly dies out; each takes as many digits off the 
 def _with_marginal(
     split: Parts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same for the whole state (marginal first), its correction and basis, motions that diffuse left out.
+    """Covariance of the whole state (marginal motions first), its correction and basis, motions that diffuse left out.
 
     A motion that does not diffuse lives from the first hit to the last: integrals over that window.
     """

@@ -146,7 +146,7 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 
 
 def _halved(
-    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, whole: np.ndarray, limit: np.ndarray
+    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
     variance, error = np.zeros_like(limit), np.zeros_like(limit)
@@ -156,11 +156,11 @@ def _halved(
         parts = over(finer)
         taken += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
-        change = abs(halves - whole)
+        change = abs(halves - panels)
         rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (taken < PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
-        edges, whole = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
+        edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
     return variance, error, taken
 
 

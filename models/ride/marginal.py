@@ -227,7 +227,7 @@ def growth(
     variance: np.ndarray,
     accuracy: float = ACCURACY,
 ) -> Growth:
-    """What noise through B_i (n, k), delays tau_i (s), does to y = C x along the marginal motions.
+    """Growth of y = C x along the marginal motions under noise through B_i (n, k) with delays tau_i (s).
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
     last one may stop. C (p, n). Products no larger than TOLD times their accuracy are zero, unless the motion, if it is

@@ -1,4 +1,4 @@
-"""What engineers read from variances: how often a travel runs out, how much a wheel load moves about its mean.
+"""Figures that engineers read from variances: how often a travel runs out, how much a wheel load moves about its mean.
 
 All for Gaussian processes of zero mean, which the linear vehicle makes of a Gaussian road. Deviations and limits below
 0, and what is not finite, are refused (InputError).
@@ -16,7 +16,8 @@ def share_beyond(deviation: float, limit: float) -> float:
 
 
 def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
-    """How often per second abs(x) passes the limit outwards, from the deviations of x and of its rate x' (1/s).
+    """Number of times per second that abs(x) passes the limit outwards, from the deviations of x and of its rate x'
+    (1/s).
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
     """

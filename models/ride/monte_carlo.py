@@ -53,7 +53,8 @@ class Estimate:
     copies: int
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """How many standard errors (N, p) the estimate lies above the variance of these standard deviations (N, p)."""
+        """Standard scores (N, p) of the estimate: its distance, in standard errors, above the variance of these
+        standard deviations (N, p)."""
         known = np.isfinite(self.variance)
         off = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
         return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
@@ -138,11 +139,14 @@ class _Cells:
         def system(speed: float) -> DelayedSystem:
             return at_speed(vehicle, excitation, speed, weightings)
 
-        self.one, self.two = system(1.0), system(2.0)
+        self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
         self.finite = np.array([status == FINITE for status in stationary(system(slowest)).status])
         fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
         self.length, self.shifts = path_cell(excitation.lengths, REACH / fastest)
-        self.at_rest, self.per_speed = 2.0 * self.one.A - self.two.A, self.two.A - self.one.A
+        self.at_rest, self.per_speed = (
+            2.0 * self.at_unit_speed.A - self.at_double_speed.A,
+            self.at_double_speed.A - self.at_unit_speed.A,
+        )
 
     def to_forget(self, speed: float) -> int:
         """Cells at a constant speed after which a copy has forgotten its beginning."""
@@ -154,8 +158,8 @@ class _Cells:
 
     def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
         """States (n, copies) at the end of each cell, crossed by the first axle in the given times (s)."""
-        k, axles = self.one.B[0].shape[1], len(self.one.B)
-        independent = self.one.independent
+        k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
+        independent = self.at_unit_speed.independent
         draws = _drawn(seed, copies, k * MODES * (axles if independent else 1))
         last = int(self.shifts[-1])
         met = deque((next(draws) for _ in range(last)), maxlen=last + 1)
@@ -172,7 +176,7 @@ class _Cells:
     def _crossed(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
         """Transition (n, n) over a cell and responses (n, a k MODES) to its noise, axle by axle."""
         matrix = duration * self.at_rest + self.length * self.per_speed
-        rows = [np.stack(self.one.B, axis=1) * self.length**0.5]
+        rows = [np.stack(self.at_unit_speed.B, axis=1) * self.length**0.5]
         for _ in range(TERMS - 1):
             rows.append(np.tensordot(matrix, rows[-1], 1))
         responses = np.einsum("jnak,jl->nakl", np.stack(rows), _legendre())
@@ -180,12 +184,12 @@ class _Cells:
 
     def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
         """Outputs (p, copies) without white noise."""
-        return (self.one.C + (speed - 1.0) * (self.two.C - self.one.C)) @ x
+        return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
 
     def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> Estimate:
-        """From variances and their errors (N, 2, p), inf where an output has none."""
+        """The estimate from variances and their errors (N, 2, p), inf where an output has none."""
         moments = np.where(self.finite, rows, np.inf)
-        return Estimate(self.one.names, time, moments[:, 0], moments[:, 1], copies)
+        return Estimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
 
 
 def _legendre() -> np.ndarray:

@@ -53,7 +53,8 @@ class Copies:
 
     @property
     def mean_error(self) -> np.ndarray:
-        """Their standard errors (p,), from the scatter of the copies, which do not depend on each other."""
+        """Standard errors (p,) of the outputs' means, from the scatter of the copies, which do not depend on each
+        other."""
         return self.moments[0].std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
 
     @property
@@ -63,7 +64,7 @@ class Copies:
 
     @property
     def error(self) -> np.ndarray:
-        """Their standard errors (p,), likewise."""
+        """Standard errors (p,) of the outputs' variances, from the scatter of the copies."""
         return self.about_mean().std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
 
     @property
@@ -79,7 +80,8 @@ class Copies:
         return central / self.variance**2
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """How many standard errors (p,) the variance lies above that of these standard deviations (p,)."""
+        """Standard scores (p,) of the variances: distance, in standard errors, above that of these standard deviations
+        (p,)."""
         return (self.variance - deviation**2) / self.error
 
     def about_mean(self) -> np.ndarray:
@@ -176,9 +178,9 @@ def followed(vehicle: SpatialVehicle, speed: float) -> float:
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _first(settling: int, done: int, every: int = EVERY) -> int:
+def _first(settling: int, completed: int, every: int = EVERY) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
-    return settling - done if done <= settling else (settling - done) % every
+    return settling - completed if completed <= settling else (settling - completed) % every
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:

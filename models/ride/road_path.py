@@ -30,7 +30,7 @@ class RoadPath:
 
     @property
     def step(self) -> float:
-        """Step (s) of a run that reads it."""
+        """Step (s) of a run that reads the road path."""
         return 2.0 * self.half
 
     @property

@@ -61,7 +61,7 @@ class BentSpring:
 
 @dataclass(frozen=True)
 class StatisticallyLinear:
-    """The replaced vehicle and what it says.
+    """The statistically linearised vehicle, its covariance and its means.
 
     mean, left_out (p,), by output: mean beside the equilibrium on a flat road (0 for accelerations), and the variance
     that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``changes``: largest
@@ -112,7 +112,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).found(scale)
+    return _Search(vehicle, excitation, speed).solved(scale)
 
 
 Law = tuple[float, float, float]
@@ -141,7 +141,7 @@ class _Search:
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
         self.rows = np.array([output.displacement for output in with_forces]).reshape(-1, len(self.plain.mass))
 
-    def found(self, scale: float) -> StatisticallyLinear:
+    def solved(self, scale: float) -> StatisticallyLinear:
         """Iterate to the fixed point."""
         count = len(self.springs)
         first = _Moments(np.zeros(count), np.full(count, scale * TRAVEL), np.full(count, scale * RATE))
@@ -170,7 +170,8 @@ class _Search:
         return np.array(rows).reshape(-1, 2)
 
     def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
-        """Of every spring's travel and rate: mean force, gain and variance that the gain leaves out."""
+        """Statistical linearisation of every spring's laws over travel and rate: mean force, gain and variance that the
+        gain leaves out."""
         moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
         return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
 
@@ -179,7 +180,7 @@ class _Search:
         return linearise(vehicle, self.speed, named)
 
     def _moved(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
-        """How the springs of the replaced vehicle move, and its mean position (n,)."""
+        """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
         linear = self._replaced(gains, self.watched)
         deviation = stationary(excited(linear, self.excitation, self.speed)).deviation[len(self.vehicle.outputs) :]
         if not np.isfinite(deviation).all():
@@ -288,7 +289,7 @@ def _largest(wanted: np.ndarray, gains: np.ndarray) -> float:
 
 
 def _sentence(name: str, share: float, status: str) -> str:
-    """What the left-out share says of an output's standard deviation."""
+    """Sentence on how far the left-out share may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "

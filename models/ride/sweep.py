@@ -94,7 +94,7 @@ Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 
 
 def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
-    """By the covariance itself; a vehicle that is unstable is told with its speed."""
+    """Variances by solving for the covariance; a vehicle that is unstable is told with its speed."""
     try:
         exact = stationary(system, accuracy)
     except Unstable as error:
@@ -105,7 +105,7 @@ def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
 def _quick(
     system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
 ) -> Answer | str:
-    """By the fast route, or why it cannot be trusted here."""
+    """Variances by the fast route, or the reason why that cannot be trusted here."""
     quick = modal(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick

@@ -177,7 +177,7 @@ class _Met:
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
     def within(self, step: int) -> slice:
-        """Which of the times lie in a step."""
+        """The slice of the times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
     def of(self, step: int) -> np.ndarray:
@@ -211,15 +211,15 @@ class _Queue:
         self.waiting = np.concatenate([moved, self.met.of(step)], axis=1)
 
     def take(self, count: int) -> np.ndarray:
-        """The first of the queue leave it."""
+        """Take the first entries out of the queue."""
         taken, self.waiting = self.waiting[:, :count], self.waiting[:, count:]
         return taken
 
 
-def _product(first: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _product(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Sum over points and channels of one times other, both (n, c, k), with the points' weights (c,)."""
     n = len(first)
-    return (first * weight[:, None]).reshape(n, -1) @ other.reshape(n, -1).T
+    return (first * weight[:, None]).reshape(n, -1) @ second.reshape(n, -1).T
 
 
 def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:

@@ -130,5 +130,5 @@ def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]
 
 
 def _columns(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Each vector in a column and in rows of its own."""
+    """Block-diagonal matrix with each vector as a column."""
     return block_diag(*(part[:, None] for part in parts))

@@ -115,7 +115,7 @@ def _bands(
 
 
 def _limits(tracks: MeasuredTracks, measured: TrackSpectra) -> list[str]:
-    """What no fit could change."""
+    """Sentences on what no fit of the road could change."""
     least = measured.wavenumber[0]
     low, high = measured.band()
     return [

@@ -38,7 +38,7 @@ class Graded:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """That of the profile (m)."""
+        """First and last arc length of the profile (m)."""
         return self.profile.extent
 
     @property
@@ -65,7 +65,7 @@ class Graded:
         return height + float(more[0]), slope + float(more[1])
 
     def _climb(self, s: np.ndarray) -> Samples:
-        """What the grade adds to heights (m) and slopes."""
+        """Heights (m) and slopes that the grade adds."""
         beyond = (s - self.start) / TRANSITION
         x, steepness = np.clip(beyond, 0.0, 1.0), math.tan(self.grade)
         risen = x**4 * (2.5 - x * (3.0 - x)) + np.maximum(beyond - 1.0, 0.0)

@@ -38,7 +38,7 @@ _KEYWORD = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
 
 @dataclass(frozen=True)
 class _Promise:
-    """What the header says of the data: records, channels, bytes per value, text or binary."""
+    """Layout of the data by the header: records, channels, bytes per value, text or binary."""
 
     records: int
     channels: int

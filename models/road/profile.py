@@ -23,7 +23,7 @@ SLACK = 1e-9
 
 
 class Profile(Protocol):
-    """What a vehicle asks of a road; heights in m, positive down."""
+    """Protocol of a road profile; heights in m, positive down."""
 
     @property
     def name(self) -> str:
@@ -86,12 +86,12 @@ class SineProfile:
 
     @property
     def waves(self) -> kernels.Waves:
-        """As compiled functions take them."""
+        """The profile's waves as compiled functions take them."""
         return kernels.Waves(self.amplitude, self.wavenumber, self.phase, self.window_length)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Without end on both sides."""
+        """First and last arc length: without end on both sides."""
         return -math.inf, math.inf
 
     @property

@@ -70,7 +70,7 @@ class TwoTrackRoad:
         return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
 
     def label(self, y: float) -> str:
-        """What the road is, with the convention of its level."""
+        """Text that names the road and the convention of its level."""
         cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
         steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
         return (
@@ -181,7 +181,7 @@ def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, whee
 
 
 def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
-    """How far (m) each axle runs behind the first."""
+    """Distance (m) of each axle behind the first."""
     axles = sorted({wheel.axle for wheel in wheels})
     if not axles or axles != list(range(len(axles))):
         raise InputError("", "axles", axles, "must be numbered 0, 1, ... from the front, each with a wheel")

@@ -1,4 +1,4 @@
-"""What the motion that is recovered from accelerometers takes for granted."""
+"""Assumptions of the motion that is recovered from accelerometers."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -29,7 +29,7 @@ class Record:
 
 
 def assumptions(record: Record, recovered: Motion) -> list[Assumption]:
-    """What a motion (n samples) recovered from a record takes for granted."""
+    """Assumptions of a motion (n samples) recovered from a record."""
     pitch, turned = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
     listed = [
         Assumption(

@@ -75,5 +75,5 @@ def _entries(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _jacobian(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Their derivatives (entries, 3) by w."""
+    """Derivatives (entries, 3) of the measured rate products by the angular rate w."""
     return w[first, None] * EYE[other] + w[other, None] * EYE[first] - 2 * (first == other)[:, None] * w

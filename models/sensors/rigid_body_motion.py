@@ -25,7 +25,7 @@ NOISE_FACTOR = 1.5
 
 @dataclass(frozen=True)
 class Spin:
-    """What relative accelerations tell at each instant, in the array's own axes e1, e2, n.
+    """Products of the angular rate by relative accelerations at each instant, in the array's axes e1, e2, n.
 
     gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
     relative : (n, 3, sensors) in m/s^2, readings less their mean
@@ -38,7 +38,7 @@ class Spin:
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a rigid body explains the readings.
+    """Quality of a rigid-body fit to accelerometer readings.
 
     misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
     share : its rms over the record by that of the relative accelerations
@@ -72,7 +72,7 @@ class Start:
 
     @staticmethod
     def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "Start":
-        """Of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
+        """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
         level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
         return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
@@ -168,7 +168,8 @@ def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
 
 
 def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
-    """The same from what e1 and e2 tell, (w.w) I - (w1, w2) (w1, w2)^T, whose smaller eigenvalue is w3^2."""
+    """Magnitudes of the angular rates from in-plane accelerations (axes e1, e2), (w.w) I - (w1, w2) (w1, w2)^T, whose
+    smaller eigenvalue is w3^2."""
     flat = m[:, :2, :2]
     sizes, directions = np.linalg.eigh(-0.5 * (flat + np.swapaxes(flat, 1, 2)))
     about_normal = np.sqrt(np.maximum(sizes[:, :1], 0.0))

@@ -60,7 +60,7 @@ class SensorArray:
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
-        """The same about e1, e2, n."""
+        """Noise gains about the array's axes e1, e2, n."""
         first, two, three = self.inverse_squares
         return np.sqrt(
             [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
@@ -72,7 +72,7 @@ class SensorArray:
         return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
 
     def describe(self) -> list[str]:
-        """What an engineer should know of the arrangement, as sentences."""
+        """Sentences on the strengths and weaknesses of the sensor arrangement."""
         normal = ", ".join(f"{value:.3g}" for value in np.round(self.frame[:, 2], 12) + 0.0)
         flatness = self.spreads[2] / self.spreads[1]
         spreads = ", ".join(f"{value:.3g}" for value in self.spreads)

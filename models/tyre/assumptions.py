@@ -1,4 +1,4 @@
-"""What a table of friction takes for granted where it is read."""
+"""Assumptions of a table of friction where its values are read."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from models.tyre.tyre_table import TyreTable
 
 
 def assumptions(table: TyreTable, load: float) -> list[Assumption]:
-    """Of a result over "slip_angle" (deg) under a load (N): that both lie among the table's nodes.
+    """Assumptions of a result over "slip_angle" (deg) under a load (N): that both lie among the table's nodes.
 
     A table of one load holds for all of them.
     """

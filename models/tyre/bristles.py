@@ -76,7 +76,7 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
 
 @lean
 def _creepages(sign, patches, slides):
-    """Of tyres that roll forwards (sign 1) or backwards (-1)."""
+    """Creepages of tyres that roll forwards (sign 1) or backwards (-1)."""
     for i in range(len(patches)):
         patch, speed = patches[i], max(abs(slides[i, 3]), SLOW)
         patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed

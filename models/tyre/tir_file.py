@@ -24,7 +24,7 @@ UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": (
 VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
 """FITTYP of the property files whose equations these are."""
 NEEDED = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-ONE = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
+UNIT_SCALES = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
 """Scaling factors, 1 where the file has none; all other coefficients are then 0."""
 COEFFICIENT = re.compile(r"P[CDEK][XY]\d")
 LOADS = 9
@@ -43,8 +43,8 @@ def tir_table(path: str | Path) -> TyreTable:
     """Table of the tyre in a `.tir` file; raises InputError that names file, line, key, value and what is allowed."""
     properties = _properties(path)
     _check(path, properties)
-    named = (name for name in properties if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name))
-    c = defaultdict(float, dict.fromkeys(ONE, 1.0)) | {name: _number(path, properties, name) for name in named}
+    named = (name for name in properties if name in (*NEEDED, *UNIT_SCALES) or COEFFICIENT.fullmatch(name))
+    c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {name: _number(path, properties, name) for name in named}
     least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:

@@ -72,7 +72,8 @@ class TyreTable:
         self._check_resultant()
 
     def _check_resultant(self) -> None:
-        """Both together not above the largest mu_x or mu_y: linear in slip and load, so only angles lie between."""
+        """Check that the resultant friction is not above the largest mu_x or mu_y: linear in slip and load, so only
+        angles lie between."""
         peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
         for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
             x, g, h = (
@@ -100,12 +101,12 @@ class TyreTable:
         return float((self.g[1].max() * self.h[1].max()) / self.angles[1])
 
     def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
-        """The same functions on nodes that include these tables' own: linear interpolation loses nothing."""
+        """The tyre's functions on nodes that include these tables' own: linear interpolation loses nothing."""
         mu_x, g, h = self._at(angles, slips, loads)
         return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
 
     def scaled(self, factor: float) -> "TyreTable":
-        """The same tyre where friction is ``factor`` times as large."""
+        """A copy of the tyre where friction is ``factor`` times as large."""
         return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
@@ -114,7 +115,7 @@ class TyreTable:
         return mu_x[:, 0, :], g * h
 
     def figures(self, load: float) -> dict[str, float]:
-        """What engineers ask of a tyre first, under one load (N), by name and unit."""
+        """The main figures of a tyre under one load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
         return {

@@ -27,16 +27,15 @@ class Element:
     """A force along an axis, positive in compression, or a moment.
 
     F = held + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
-    d = axis . (point two - point one) less its design value, in the axes of the body ``frame``, the chassis mostly; of
-    an anti-roll bar the axis is divided by the track, so that d is an angle and F a moment. points in the design
-    position, m; N or N m.
-    """
+    d = axis . (second_point - first_point) less its design value, in the axes of the body ``frame``, the chassis
+    mostly; of an anti-roll bar the axis is divided by the track, so that d is an angle and F a moment. points in the
+    design position, m; N or N m."""
 
     name: str
-    one: str
-    two: str
-    point_one: np.ndarray
-    point_two: np.ndarray
+    first_body: str
+    second_body: str
+    first_point: np.ndarray
+    second_point: np.ndarray
     axis: np.ndarray
     stiffness: float
     damping: float
@@ -54,8 +53,8 @@ class Element:
 
     @property
     def design(self) -> float:
-        """axis . (point two - point one) in the design position."""
-        return float(self.axis @ (self.point_two - self.point_one))
+        """axis . (second_point - first_point) in the design position."""
+        return float(self.axis @ (self.second_point - self.first_point))
 
     @property
     def unit(self) -> str:
@@ -65,7 +64,7 @@ class Element:
 
 @dataclass(frozen=True)
 class CutVehicle:
-    """What is above the cut.
+    """A vehicle cut at its hubs: the bodies above the cut.
 
     tree : bodies and joints, carriers first, then the chassis; without springs and tyres
     whole : the vehicle that was cut, all its bodies on the chassis, loaded; tyres are listed there
@@ -96,15 +95,24 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
 
-    def element(part: SpringDamper | AntiRollBar, first_body: str, two: str, *places: Vector) -> Element:
+    def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
         force = held.parts[part.name]
         return Element(
-            part.name, first_body, two, first, second, axis, part.stiffness, part.damping, force, str(part.frame)
+            part.name,
+            first_body,
+            second_body,
+            first,
+            second,
+            axis,
+            part.stiffness,
+            part.damping,
+            force,
+            str(part.frame),
         )
 
     def bent(s: SpringDamper) -> Element:
-        straight = element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis)
+        straight = element(s, s.first_body, str(s.second_body), s.first_point, s.second_point, s.axis)
         rough = replace(straight, friction=s.friction, friction_rate=s.friction_rate)
         return replace(rough, travel_force=s.travel_force, rate_force=s.rate_force)
 
@@ -139,7 +147,7 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
             "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz",
         )
     for spring in vehicle.springs:
-        if spring.two is None:
+        if spring.second_body is None:
             raise InputError(vehicle.name, f"springs[{spring.name}].bodies", "ground", "a cut vehicle has no ground")
     for bar in vehicle.bars:
         if bar.body != chassis:

@@ -36,7 +36,7 @@ class Output:
 
 
 class Rows(NamedTuple):
-    """What ``Output`` has, of all outputs: (p, n), those by the road (p, w)."""
+    """Rows of all outputs' matrices, as ``Output`` has them of one output: (p, n), those by the road (p, w)."""
 
     acceleration: np.ndarray
     rate: np.ndarray
@@ -89,7 +89,7 @@ def poles(vehicle: LinearVehicle) -> np.ndarray:
 
 
 def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
-    """How far every eigenvalue (2 n,) of the unloaded vehicle moves, complex, in 1/s.
+    """Shift of every eigenvalue (2 n,) of the unloaded vehicle by its load, complex, in 1/s.
 
     The eigenvalues of the two are paired so that the sum of all distances is the least.
     """

@@ -24,7 +24,8 @@ from models.vehicles.pitch_plane import Parameters
 
 
 def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
-    """What the compiled equations read: the parameters (15,), then stiffness, damping and dead band of each spring."""
+    """Numbers that the compiled equations read: the parameters (15,), then stiffness, damping and dead band of each
+    spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
     return np.concatenate((p.array(), *springs))
 
@@ -57,7 +58,7 @@ def tyres(y, u, p):
 
 @register_jitable
 def pushing_tyres(y, u, p):
-    """The same of tyres that never pull (the effect ``lift_off``). What is not a number stays so."""
+    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). What is not a number stays so."""
     e1, e2 = y[0] - u[0], y[1] - u[1]
     f1 = max(min(p[6] * e1 + p[10] * (y[4] - u[2]), 2.0 * p[6] * e1), 0.0)
     f2 = max(min(p[7] * e2 + p[11] * (y[5] - u[3]), 2.0 * p[7] * e2), 0.0)
@@ -98,7 +99,7 @@ def lift_off_exact(y, u, p, dy):
 
 @register_jitable
 def lift_off_linear(y, u, p, dy):
-    """The same, linearised about zero pitch."""
+    """Rates of the vehicle on tyres that never pull, linearised about zero pitch."""
     newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
 
 
@@ -139,7 +140,7 @@ def pitch_exact(y, u, p, dy):
 
 @register_jitable
 def pitch_linear(y, u, p, dy):
-    """The same, linearised about zero pitch."""
+    """Rates of the vehicle with its pitch guided, linearised about zero pitch."""
     y[3], y[7] = u[2], u[3]
     newton_euler(y, (u[0], u[1]), suspension(y, p, u[2], 1.0), 1.0, p, dy)
     dy[7] = u[4]
@@ -156,7 +157,7 @@ def heave_pitch_exact(y, u, p, dy):
 
 @register_jitable
 def heave_pitch_linear(y, u, p, dy):
-    """The same, linearised about zero pitch."""
+    """Rates of the vehicle with heave and pitch guided, linearised about zero pitch."""
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
     newton_euler(y, (u[0], u[1]), suspension(y, p, u[3], 1.0), 1.0, p, dy)
     dy[6], dy[7] = u[6], u[7]

@@ -1,4 +1,4 @@
-"""What no usual vehicle has: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
+"""Queries on implausible vehicles: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
 
 Nothing here refuses: each finding names the entry, its value and what is usual, as the units of a file are named. Only
 what is far from every vehicle on wheels is queried, from a quarter of a small car to a loaded truck; a vehicle that is
@@ -46,14 +46,14 @@ UPRIGHT = 0.3
 
 
 @dataclass(frozen=True)
-class Whole:
-    """A vehicle with what is worked out of it once."""
+class VehicleFigures:
+    """Figures of a vehicle that several checks use."""
 
     vehicle: SpatialVehicle
 
     @cached_property
     def wheels(self) -> dict[str, tuple[Tyre, ...]]:
-        """Bodies that carry tyres, and these; not the one that is carried."""
+        """Names of the bodies that carry tyres, with their tyres; without the carried body."""
         names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
         tyres_of = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
         return tyres_of if len(tyres_of) < len(self.vehicle.bodies) else {}
@@ -89,13 +89,13 @@ class Whole:
         return [
             s
             for s in self.vehicle.springs
-            if s.two is not None and wheel in (s.one, s.two) and abs(s.axis[2]) > UPRIGHT
+            if s.second_body is not None and wheel in (s.first_body, s.second_body) and abs(s.axis[2]) > UPRIGHT
         ]
 
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
     """All queries about a vehicle, in SI, but for those of checks that the user accepts; empty for a usual one."""
-    whole = Whole(vehicle)
+    whole = VehicleFigures(vehicle)
     queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
     return tuple(query for query in queries if query.check not in accept)
 
@@ -108,24 +108,24 @@ def _beyond(value: float, usual: tuple[float, float]) -> bool:
     return not usual[0] <= value <= usual[1]
 
 
-def _masses(whole: Whole) -> Iterator[Finding]:
-    if _beyond(whole.total, MASS):
+def _masses(figures: VehicleFigures) -> Iterator[Finding]:
+    if _beyond(figures.total, MASS):
         yield _query(
             "mass",
             "mass of the vehicle",
-            f"{whole.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. {_tonnes(whole.total)}",
-            whole.total,
+            f"{figures.total:.4g} kg; usual are {MASS[0]:g} to {MASS[1]:g} kg. {_tonnes(figures.total)}",
+            figures.total,
             "kg",
         )
-    unsprung = sum(whole.vehicle.body(name).mass for name in whole.wheels)
-    if whole.wheels and not _beyond(whole.total, MASS) and whole.total - unsprung < LIGHT * unsprung:
+    unsprung = sum(figures.vehicle.body(name).mass for name in figures.wheels)
+    if figures.wheels and not _beyond(figures.total, MASS) and figures.total - unsprung < LIGHT * unsprung:
         yield _query(
             "mass",
-            f"bodies[{whole.carried.name}].mass",
-            f"{whole.carried.mass:.4g} kg; all that is carried "
-            f"weighs {whole.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
-            f"{_tonnes(whole.carried.mass)}",
-            whole.carried.mass,
+            f"bodies[{figures.carried.name}].mass",
+            f"{figures.carried.mass:.4g} kg; all that is carried "
+            f"weighs {figures.total - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
+            f"{_tonnes(figures.carried.mass)}",
+            figures.carried.mass,
             "kg",
         )
 
@@ -134,12 +134,12 @@ def _tonnes(value: float) -> str:
     return "Masses are in kg, not in tonnes" if value < 100 else "Masses are in kg, not in g or lb"
 
 
-def _sizes(whole: Whole) -> Iterator[Finding]:
+def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
     metres = "Lengths are in m, not in mm"
-    for name, value, usual in (("wheelbase", whole.wheelbase, WHEELBASE), ("track", whole.track, TRACK)):
+    for name, value, usual in (("wheelbase", figures.wheelbase, WHEELBASE), ("track", figures.track, TRACK)):
         if value and _beyond(value, usual):
             yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
-    for body in whole.vehicle.bodies:
+    for body in figures.vehicle.bodies:
         if _beyond(body.position[2], (-0.01, HEIGHT)):
             yield _query(
                 "size",
@@ -150,9 +150,10 @@ def _sizes(whole: Whole) -> Iterator[Finding]:
             )
 
 
-def _inertias(whole: Whole) -> Iterator[Finding]:
-    """Of the body that is carried: its freedoms of turning, and that no mass is negative anywhere in it."""
-    body, spans = whole.carried, {"rx": whole.track, "ry": whole.wheelbase, "rz": whole.wheelbase}
+def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
+    """Findings on the inertia of the carried body: its freedoms of turning, and that no mass is negative anywhere in
+    it."""
+    body, spans = figures.carried, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
     about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
     for freedom, usual in GYRATION.items():
         span, inertia = spans[freedom], about[freedom]
@@ -167,7 +168,7 @@ def _inertias(whole: Whole) -> Iterator[Finding]:
                 inertia,
                 "kg m^2",
             )
-    for each in whole.vehicle.bodies:
+    for each in figures.vehicle.bodies:
         low, middle, high = sorted(np.diag(each.inertia).tolist())
         if low > 0 and high > 1.05 * (low + middle):
             yield _query(
@@ -180,11 +181,11 @@ def _inertias(whole: Whole) -> Iterator[Finding]:
             )
 
 
-def _struts(whole: Whole) -> Iterator[Finding]:
+def _struts(figures: VehicleFigures) -> Iterator[Finding]:
     """Corners without a strut, and struts far from their wheels."""
-    for wheel, tyres in whole.wheels.items():
-        struts = whole.struts(wheel)
-        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != whole.carried.name:
+    for wheel, tyres in figures.wheels.items():
+        struts = figures.struts(wheel)
+        if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != figures.carried.name:
             kind = "damper alone" if struts else "strut"
             yield _query(
                 "strut",
@@ -196,7 +197,7 @@ def _struts(whole: Whole) -> Iterator[Finding]:
         for strut in struts:
             apart = _apart(strut, wheel, tyres)
             if apart > FAR:
-                point = strut.point_one if strut.one == wheel else strut.point_two
+                point = strut.first_point if strut.first_body == wheel else strut.second_point
                 yield _query(
                     "strut",
                     f"springs[{strut.name}]",
@@ -209,40 +210,40 @@ def _struts(whole: Whole) -> Iterator[Finding]:
 
 def _apart(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
     """Distance (m) of a strut's point on a wheel from the line between its tyres, seen from above."""
-    x, y, _ = strut.point_one if strut.one == wheel else strut.point_two
+    x, y, _ = strut.first_point if strut.first_body == wheel else strut.second_point
     beside = [tyre.point[1] for tyre in tyres]
     return float(np.hypot(x - tyres[0].point[0], max(min(beside) - y, y - max(beside), 0.0)))
 
 
-def _statics(whole: Whole) -> Iterator[Finding]:
+def _statics(figures: VehicleFigures) -> Iterator[Finding]:
     """Static loads and what follows from them; nothing where masses or lengths are beyond all vehicles already."""
-    if any(_masses(whole)) or any(_sizes(whole)):
+    if any(_masses(figures)) or any(_sizes(figures)):
         return
     try:
-        whole.held  # noqa: B018
+        figures.held  # noqa: B018
     except InputError as error:
         yield _query("load", error.place, error.allowed, 0.0, "N")
         return
-    yield from _loads(whole)
-    yield from _frequencies(whole)
-    yield from _dampers(whole)
+    yield from _loads(figures)
+    yield from _frequencies(figures)
+    yield from _dampers(figures)
 
 
-def _loads(whole: Whole) -> Iterator[Finding]:
-    weight, axles = whole.total * GRAVITY, dict[int, list[Tyre]]()
-    for tyre in whole.vehicle.tyres:
+def _loads(figures: VehicleFigures) -> Iterator[Finding]:
+    weight, axles = figures.total * GRAVITY, dict[int, list[Tyre]]()
+    for tyre in figures.vehicle.tyres:
         axles.setdefault(tyre.axle, []).append(tyre)
-        if whole.held[tyre.name] < 0:
+        if figures.held[tyre.name] < 0:
             yield _query(
                 "load",
                 f"tyres[{tyre.name}]",
-                f"its static load is {whole.held[tyre.name]:.4g} N: the wheel "
+                f"its static load is {figures.held[tyre.name]:.4g} N: the wheel "
                 "pulls on the road. The centre of mass lies beyond the axles, or an axle at a wrong place",
-                whole.held[tyre.name],
+                figures.held[tyre.name],
                 "N",
             )
     for tyres in axles.values():
-        loads = [whole.held[tyre.name] for tyre in tyres]
+        loads = [figures.held[tyre.name] for tyre in tyres]
         names = " and ".join(tyre.name for tyre in tyres)
         if len(axles) > 1 and 0 <= sum(loads) < SHARE * weight:
             yield _query(
@@ -265,22 +266,23 @@ def _loads(whole: Whole) -> Iterator[Finding]:
                 )
 
 
-def _frequencies(whole: Whole) -> Iterator[Finding]:
-    """Of the carried body from how far it sinks, of every wheel between road and body, and how far tyres give way."""
+def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
+    """Findings on frequencies: of the carried body from how far it sinks, of every wheel between road and body, and how
+    far tyres give way."""
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
-    sunk = _sunk(whole)
+    sunk = _sunk(figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
     if _beyond(bounce, BOUNCE):
         yield _query(
             "frequency",
-            f"bodies[{whole.carried.name}]",
+            f"bodies[{figures.carried.name}]",
             f"sinks {sunk:.4g} m under the vehicle's weight, a "
             f"natural frequency of {bounce:.3g} Hz; usual are {BOUNCE[0]:g} to {BOUNCE[1]:g} Hz. {remedy}",
             bounce,
             "Hz",
         )
-    for wheel in whole.wheels:
-        hop = _hop(whole, wheel)
+    for wheel in figures.wheels:
+        hop = _hop(figures, wheel)
         if hop is not None and _beyond(hop, HOP):
             yield _query(
                 "frequency",
@@ -289,44 +291,44 @@ def _frequencies(whole: Whole) -> Iterator[Finding]:
                 hop,
                 "Hz",
             )
-    for tyre in whole.vehicle.tyres:
-        pressed = whole.held[tyre.name] / tyre.stiffness
+    for tyre in figures.vehicle.tyres:
+        pressed = figures.held[tyre.name] / tyre.stiffness
         if pressed > 0 and _beyond(pressed, PRESSED):
             yield _query(
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
                 f"{tyre.stiffness:.4g} N/m gives way by "
-                f"{pressed:.3g} m under {whole.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
+                f"{pressed:.3g} m under {figures.held[tyre.name]:.4g} N; usual are {PRESSED[0]:g} to "
                 f"{PRESSED[1]:g} m. {remedy}",
                 pressed,
                 "m",
             )
 
 
-def _sunk(whole: Whole) -> float:
-    """How far (m) the carried body sinks under the weights, springs and tyres together."""
-    vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
+def _sunk(figures: VehicleFigures) -> float:
+    """Distance (m) by which the carried body sinks under the weights, springs and tyres together."""
+    vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     moved = np.linalg.lstsq(stiffness, np.asarray(weights), rcond=1e-12)[0]
-    return float(motion.shift(whole.carried.name, whole.carried.position)[2] @ moved)
+    return float(motion.shift(figures.carried.name, figures.carried.position)[2] @ moved)
 
 
-def _hop(whole: Whole, wheel: str) -> float | None:
+def _hop(figures: VehicleFigures, wheel: str) -> float | None:
     """Frequency (Hz) of a wheel's or an axle's own z with everything else at rest; None where it has none."""
-    vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
+    vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     row = motion.coordinate(wheel, "z")
-    if not row.any() or wheel == whole.carried.name:
+    if not row.any() or wheel == figures.carried.name:
         return None
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)
     return float(np.sqrt((row @ stiffness @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
 
 
-def _dampers(whole: Whole) -> Iterator[Finding]:
+def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
     """Dampers of struts by the critical damping of what rests on them, and springs of one axle that differ."""
-    struts = {strut.name: strut for wheel in whole.wheels for strut in whole.struts(wheel)}
+    struts = {strut.name: strut for wheel in figures.wheels for strut in figures.struts(wheel)}
     for name, strut in struts.items():
-        stiffness, load = slopes_at_rest(strut)[0], whole.held[name]
+        stiffness, load = slopes_at_rest(strut)[0], figures.held[name]
         if not (strut.damping and stiffness > 0 and load > 0):
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)

@@ -1,4 +1,4 @@
-"""What no usual pitch-plane vehicle has: its parameters, judged as the vehicle in space that they describe."""
+"""Queries on implausible pitch-plane vehicles: their parameters, judged as the vehicle in space that they describe."""
 
 from collections.abc import Sequence
 

@@ -85,27 +85,27 @@ class Curve:
 
 @dataclass(frozen=True)
 class SpringDamper:
-    """Spring, damper, curves and dry friction between p1 fixed to body ``one`` and p2 fixed to body ``two``.
+    """Spring, damper, curves and dry friction between p1 fixed to ``first_body`` and p2 to ``second_body``.
 
     With a = ``axis`` (a unit vector fixed in ``frame``) and d = a . (p2 - p1) less its value in the design position,
 
         F = F0 + k d + c d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate),
 
-    acts as +F a at p1 on body one and as -F a at p2 on body two (None: the ground). With one above, two below and a
-    up, travel d and force F are positive in compression. F0 is the preload of ``spatial_linear.preloads``, 0 without
-    gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of the pair is taken up by the frame,
-    which keeps a. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at rest. Where it is not, as with a
-    spring beside the wheel that it carries, bodies that turn together strain a spring whose frame is the space.
+    acts as +F a at p1 on the first body and as -F a at p2 on the second (None: the ground). With the first above, the
+    second below and a up, travel d and force F are positive in compression. F0 is the preload of
+    ``spatial_linear.preloads``, 0 without gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of
+    the pair is taken up by the frame, which keeps a. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at
+    rest. Where it is not, as with a spring beside the wheel that it carries, bodies that turn together strain a spring
+    whose frame is the space.
 
-    point_one, point_two (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s); frame: the body in
-    whose axes a is fixed, None for the space.
-    """
+    first_point, second_point (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s); frame: the body
+    in whose axes a is fixed, None for the space."""
 
     name: str
-    one: str
-    two: str | None
-    point_one: Vector
-    point_two: Vector
+    first_body: str
+    second_body: str | None
+    first_point: Vector
+    second_point: Vector
     axis: Vector
     stiffness: float
     damping: float
@@ -241,7 +241,7 @@ class TyreOutput:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a reduced vehicle is the limit of, for small motion only.
+    """Limits that make up a reduced vehicle, for small motion only.
 
     Names of ``massless`` bodies and ``rigid`` springs, and ``locked`` freedoms as (body, freedom). Rigid springs and
     locked freedoms leave q = N r with fewer coordinates r; bodies without mass leave a mass matrix that may be singular

@@ -184,7 +184,7 @@ class Preloads(NamedTuple):
 
 
 def preloads(vehicle: SpatialVehicle) -> Preloads:
-    """What holds the design position against gravity; a tyre's is its static wheel load.
+    """Preloads that hold the design position against gravity; a tyre's is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
     sunk by K^-1 times the weights. InputError where no spring can carry a weight, and for a tyre that only pushes
@@ -223,8 +223,13 @@ def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gain
     """Spring-dampers and bars by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
-        ends = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-        apart, turning = np.subtract(spring.point_two, spring.point_one), motion.turned_axis(spring.frame, spring.axis)
+        ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
+            spring.first_body, spring.first_point
+        )
+        apart, turning = (
+            np.subtract(spring.second_point, spring.first_point),
+            motion.turned_axis(spring.frame, spring.axis),
+        )
         rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
     return rows | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
 
@@ -253,7 +258,7 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     for body in vehicle.bodies:
         total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
     for spring in vehicle.springs:
-        ends = (spring.one, spring.point_one), (spring.two, spring.point_two)
+        ends = (spring.first_body, spring.first_point), (spring.second_body, spring.second_point)
         total += held.parts[spring.name] * motion.travel_bend(*ends, spring.axis, spring.frame)
     for bar in vehicle.bars:
         ends = (bar.left, bar.point_left), (bar.right, bar.point_right)
@@ -365,7 +370,9 @@ def _free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
     coordinates, motion = vehicle.coordinates(), Kinematics(vehicle)
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
     rows = [
-        np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
+        np.array(s.axis)
+        @ (motion.shift(s.second_body, s.second_point) - motion.shift(s.first_body, s.first_point))
+        @ kept
         for s in vehicle.springs
         if s.name in limits.rigid
     ]

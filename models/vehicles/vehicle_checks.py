@@ -1,4 +1,4 @@
-"""What a vehicle must be as a whole, before any number is computed from it."""
+"""Checks of a vehicle as a whole, before any number is computed from it."""
 
 from collections import defaultdict
 
@@ -57,7 +57,7 @@ def _connected(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
-    springs = [(spring.one, spring.two or GROUND) for spring in vehicle.springs]
+    springs = [(spring.first_body, spring.second_body or GROUND) for spring in vehicle.springs]
     tyres = [(tyre.body, GROUND) for tyre in vehicle.tyres]
     bars = [(bar.body, end) for bar in vehicle.bars for end in (bar.left, bar.right)]
     return springs + tyres + bars

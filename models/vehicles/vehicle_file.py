@@ -304,7 +304,7 @@ class _Builder:
         return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping)
 
     def _side_forces(self) -> tuple[SideForce, ...]:
-        """On the chassis, which guides the wheels sideways."""
+        """Side forces of the tyres on the chassis, which guides the wheels sideways."""
         rolling, chassis = [tyre for tyre in self.tables.tyres if tyre.cornering], self.tables.chassis
         for axle in (axle for axle in self.tables.axles if axle.roll_steer):
             place = _place("axles", axle.name, "roll_steer")

@@ -29,7 +29,8 @@ def _source() -> Any:
 
 
 class Entry(Strict):
-    """What every table has: a name, by which messages and outputs call it, and where its values are from."""
+    """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and where its values
+    are from."""
 
     name: Name
     source: str = _source()

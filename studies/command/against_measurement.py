@@ -54,7 +54,7 @@ class Match:
 
     @property
     def relative(self) -> float:
-        """The same by the standard deviation of the measurement; infinite where that does not move."""
+        """Error divided by the standard deviation of the measurement; infinite where the measurement is constant."""
         size = float(np.std(self.measured))
         return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
 
@@ -216,15 +216,15 @@ def report(run_path: Path, measurement: Path, folder: Path, shift: float | None 
     }
 
 
-def _told(name: str, each: Overlay, count: int) -> Sequence[str]:
-    return [*([f"  {name}"] if count > 1 else []), *each.lines()]
+def _told(name: str, overlay: Overlay, count: int) -> Sequence[str]:
+    return [*([f"  {name}"] if count > 1 else []), *overlay.lines()]
 
 
-def draw(each: Overlay, title: str, path: Path) -> None:
-    """Both, and below the error, of the channels of the largest relative error."""
+def draw(overlay: Overlay, title: str, path: Path) -> None:
+    """Draw measurement and run, and below their difference, of the channels of the largest relative error."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, plt, save
 
-    shown = each.matches[:SHOWN]
+    shown = overlay.matches[:SHOWN]
     figure, axes = plt.subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, below), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
@@ -236,5 +236,5 @@ def draw(each: Overlay, title: str, path: Path) -> None:
         below.set(title=f"rms error {match.rms:.3g} {unit}, {match.relative:.1%}", xlabel="time of the run [s]")
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    heading(figure, f"{title}: {each.told().partition(';')[0]}", {})
+    heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})
     save(figure, path)

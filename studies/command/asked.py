@@ -1,4 +1,4 @@
-"""What the user asked for on the command line: a scene, its study and the engines that run it."""
+"""The scene, its study and the engines that the user named on the command line."""
 
 import os
 import re

@@ -43,7 +43,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Difference:
-    """``two`` less ``one`` over ``grid`` (n,); ``note`` says how they came onto the same rows.
+    """``second`` less ``first`` over ``grid`` (n,); ``note`` says how they came onto the same rows.
 
     stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
     """
@@ -52,8 +52,8 @@ class Difference:
     unit: str
     over: str
     grid: np.ndarray
-    one: np.ndarray
-    two: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
     note: str = ""
     labels: tuple[str, ...] = ()
     stated: float = np.nan
@@ -67,8 +67,8 @@ class Difference:
     def gap(self) -> np.ndarray:
         """(n,) nan in both is no difference; infinite where only one of them is a number, or the infinities differ."""
         with np.errstate(invalid="ignore"):
-            gap = self.two - self.one
-        same = (self.one == self.two) | (np.isnan(self.one) & np.isnan(self.two))
+            gap = self.second - self.first
+        same = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
         return np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap))
 
     @property
@@ -93,42 +93,42 @@ class Difference:
 
     @property
     def where(self) -> str:
-        """The same in words."""
+        """Place of the largest difference, in words."""
         return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property
     def share(self) -> float:
         """Largest difference by the largest magnitude of the first."""
-        size = np.abs(self.one[np.isfinite(self.one)]).max(initial=0.0)
+        size = np.abs(self.first[np.isfinite(self.first)]).max(initial=0.0)
         return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf
 
 
-def compare(first: Path, two: Path) -> tuple[list[Difference], list[str]]:
+def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:
     """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
-    pairs, notes = _pairs(first, two)
+    pairs, notes = _pairs(first, second)
     differences = list[Difference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
         a, b = (dict(_quantities(file)) for file in files)
         notes += _alone(prefix, (files[0], a), (files[1], b))
         differences += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _sorted(differences, first, two), notes
+    return _sorted(differences, first, second), notes
 
 
-def compare_runs(first: Result, two: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
-    """The same of two results in memory, which messages and notes call by ``names``."""
-    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, two))
+def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
+    """Differences between two results in memory, which messages and notes call by ``names``."""
+    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _sorted(differences, *names), _alone("", (names[0], a), (names[1], b))
 
 
-def _sorted(differences: list[Difference], first: object, two: object) -> list[Difference]:
+def _sorted(differences: list[Difference], first: object, second: object) -> list[Difference]:
     """The largest share first; raises InputError where there is none."""
     if not differences:
-        raise InputError(two, "", None, f"has no quantity in common with {first}: compare two results of one study")
+        raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
     return sorted(differences, key=lambda each: -each.share)
 
 
@@ -181,9 +181,9 @@ def _tabled(path: Path) -> bool:
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
-def results_of(first: Path, two: Path) -> dict[str, Result]:
+def results_of(first: Path, second: Path) -> dict[str, Result]:
     """The results that are compared, by their files: those of tables are the netCDF files beside them."""
-    files = [file for _, *pair in _pairs(first, two)[0] for file in pair]
+    files = [file for _, *pair in _pairs(first, second)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
     return {name: run for name, run in results if run is not None and all(said in run.data.attrs for said in SAID)}
 
@@ -269,41 +269,41 @@ def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _difference(name: str, first: Quantity, two: Quantity, file: object) -> Difference:
+def _difference(name: str, first: Quantity, second: Quantity, file: object) -> Difference:
     """Raises InputError where kinds of runs, units or rows do not fit."""
-    if first.kind != two.kind:
-        raise InputError(file, name, two.kind, f"the other run is of {first.kind}: compare two runs of one kind")
-    if (first.unit, first.over) != (two.unit, two.over):
+    if first.kind != second.kind:
+        raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
+    if (first.unit, first.over) != (second.unit, second.over):
         raise InputError(
-            file, name, f"{two.unit} over {two.over}", f"the other one is in {first.unit} over {first.over}"
+            file, name, f"{second.unit} over {second.over}", f"the other one is in {first.unit} over {first.over}"
         )
-    for label, other in zip(first.labels, two.labels, strict=False):
+    for label, other in zip(first.labels, second.labels, strict=False):
         if label != other:
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
     near = NEAR * np.abs(first.grid).max(initial=0.0)
-    if first.grid.shape == two.grid.shape and np.allclose(first.grid, two.grid, rtol=0.0, atol=near):
+    if first.grid.shape == second.grid.shape and np.allclose(first.grid, second.grid, rtol=0.0, atol=near):
         return Difference(
             name,
             first.unit,
             first.over,
             first.grid,
             first.values,
-            two.values,
+            second.values,
             "",
             first.labels,
-            first.error + two.error,
+            first.error + second.error,
         )
     if first.over != "time [s]":
-        rows = "" if len(first.grid) == len(two.grid) else f", {len(two.grid)} instead of {len(first.grid)}"
+        rows = "" if len(first.grid) == len(second.grid) else f", {len(second.grid)} instead of {len(first.grid)}"
         raise InputError(file, name, None, f"has rows at other places ({first.over}) than the first{rows}")
-    return _in_time(name, first, two, file)
+    return _in_time(name, first, second, file)
 
 
-def _in_time(name: str, first: Quantity, two: Quantity, file: object) -> Difference:
+def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> Difference:
     """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (first, two) if len(first.grid) > len(two.grid) else (two, first)
+    fine, coarse = (first, second) if len(first.grid) > len(second.grid) else (second, first)
     unread = "cannot be read at other times: the"
     if not (np.diff(fine.grid) > 0.0).all():
         raise InputError(file, name, None, f"{unread} times of the denser run do not increase")
@@ -316,12 +316,12 @@ def _in_time(name: str, first: Quantity, two: Quantity, file: object) -> Differe
     pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
     note = f"on {len(times)} common rows, the denser run by a cubic spline"
     both = pair if fine is first else pair[::-1]
-    return Difference(name, first.unit, first.over, times, *both, note, stated=first.error + two.error)
+    return Difference(name, first.unit, first.over, times, *both, note, stated=first.error + second.error)
 
 
-def report(first: Path, two: Path, folder: Path) -> dict[str, Any]:
+def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
     """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
-    differences, notes = compare(first, two)
+    differences, notes = compare(first, second)
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         heads = ("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value")
@@ -330,10 +330,10 @@ def report(first: Path, two: Path, folder: Path) -> dict[str, Any]:
             (d.name, d.unit, d.largest, d.where, d.rms, d.share, "" if np.isnan(d.stated) else d.stated)
             for d in differences
         )
-    results = results_of(first, two)
-    _figure(first, two, differences, results, folder / "compare.png")
+    results = results_of(first, second)
+    _figure(first, second, differences, results, folder / "compare.png")
     return {
-        "scene": f"{two} less {first}",
+        "scene": f"{second} less {first}",
         "folder": str(folder),
         "failed": {},
         "names": [each.name for each in differences],
@@ -375,8 +375,9 @@ def _told(difference: Difference) -> str:
     )
 
 
-def _figure(first: Path, two: Path, differences: list[Difference], results: Results, path: Path) -> None:
-    """Both results and, below, their difference, of the three quantities that differ most, or one that is equal."""
+def _figure(first: Path, second: Path, differences: list[Difference], results: Results, path: Path) -> None:
+    """Draw both results and, below, their difference, of the three quantities that differ most, or one that is
+    equal."""
     from models.drawing.figures import BLUE, DARK, TITLE, VERMILION, WIDE, heading, legend_below, plt, save, wrapped
 
     differ = [each for each in differences if each.largest != 0][:3]
@@ -384,8 +385,8 @@ def _figure(first: Path, two: Path, differences: list[Difference], results: Resu
     share = 0.95 * WIDE / len(shown) - 0.3
     figure, axes = plt.subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
     for top, each in zip(axes[0], shown, strict=True):
-        top.plot(each.grid, each.one, color=DARK, linewidth=2.0, label=str(first))
-        top.plot(each.grid, each.two, color=VERMILION, linewidth=1.0, label=str(two))
+        top.plot(each.grid, each.first, color=DARK, linewidth=2.0, label=str(first))
+        top.plot(each.grid, each.second, color=VERMILION, linewidth=1.0, label=str(second))
         top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE))
     for below, each in zip(axes[-1], differ, strict=False):
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)

@@ -247,8 +247,8 @@ def _unit(job: Points) -> str:
 def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:
     """Records of all points; InputError if none of them has a number although none failed."""
 
-    def tell(done: Done) -> None:
-        progress(f"{done.done} of {done.paths} points", done.done / done.paths)
+    def tell(finished: Done) -> None:
+        progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
 
     def lost(points: range, reason: str) -> Arrays:
         return _array(_failed(reason) for _ in points)

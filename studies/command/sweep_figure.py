@@ -45,7 +45,7 @@ Columns = dict[str, list[Any]]
 
 @dataclass(frozen=True)
 class Swept:
-    """What the points of a sweep of ``scene`` over ``key`` gave.
+    """Results at the points of a sweep of ``scene`` over ``key``.
 
     failures : what failed at each point, by engine; results : of each point, without channels, by their names; unit :
     of the key's values.
@@ -131,7 +131,7 @@ def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     return np.arange(float(len(values))), [str(value)[:18] for value in values]
 
 
-def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], swept: Swept, style: str) -> None:
+def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: Swept, style: str) -> None:
     order = np.argsort(at)
     for i, (engine, column) in enumerate(curves.items()):
         axis.plot(
@@ -152,7 +152,7 @@ def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], s
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED, **foot)
-    axis.set_title(wrapped(_with_unit(what), 0.47 * WIDE, 9), fontsize=9)
+    axis.set_title(wrapped(_with_unit(quantity), 0.47 * WIDE, 9), fontsize=9)
 
 
 def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:
@@ -163,9 +163,9 @@ def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: 
             axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
 
 
-def _with_unit(what: str) -> str:
+def _with_unit(quantity: str) -> str:
     """A quantity with its unit; counts have none, and what else tells none is in SI."""
-    return what if "[" in what else f"{what} [{'-' if what.startswith('counts') else 'SI'}]"
+    return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
 
 
 def _spread(values: np.ndarray) -> bool:

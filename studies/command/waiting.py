@@ -63,13 +63,13 @@ class Kernels:
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
     def busy(self) -> bool:
-        """Whether one is under way that is told."""
+        """Whether a kernel is being compiled that the bar shows."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW
 
 
 @dataclass
 class Waiting:
-    """What a bar shows: text and share as told, the march that runs, what numba does.
+    """State of a progress bar: text and share of the work, the march that runs, numba's compiling.
 
     system : of the scene, for the time that its kernels take.
     """
@@ -82,7 +82,7 @@ class Waiting:
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Another work, and which part of all is done."""
+        """Set the bar's text to the work that begins, and its share to the part that is done."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
@@ -138,7 +138,7 @@ def waiting(text: str, system: str = "") -> Iterator[Tell]:
 
 
 def _draw(now: Waiting, over: threading.Event) -> None:
-    """Draw until it is over, from DELAY on."""
+    """Draw the bar until the work is over, from DELAY on."""
     while not over.wait(EVERY):
         now.kernels.attach()
         now.state()  # which sees when a march begins

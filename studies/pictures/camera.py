@@ -81,7 +81,7 @@ def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int
 def _shaded(
     camera: Camera, surfaces: list[Surface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What ``paint`` takes, of the triangles that lie before the eye."""
+    """Corners, depths and colours for ``paint``, of the triangles that lie before the eye."""
     corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]

@@ -24,7 +24,9 @@ def drawn(motion: Motion, stage: Stage, k: int, width: int, height: int) -> np.n
         place, turn = poses[body]
         return place + turn @ np.array(point)
 
-    struts = [rod(end(s.one, s.point_one), end(s.two, s.point_two), 0.025, GREY) for s in stage.struts]
+    struts = [
+        rod(end(s.first_body, s.first_point), end(s.second_body, s.second_point), 0.025, GREY) for s in stage.struts
+    ]
     thick = THICKNESS * height / stage.camera.pixels(height)
     arrows = [
         arrow(*line, thick, stage.kinds[force.kind].colour)

@@ -1,4 +1,4 @@
-"""What can be drawn: the motion that an engine reports, as it computes poses itself, and the stage of it.
+"""Films of a motion that an engine reports, as it computes poses itself, and their stage.
 
 Axes are those of the run, whatever they are; the camera's ``up`` says where up is. Lengths in m, forces in N.
 """
@@ -52,7 +52,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Curve:
-    """What is plotted below the pictures: forces of one kind along a direction, and how that is called."""
+    """A curve plotted below the pictures: forces of one kind along a direction, and their name."""
 
     kind: str
     direction: tuple[float, float, float]
@@ -63,10 +63,10 @@ class Curve:
 class Strut:
     """A rod between points fixed to two bodies, in the bodies' axes."""
 
-    one: str
-    point_one: tuple[float, float, float]
-    two: str
-    point_two: tuple[float, float, float]
+    first_body: str
+    first_point: tuple[float, float, float]
+    second_body: str
+    second_point: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +91,11 @@ class Stage:
     struts: tuple[Strut, ...] = ()
 
 
-def gaps(first: Motion, two: Motion) -> tuple[float, float, float]:
+def gaps(first: Motion, second: Motion) -> tuple[float, float, float]:
     """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
-    places = [(place, two.places[name]) for name, place in first.places.items()]
-    turns = [(turn, two.turns[name]) for name, turn in first.turns.items()]
-    forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, two.arrows, strict=True)]
+    places = [(place, second.places[name]) for name, place in first.places.items()]
+    turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
+    forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
     largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))
     return next(largest), next(largest), next(largest)
 

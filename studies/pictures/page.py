@@ -133,7 +133,7 @@ TONES = (DARK, PINK, ORANGE, SKY, GREY)
 
 
 def difference(motions: list[Motion]) -> str:
-    """How far two engines differ over the whole film, in words; who drew it, for one."""
+    """Sentence on how far two engines differ over the film; on the engine that drew it, for a single engine."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
     places, turns, forces = gaps(*motions)

@@ -1,11 +1,11 @@
-"""What a scene of pictures will draw: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of pictures: printed by ``twinrig show``, checked before any run."""
 
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing
 
 
 def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
-    """Nothing is left to refuse: the scene's tables say it all."""
+    """Refuse nothing: the scene's tables say it all."""
 
 
 def describe(scene: PictureScene) -> str:

@@ -75,7 +75,7 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
     places, turns = of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
-    axes = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
+    axes = {name: np.transpose([model.built.in_body_axes(name, axis) for axis in np.eye(3)]) for name in markers}
     return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
 
 

@@ -49,9 +49,9 @@ class PassingRoad:
         ]
         return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), grass, *marks]
 
-    def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
+    def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""
-        left, two = (np.interp(way, self.way, column) for column in self.heights.T)
+        left, two = (np.interp(distance, self.way, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
         return self.magnified * (left + share * (two - left))
 

@@ -123,7 +123,7 @@ def shapes(w: Wheelset) -> list[Surface]:
     return surfaces
 
 
-def track(w: Wheelset, way: float) -> list[Surface]:
+def track(w: Wheelset, distance: float) -> list[Surface]:
     """Rails, sleepers and ballast after a way (m)."""
     first, last, top = -24.0, 2.4, w.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
@@ -135,7 +135,7 @@ def track(w: Wheelset, way: float) -> list[Surface]:
     ]
     sides = w.half_gauge, -w.half_gauge
     surfaces = [part.at((first + last) / 2.0, y, top) for y in sides for part in rail]
-    phase = way % SLEEPERS
+    phase = distance % SLEEPERS
     for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
         surfaces.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
     return [*surfaces, floor(top + 0.24, BALLAST, -1.0)]

@@ -76,8 +76,8 @@ def copies(steps: int) -> tuple[Job, Job]:
 
 
 def ratio_of_rides(engine: str, steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Of an engine or the reference: largest difference of states (m, rad, m/s, rad/s), and the ratio of seconds with
-    its interval."""
+    """Comparison with a ride built by hand, of an engine or the reference: largest difference of states (m, rad, m/s,
+    rad/s), and the ratio of seconds with its interval."""
     jobs = copies(steps) if engine == "reference" else rides(engine, steps)
     ours, theirs = (job() for job in jobs)
     return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

@@ -47,7 +47,7 @@ def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int]
 
 
 def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
-    """What a run is made of."""
+    """Counts of what a braking run is made of."""
     from models.brake.controllers import CONTROLLERS
     from models.brake.pressure import still
     from models.systems.braking.measured_pressures import MeasuredPressures

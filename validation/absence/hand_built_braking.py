@@ -44,7 +44,7 @@ class Truck(NamedTuple):
 
 
 class Step(NamedTuple):
-    """How long a step takes (s), and the speed (m/s) below which slip angles are those of this one."""
+    """Length of a step (s), and the speed (m/s) below which slip angles are those of this one."""
 
     time: float
     regular: float
@@ -71,7 +71,7 @@ class Stop(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What a step knows of each wheel, each (4,): see ``models.brake.plane_records.Wheels``; where it heads, and arms
+    """State of each wheel within a step, each (4,): see ``models.brake.plane_records.Wheels``; where it heads, and arms
     of its forces about the centre of mass. last, off (3,): accelerations of a round, and by how much they were off;
     first (6,): state at the start; middle (4,): torques in the middle; ends (2, 4): at the ends of a part."""
 
@@ -354,7 +354,7 @@ def stops(speed: float) -> tuple[Job, Job]:
 
 
 def forces(path: Path) -> np.ndarray:
-    """Of the tyres along and across them (2, n - 1, W) in N."""
+    """Forces of the tyres along and across them (2, n - 1, W) in N."""
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 

@@ -156,7 +156,7 @@ def _engine(mounts, head, frame, q, v, f):
 
 @lean
 def _seats(seats, frame, q, v, f):
-    """Both seats; moment on the chassis about S."""
+    """Add the forces of both seats; moment on the chassis about S."""
     _, _, z, turning = frame
     moment = 0.0, 0.0, 0.0
     for i in range(2):
@@ -210,13 +210,13 @@ def numbers_of(handling: Handling) -> np.ndarray:
         ]
     mounts = [
         np.r_[
-            np.subtract(springs[f"{name} mount.x"].point_one, s),
-            np.subtract(springs[f"{name} mount.x"].point_one, joint),
+            np.subtract(springs[f"{name} mount.x"].first_point, s),
+            np.subtract(springs[f"{name} mount.x"].first_point, joint),
             np.array([law(f"{name} mount.{axis}") for axis in "xyz"]).T.ravel(),
         ]
         for name in ("left", "right", "rear")
     ]
-    seats = [[*np.subtract(springs[name].point_one, s), *law(name)] for name in ("left seat", "right seat")]
+    seats = [[*np.subtract(springs[name].first_point, s), *law(name)] for name in ("left seat", "right seat")]
     return np.concatenate([head, wheels, np.ravel(mounts), np.ravel(seats), of.cells.ravel(), of.strips.ravel()])
 
 

@@ -37,7 +37,7 @@ class Car:
     def of(cls, vehicle: SpatialVehicle) -> "Car":
         """The numbers of a vehicle of this kind."""
         body, wheel = vehicle.bodies[:2]
-        corners = [[*np.subtract(s.point_one, body.position), s.stiffness, s.damping] for s in vehicle.springs]
+        corners = [[*np.subtract(s.first_point, body.position), s.stiffness, s.damping] for s in vehicle.springs]
         return cls(
             body.mass,
             tuple(np.diag(body.inertia).tolist()),

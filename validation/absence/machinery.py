@@ -1,4 +1,4 @@
-"""What the loop of a bare scene costs beside one that was written for that scene alone: seconds, and arrays made."""
+"""Cost of the loop of a bare scene beside a loop written for that scene alone: seconds, and arrays made."""
 
 import time
 from collections.abc import Callable

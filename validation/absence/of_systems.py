@@ -90,13 +90,14 @@ def pair(system: str, effect: str) -> tuple[Any, Any]:
 
 
 def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
-    """What the effect's file says that it adds, engine by engine."""
+    """Counts that the effect's file declares, engine by engine."""
     counts = module_of(system, effect).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
 def added(system: str, effect: str, quick: bool = False) -> Counts:
-    """What it does add to a bare scene, or to that with what it needs, in each engine that takes both."""
+    """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
+    both."""
     before, after = _before(system, effect, quick), seen(system, pair(system, effect)[1], quick)
     return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
 
@@ -120,7 +121,8 @@ def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
 
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
-    """To be run in a fresh process: what a bare scene imports, what effects import and add, whether the path stays."""
+    """Facts for the case, to be gathered in a fresh process: what a bare scene imports, what effects import and add,
+    whether the path stays."""
     modules_of = {
         system: sorted({module for some in _modules(system).values() for module in some}) for system in systems
     }
@@ -158,7 +160,7 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
 
 @contextmanager
 def _removed(system: str, modules: list[str]) -> Iterator[None]:
-    """As if the files of a system's effects, and what only they import, had been removed."""
+    """Context in which the files of a system's effects, and modules that only they import, cannot be imported."""
     assert not _loaded(modules), "the process is not fresh"
     blocked: dict[str, Any] = dict.fromkeys(modules)
     sys.modules.update(blocked)
@@ -176,8 +178,8 @@ def _loaded(modules: list[str]) -> list[str]:
 
 
 @cache
-def found() -> dict[str, Any]:
-    """``probed`` from a process of its own."""
+def measured_counts() -> dict[str, Any]:
+    """The facts of ``probed``, gathered in a process of its own."""
     code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
@@ -191,7 +193,7 @@ def rows(quick: bool) -> list[Row]:
             for system in FILES
             for row in _present(system, {name: added(system, name, quick) for name in controlled(system)[::3]})
         ]
-    seen_there = found()
+    seen_there = measured_counts()
     present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]
     engines = Observed(
         "absent.references.engines",
@@ -244,7 +246,7 @@ def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
 
 
 def _present(system: str, more: dict[str, Counts]) -> list[Row]:
-    """A row per effect of what it adds."""
+    """A row for each effect on the counts that it adds."""
     return [
         behaves(
             f"absent.{system}.adds.{name}",

@@ -1,4 +1,4 @@
-"""What an effect leaves behind where a scene does not name it: looked for, counted, never assumed.
+"""Traces that an effect leaves behind where a scene does not name it: looked for, counted, never assumed.
 
 Everything here observes a run from outside: the modules of a fresh process, Exudyn's own items, MuJoCo's
 global callbacks, the Python frames that are entered while an engine marches, the memory it takes.
@@ -65,7 +65,7 @@ def belongs_to_effects(module: str) -> bool:
 
 @dataclass
 class March:
-    """What was seen while an engine marched.
+    """Counts taken while an engine marched: Python frames, memory, callbacks.
 
     frames : Python functions entered, by the engine's own wrapper or from inside the march
     memory : bytes that Python and numpy took at most, beyond what the march returned

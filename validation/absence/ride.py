@@ -100,7 +100,7 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 
 def _few() -> Any:
-    """As few copies as there may be, for a moment."""
+    """Context with the smallest allowed number of copies."""
     from models.systems.ride.nonlinear import Sampling
 
     return Sampling(copies=2, lasting=0.1)
@@ -132,7 +132,7 @@ def states(filters: dict[str, str]) -> int:
 
 
 def linearised(name: str) -> int:
-    """How many linear vehicles a sweep over SPEEDS needs."""
+    """Number of linear vehicles that a sweep over SPEEDS needs."""
     with mock.patch.object(of_scene, "linearise", wraps=linearise) as made:
         linear = of_scene.linear_vehicle(load_vehicle(name))
         for speed in SPEEDS:

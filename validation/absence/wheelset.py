@@ -55,7 +55,7 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 
 def without_net(law: Any) -> str:
-    """What the rates become where FASTSIM's net holds no numbers: the same to the last bit, or no numbers."""
+    """Text: "the same" if the rates stay the same to the last bit where FASTSIM's net holds NaN, else "no numbers"."""
     equations = Equations(CHOSEN, SPEED, law, 11)
     state, (speed, body, _), rails = equations.displaced(SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))

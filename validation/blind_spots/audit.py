@@ -54,7 +54,7 @@ Job = tuple[list[str], list[str]]
 
 @dataclass(frozen=True)
 class Traced:
-    """What cases and tests ran, how long they took and how they ended, by name.
+    """Trace of cases and tests: the functions they ran, their time and how they ended, by name.
 
     functions : all names, by place; items : each with "numbers", the functions that gave numbers in it.
     """
@@ -202,7 +202,7 @@ def in_order(functions: list[str]) -> list[str]:
 
 
 def summary(lines: list[Line], folder: Path) -> list[str]:
-    """What the command prints: counts, then each function that nothing independent notices."""
+    """Printed summary: counts, then each function that nothing independent notices."""
     text = [f"{len(lines)} functions, {sum(line.is_covered for line in lines)} noticed by something independent"]
     for kind, names in uncovered(lines, [line.function for line in lines]).items():
         text += [f"{kind}:", *(f"  {name}" for name in names)]
@@ -226,7 +226,7 @@ def prepare(folder: Path) -> list[str]:
 
 
 def jobs(with_grounds: bool) -> list[Job]:
-    """What the trace runs, each in a process of its own: cases, and files of tests that name independent grounds, or
+    """Jobs of the trace, each in a process of its own: cases, and files of tests that name independent grounds, or
     those too that name none."""
     files = sorted((ROOT / "tests").glob("test_*.py"))
     chosen = [str(each.relative_to(ROOT)) for each in files if not with_grounds or "mark.grounds(" in each.read_text()]
@@ -234,7 +234,7 @@ def jobs(with_grounds: bool) -> list[Job]:
 
 
 def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
-    """What runs what: read from the folder, or traced now."""
+    """The trace, read from the folder, or made now."""
 
     def run_once(job: Job) -> Path:
         path = probes.folder / TRACE / f"{Path(*job[0], *job[1]).stem}.jsonl"
@@ -260,7 +260,7 @@ def traced_of(functions: list[str], paths: list[Path]) -> Traced:
 
 
 def lines_of(path: Path) -> list[Told]:
-    """What a process has told; a last line that was cut off is not."""
+    """Lines that a process has written; a last line that was cut off is not."""
     if not path.is_file():
         return []
     return [json.loads(line) for line in path.read_text().splitlines(keepends=True) if line.endswith("\n")]

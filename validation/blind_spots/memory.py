@@ -1,4 +1,4 @@
-"""What an audit and the processes that it starts share: of each function its fault, and whether it ran.
+"""Shared memory of an audit and the processes that it starts: of each function its fault, and whether it ran.
 
 One file of doubles, mapped into the processes of one run, their workers too: rows of faults, of functions that ran, and
 of those that gave numbers, with a place for each function. A process that is none of an audit has such rows to itself.
@@ -22,7 +22,7 @@ SYMBOL = "twinrig_blind_spots"
 
 
 def order() -> dict[str, str]:
-    """What the environment says; empty in a process that is none of an audit."""
+    """The audit's order to this process, from the environment; empty in a process that belongs to no audit."""
     told: dict[str, str] = json.loads(os.environ.get(VARIABLE, "{}"))
     return told
 

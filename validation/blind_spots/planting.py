@@ -1,4 +1,4 @@
-"""What an audit does to a process before it imports anything: shared functions multiply what they give by a factor.
+"""Change of a process by an audit before it imports anything: shared functions multiply their results by a factor.
 
 The environment names the functions, so that the workers of a process are treated as it is. Files on the disk stay as
 they are: modules are rewritten as they are imported. All factors are 1 but where the memory of the process says

@@ -58,7 +58,7 @@ class Told:
         self.first = self.clock()
 
     def clock(self) -> float:
-        """Seconds without those that numba took."""
+        """Seconds so far, without those that numba's compiling took."""
         return clock() - self.compiling.seconds
 
     def is_enough(self) -> bool:
@@ -79,11 +79,11 @@ class Told:
             file.write(json.dumps(line) + "\n")
 
 
-def run_case(name: str, told: Told) -> None:
+def run_case(name: str, log: Told) -> None:
     """Measure the quick share of a case; a case that breaks has one row, which failed."""
     from validation.common.rows import rested
 
-    told.begin()
+    log.begin()
     try:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -93,9 +93,9 @@ def run_case(name: str, told: Told) -> None:
         ]
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
-        told.refused |= is_of_numba(error)
+        log.refused |= is_of_numba(error)
     failed = [(line["id"], line["independence"]) for line in lines if line["status"] == "failed"]
-    told.end({"case": name, "rows": lines}, failed)
+    log.end({"case": name, "rows": lines}, failed)
 
 
 def is_of_numba(error: BaseException) -> bool:
@@ -106,8 +106,8 @@ def is_of_numba(error: BaseException) -> bool:
 class Watching:
     """Plug-in of pytest: tells how each test ended."""
 
-    def __init__(self, told: Told) -> None:
-        self.told, self.failed = told, False
+    def __init__(self, log: Told) -> None:
+        self.told, self.failed = log, False
         self.session: pytest.Session | None = None
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
@@ -120,7 +120,7 @@ class Watching:
         self.told.begin()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """A part of a test has ended."""
+        """Note the end of a part of a test."""
         self.failed |= report.failed
         if report.when == "teardown":
             marked = str(dict(report.user_properties).get("grounds", ""))

@@ -192,7 +192,7 @@ class _Spoil(ast.NodeTransformer):
         return ast.Yield(self._spoiled(node.value)) if node.value else node
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr:
-        """What a call hands over to be written behind a pointer is spoiled before; an array is at the end."""
+        """Spoil the value that a call writes behind a pointer before the call; an array is spoiled at the end."""
         if isinstance(node.value, ast.Call):
             for root in sorted(handed(self.caller, node.value, self.known))[:1]:
                 given = [each if root_of(each, self.known) else self._into(each, root) for each in node.value.args]

@@ -33,7 +33,7 @@ def _ran(value: Any, place: int) -> float:
 
 
 def spoiled(value: Any, place: int) -> Any:
-    """What the function at a place gives: where it has a fault, a new value whose numbers are off."""
+    """The value of the function at a place: where that has a fault, a new value whose numbers are multiplied."""
     factor = _ran(value, place)
     return value if factor == 1.0 else _times(value, factor)
 

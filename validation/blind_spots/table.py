@@ -23,7 +23,8 @@ JOINED = "; "
 
 @dataclass(frozen=True)
 class Line:
-    """What notices one function: ids of rows and tests, which of them are independent, and what was not run.
+    """Checks that notice a fault in a function: ids of rows and tests, which of them are independent, and what was not
+    run.
 
     ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
     writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked);
@@ -48,11 +49,11 @@ class Line:
 
     @property
     def noticed(self) -> int:
-        """How many rows and tests notice."""
+        """Number of rows and tests that notice the fault."""
         return sum(len(text.split(JOINED)) for text in (self.rows, self.tests) if text)
 
     def with_others(self, line: "Line") -> "Line":
-        """This line, and that of others that were asked about the same function, as one."""
+        """This line joined with a line of other checks on the same function."""
         texts = {
             name: JOINED.join(filter(None, (getattr(self, name), getattr(line, name))))
             for name in ("rows", "tests", "independent")

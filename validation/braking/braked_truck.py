@@ -46,12 +46,12 @@ class Moving:
 
     @property
     def report(self) -> Report:
-        """Of the last step."""
+        """Report of the wheels in the last step."""
         return Report(*self.motion.report)
 
     @property
     def speed(self) -> float:
-        """Of the first unit's centre of mass (m/s)."""
+        """Speed of the first unit's centre of mass (m/s)."""
         return float(np.hypot(*self.state[1, :2]))
 
     def on(self, torques: np.ndarray, step: float) -> tuple[int, float]:
@@ -67,7 +67,7 @@ class Moving:
     def braked(
         self, torques: np.ndarray, step: float = 5.5e-3, until: float = 0.0, duration: float = 200.0
     ) -> "Moving":
-        """The same at the end of a stop, or at a speed (m/s) or a time (s) before. Raises RunFailed."""
+        """The state at the end of a stop, or earlier at a speed (m/s) or a time (s). Raises RunFailed."""
         status = FINE
         while status == FINE and self.speed > until and self.time < duration - 1e-9:
             status, _ = self.on(torques, step)

@@ -18,8 +18,8 @@ from validation.braking.quarter_stops import exact
 
 Error = Callable[[str, Path], float]
 STEP, SPEED = 5.5e-3, 10.0
-ONE = Quarter(mass=1700.0, radius=0.5, spin_inertia=13.35)
-LOAD = ONE.mass * GRAVITY
+QUARTER = Quarter(mass=1700.0, radius=0.5, spin_inertia=13.35)
+LOAD = QUARTER.mass * GRAVITY
 DRY, ICE = surface("dry"), surface("ice")
 
 
@@ -72,16 +72,20 @@ def stopping(
     road: Road = EVEN,
 ) -> float:
     """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
-    wheel = Moved(implementation, ONE.plane, *tyres, turning=turning, road=road)
-    least = min(level / ONE.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
-    rests = wheel.under(np.full((int(2.0 * SPEED * ONE.mass / least / step) + 50, 1), level), step)
+    wheel = Moved(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
+    least = min(level / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
+    rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least / step) + 50, 1), level), step)
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
 
 
 def settled(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
     """Torque (N m) under which a slip stays, the way (m) that this takes, and the speed of turning (rad/s)."""
     force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
-    return ONE.steady_torque(slip, force), ONE.mass * SPEED**2 / (2.0 * force), (1.0 - slip) * SPEED / ONE.radius
+    return (
+        QUARTER.steady_torque(slip, force),
+        QUARTER.mass * SPEED**2 / (2.0 * force),
+        (1.0 - slip) * SPEED / QUARTER.radius,
+    )
 
 
 def steady(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
@@ -93,7 +97,7 @@ def steady(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
 def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
     """A case of a stop from rolling: way against the exact one, relative."""
     level, _, _ = settled(tyre, slip)
-    return lambda name, folder: abs(stopping(name, level, tyre, step=step) / exact(ONE, tyre, level, SPEED) - 1.0)
+    return lambda name, folder: abs(stopping(name, level, tyre, step=step) / exact(QUARTER, tyre, level, SPEED) - 1.0)
 
 
 PEAKED = bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
@@ -101,15 +105,15 @@ PEAKED = bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 def beyond_the_peak(implementation: str, folder: Path) -> float:
     """A thousandth above the torque of the peak: the wheel locks; way against the exact one."""
-    peak = 1.001 * LOAD * 0.8 * (ONE.radius + ONE.spin_inertia / (ONE.mass * ONE.radius))
-    return abs(stopping(implementation, peak, PEAKED) / exact(ONE, PEAKED, peak, SPEED) - 1.0)
+    peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
+    return abs(stopping(implementation, peak, PEAKED) / exact(QUARTER, PEAKED, peak, SPEED) - 1.0)
 
 
 def at_the_peak(implementation: str, folder: Path) -> float:
     """The torque of the peak itself: way outside those of the peak and of sliding, by the first."""
     force = LOAD * 0.8
-    way = stopping(implementation, ONE.steady_torque(0.1, force), PEAKED, turning=0.9 * SPEED / ONE.radius)
-    least = ONE.mass * SPEED**2 / (2.0 * force)
+    way = stopping(implementation, QUARTER.steady_torque(0.1, force), PEAKED, turning=0.9 * SPEED / QUARTER.radius)
+    least = QUARTER.mass * SPEED**2 / (2.0 * force)
     return max(1.0 - way / least, way / (least * 0.8 / 0.6) - 1.0, 0.0)
 
 
@@ -130,7 +134,7 @@ def frictions(implementation: str, folder: Path) -> float:
     """Locked on friction from 1e-6 to 1.5 for 0.2 s: speed lost against mu g t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
-        wheel = Moved(implementation, ONE.plane, bent((0.0, 0.0), (1.0, mu)), turning=0.0)
+        wheel = Moved(implementation, QUARTER.plane, bent((0.0, 0.0), (1.0, mu)), turning=0.0)
         wheel.under(np.full((41, 1), 1e6), 5e-3)
         errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(errors))
@@ -138,21 +142,21 @@ def frictions(implementation: str, folder: Path) -> float:
 
 def at_rest(implementation: str, folder: Path) -> float:
     """A vehicle that stands, its brakes on: way and speed (m, m/s)."""
-    wheel = Moved(implementation, ONE.plane, DRY, speed=0.0)
+    wheel = Moved(implementation, QUARTER.plane, DRY, speed=0.0)
     wheel.under(np.full((51, 1), 5e3))
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
 def backwards(implementation: str, folder: Path) -> float:
     """A wheel thrown backwards, no brake: rim's speed against the vehicle's after 0.5 s, by it."""
-    wheel = Moved(implementation, ONE.plane, DRY, turning=-10.0)
+    wheel = Moved(implementation, QUARTER.plane, DRY, turning=-10.0)
     wheel.under(np.zeros((101, 1)), 5e-3)
     return wheel.rims
 
 
 def released(implementation: str, folder: Path) -> float:
     """A locked wheel whose brake lets go on a step's end: rim's speed against the vehicle's 0.6 s later, by it."""
-    wheel = Moved(implementation, ONE.plane, ICE, turning=0.0)
+    wheel = Moved(implementation, QUARTER.plane, ICE, turning=0.0)
     wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
     return wheel.rims
 
@@ -164,7 +168,8 @@ def on_the_line(implementation: str, folder: Path) -> float:
 
 
 def slope_changes(implementation: str, folder: Path) -> float:
-    """From dry on to wet within a step of 20 ms, lightly braked: way against that of the same force, relative."""
+    """Error on a change of friction, from dry on to wet within a step of 20 ms, lightly braked: way against that of the
+    same force, relative."""
     level, way, turning = settled(DRY, 0.004)
     both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
     stop = stopping(implementation, level, DRY, surface("wet"), step=2e-2, turning=turning, road=both)

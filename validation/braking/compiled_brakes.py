@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.brake.plain.suspension import Held
+from models.brake.plain.suspension import WheelForces
 from models.brake.plain.tyre import Braked, Motion, Surface
 from models.brake.plane_records import KNOWN, REPORTED, Report, Wheels
 from models.brake.plane_step import slide
@@ -52,7 +52,7 @@ def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) 
 def lag_on(
     state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, lag: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As ``validation.braking.plain_relaxation.lag_on``, of the truck's wheels."""
+    """Lags of the truck's tyres after a step, as by ``validation.braking.plain_relaxation.lag_on``."""
     after, lagging = lag.copy(), np.zeros(4)
     truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, EVEN)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
@@ -60,14 +60,14 @@ def lag_on(
 
 
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
-    """A vehicle on its suspension in an engine, around the compiled forces; ``held_in`` its table is what its wheels
-    hold."""
+    """A vehicle on its suspension in an engine, around the compiled forces; ``wheel_forces_in`` its table is what its
+    wheels hold."""
     handling = vehicle.handling
     table = np.concatenate((handling.numbers, np.zeros(HELD * len(handling.vehicle.tyres))))
     return free_model(engine, Driven(handling.vehicle, handling.gravity, table, held, set_held))
 
 
-def held_in(numbers: np.ndarray) -> Held:
-    """What four wheels hold by a table of numbers: views, to read and to write."""
+def wheel_forces_in(numbers: np.ndarray) -> WheelForces:
+    """Constant quantities of four wheels in a table of numbers: views, to read and to write."""
     rows = numbers[-4 * HELD :].reshape(HELD, 4)
-    return Held(rows[0], rows[1:3].T, rows[3])
+    return WheelForces(rows[0], rows[1:3].T, rows[3])

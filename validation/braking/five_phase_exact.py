@@ -43,13 +43,13 @@ class Piece:
         self.force = (f0, c)
 
     def slip(self, t: float) -> float:
-        """s."""
+        """Slip at a time t (s)."""
         if self.flat:
             return self.s0 + self.alpha * t + 0.5 * self.beta * t * t
         return self.a + self.b * t + (self.s0 - self.a) * math.exp(-self.k * t)
 
     def rim(self, t: float) -> float:
-        """r w' (m/s^2)."""
+        """Circumferential acceleration of the rim, r w' (m/s^2), at a time t (s)."""
         if self.flat:
             return -self.v * (self.alpha + self.beta * t)
         return -self.v * (self.b - self.k * (self.s0 - self.a) * math.exp(-self.k * t))

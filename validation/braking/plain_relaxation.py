@@ -44,7 +44,8 @@ def rotation(angle: float) -> np.ndarray:
 
 
 def turn_apart(length: float, substeps: int = 4) -> float:
-    """How far (m) a braked turn of the truck on tyres that relax over a length (m) ends from its written equations."""
+    """Distance (m) by which a braked turn of the truck on tyres that relax over a length (m) ends from its written
+    equations."""
     tyre, torques = surface("ice"), (300.0, 200.0)
     end = turned(PAPER, tyre, STEER, torques, SPEED, UNTIL, length)
     path = on_tyres(

@@ -8,7 +8,7 @@ import numpy as np
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers.slip import SlipBangBang
-from models.brake.plain.suspension import Held, Suspension
+from models.brake.plain.suspension import Suspension, WheelForces
 from models.brake.plane_vehicle import truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
@@ -20,7 +20,7 @@ from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.compiled_brakes import held_in, in_engine
+from validation.braking.compiled_brakes import in_engine, wheel_forces_in
 from validation.braking.sprung_box import SPIN, car, steady
 from validation.spatial.cars import twin
 
@@ -45,7 +45,7 @@ def bent() -> Sprung:
     whole: SpatialVehicle = load_vehicle("r19_free")
     wheels = {tyre.body for tyre in whole.tyres}
     springs = tuple(
-        replace(s, travel_force=stop, rate_force=damper, friction=60.0) if wheels & {s.one, s.two} else s
+        replace(s, travel_force=stop, rate_force=damper, friction=60.0) if wheels & {s.first_body, s.second_body} else s
         for s in whole.springs
     )
     tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(whole.tyres))
@@ -55,14 +55,14 @@ def bent() -> Sprung:
 VEHICLES = {"car": car, "twin": asymmetric, "bent": bent}
 
 
-def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, list[Held]]:
+def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, list[WheelForces]]:
     """Random coordinates and rates (count, 2, size) at any heading, and what is held at their wheels."""
     random = np.random.default_rng(seed)
     both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
     both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
     both[:, 0, 4:6], both[:, 1, :2] = random.uniform(-LEAN, LEAN, (count, 2)), random.normal(0.0, 15.0, (count, 2))
     kept = [
-        Held(random.normal(0.0, 0.2, 4), random.normal(0.0, 3e3, (4, 2)), random.normal(0.0, 300.0, 4))
+        WheelForces(random.normal(0.0, 0.2, 4), random.normal(0.0, 3e3, (4, 2)), random.normal(0.0, 300.0, 4))
         for _ in range(count)
     ]
     return both, kept
@@ -79,7 +79,7 @@ def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
     """(count, n) by an engine around the compiled forces."""
     model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
-    rows = held_in(model.numbers)
+    rows = wheel_forces_in(model.numbers)
     for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count), strict=True)):
         rows.steer[:], rows.forces[:], rows.spun[:] = kept_state.steer, kept_state.forces, kept_state.spun
         computed[i] = model.acceleration(0.0, *state)
@@ -93,8 +93,8 @@ def apart(compiled: np.ndarray, plain: np.ndarray) -> float:
 
 
 def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> Braked:
-    """On wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis; lags : whether its
-    tyres relax over LENGTHS."""
+    """The vehicle on wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis; lags :
+    whether its tyres relax over LENGTHS."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
@@ -122,7 +122,7 @@ def controller(valves: bool) -> Controller:
 def run(
     vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> Path:
-    """So many seconds of a stop from a speed (m/s)."""
+    """Run so many seconds of a stop from a speed (m/s)."""
     return vehicle_on(vehicle, engine, valves, lags).run(controller(valves), speed, duration)
 
 

@@ -21,15 +21,15 @@ class Draw:
     random: np.random.Generator
 
     def within(self, low: float, high: float) -> float:
-        """Evenly distributed."""
+        """A random number, uniform between low and high."""
         return float(self.random.uniform(low, high))
 
-    def whole(self, low: int, end: int) -> int:
-        """From low to below the end."""
+    def integer(self, low: int, end: int) -> int:
+        """A random integer from low to below the end."""
         return int(self.random.integers(low, end))
 
-    def one(self, *choices: Any) -> Any:
-        """One of these, all alike likely."""
+    def choice(self, *choices: Any) -> Any:
+        """A random element of ``choices``, all equally likely."""
         return self.random.choice(choices).item()
 
     def chance(self, share: float) -> bool:
@@ -40,7 +40,7 @@ class Draw:
 def random_stop(seed: int, number: int) -> dict[str, Any]:
     """Table of one scene, the same for the same two numbers."""
     draw = Draw(np.random.default_rng([seed, number]))
-    kind = draw.one("straight", "straight", "split", "j_turn", "j_turn", "turn")
+    kind = draw.choice("straight", "straight", "split", "j_turn", "j_turn", "turn")
     table: dict[str, Any] = {
         "title": f"stop {number}",
         "system": "braking",
@@ -48,14 +48,14 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
         "road": road(draw),
         "tyres": {"scale": {name: draw.within(0.7, 1.3) for name in SURFACES}},
         "brakes": brakes(draw),
-        "controller": {"kind": draw.one(*CONTROLLERS)},
-        "run": {"sample": draw.one(0.002, 0.0055, 0.01), "substeps": draw.whole(1, 9), "duration": 400.0},
+        "controller": {"kind": draw.choice(*CONTROLLERS)},
+        "run": {"sample": draw.choice(0.002, 0.0055, 0.01), "substeps": draw.integer(1, 9), "duration": 400.0},
     }
     if draw.chance(0.5):
         table["pressure"] = {
             "fill": draw.within(0.02, 0.3),
             "empty": draw.within(0.02, 0.3),
-            "delay": draw.one(0.0, 0.004, 0.012),
+            "delay": draw.choice(0.0, 0.004, 0.012),
         }
     if draw.chance(0.15):
         return table | {"vehicle": {"file": "r19_free", "spin_inertia": draw.within(0.5, 2.0)}}
@@ -70,12 +70,12 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
 
 
 def procedure(draw: Draw, kind: str) -> dict[str, Any]:
-    """What the driver does."""
+    """A random procedure of the driver, as a table of a scene."""
     options: dict[str, Any] = {"kind": kind, "speed": draw.within(2.0, 25.0)}
     if kind == "split":
-        options["right"] = draw.one(*SURFACES)
+        options["right"] = draw.choice(*SURFACES)
     if kind == "turn":
-        options |= {"radius": draw.one(-1.0, 1.0) * draw.within(60.0, 200.0), "speed": draw.within(2.0, 7.0)}
+        options |= {"radius": draw.choice(-1.0, 1.0) * draw.within(60.0, 200.0), "speed": draw.within(2.0, 7.0)}
     if kind == "j_turn" and draw.chance(0.5):
         options["steer"] = draw.within(-0.05, 0.05)
     elif kind == "j_turn":
@@ -85,8 +85,8 @@ def procedure(draw: Draw, kind: str) -> dict[str, Any]:
 
 def road(draw: Draw) -> dict[str, Any]:
     """One to three stretches."""
-    starts = [0.0, 12.0, 25.0][: draw.whole(1, 4)]
-    return {"stretches": [{"x": x, "left": draw.one(*SURFACES)} for x in starts]}
+    starts = [0.0, 12.0, 25.0][: draw.integer(1, 4)]
+    return {"stretches": [{"x": x, "left": draw.choice(*SURFACES)} for x in starts]}
 
 
 def brakes(draw: Draw) -> dict[str, Any]:

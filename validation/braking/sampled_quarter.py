@@ -35,7 +35,7 @@ def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller
 def reference_distance(
     quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
-    """The same by the reference, at a relative tolerance."""
+    """Stopping distance (m) by the reference, at a relative tolerance."""
     curve = SURFACES[on][0]
     return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
 

@@ -34,7 +34,8 @@ def turned(
     until: float,
     length: float = 0.0,
 ) -> Turned:
-    """From steady rolling at a speed to another one (m/s), front wheels steered (rad), torques of the axles (N m).
+    """The end of a braked turn from steady rolling at a speed to another one (m/s), front wheels steered (rad), torques
+    of the axles (N m).
 
     length : over which tyres relax (m); 0 for none. Above 1 m/s only they have no damper of their own. The tyre's
     friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.

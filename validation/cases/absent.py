@@ -74,7 +74,7 @@ def model(bare: Scene, engine: str) -> Model:
 
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
-    """The same scene without and with one effect."""
+    """A scene without and with an effect."""
     base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT, effect)
     less = scene(base, steps, folder, guided)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
@@ -83,18 +83,18 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
 
 
 def counts(bare: Scene, engine: str) -> dict[str, int]:
-    """What a scene builds in an engine, and how many channels it saves."""
+    """Counts of what a scene builds in an engine, and of the channels it saves."""
     return {**model(bare, engine).plan(), "channels": len(run(bare, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
-    """What an effect adds to the counts, without the zeros."""
+    """Changes of the counts by an effect, without the zeros."""
     before, after = (counts(bare, engine) for bare in pair(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
 def declared(effect: str, engine: str) -> dict[str, int]:
-    """What its file says that it adds."""
+    """Changes of the counts that the effect's file declares."""
     table = module_of(DEFAULT, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 

@@ -47,7 +47,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def finished(number: int) -> str:
-    """How a random stop ended: "" if it stands."""
+    """Phrase on how a random stop ended: "" if the vehicle came to rest."""
     try:
         path = run(build(random_stop(SEED, number))).detail
     except RunFailed as error:
@@ -72,7 +72,7 @@ def _scene(**tables: Any) -> Any:
 
 
 def _end(scene: Any) -> RunFailed | None:
-    """How the one procedure of a scene failed."""
+    """Error of a scene's only procedure; None if it ran."""
     try:
         run(scene)
     except RunFailed as error:

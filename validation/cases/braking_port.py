@@ -243,7 +243,7 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
 
 
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """How a run with a controller that fails ended, and how long after its last good sample."""
+    """Ending of a run whose controller fails, and the time from its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
     told = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
@@ -268,9 +268,9 @@ class _Watch:
     def __exit__(self, *_: object) -> None:
         self._march.ask = self._ask
 
-    def _noted(self, controller: Controller, given: Sample, *more: Any) -> Any:
+    def _noted(self, controller: Controller, sample: Sample, *more: Any) -> Any:
         self.last = time.perf_counter()
-        return self._ask(controller, given, *more)
+        return self._ask(controller, sample, *more)
 
 
 def _fault_rows(fault: dict[str, Any]) -> list[Row]:

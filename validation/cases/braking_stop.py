@@ -69,7 +69,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
-    """By step, of ours and every other scheme, error of the stopping distance and speed at which it still rolls."""
+    """Curves over the step, of our scheme and the others: error of the stopping distance and speed at which it still
+    rolls."""
     tyre, _ = both = met(name)
     force, torque = steady(FRONT, tyre, slip)
     true = exact(FRONT, tyre, torque, speed)
@@ -135,7 +136,7 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
 
 
 def faults_of(stopped: Stop, radius: float, brakes: bool) -> list[str]:
-    """What is wrong with a stop: names of rules it breaks."""
+    """Names of the rules that a stop breaks."""
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {

@@ -40,7 +40,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _locked_rows(mu: float) -> list[Row]:
-    """Of the box and of the car from a speed at which they brake for 4 s."""
+    """Rows of the box and of the car with locked wheels, from a speed at which they brake for 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
         vehicle, place = braked(vehicle_kind, constant(mu)), f"{name}.{mu:g}"
@@ -117,7 +117,7 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
 
 
 def _engine_rows(wet: TyreTable) -> list[Row]:
-    """At 1 ms."""
+    """Rows of stops in both engines, in steps of 1 ms."""
     ends = [
         braked(car(), wet, engine, 0.05, 1e-3).run(steady(*HARDER), 15.0).states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
@@ -183,18 +183,18 @@ class _Timed:
     """A controller that keeps the seconds which the vehicle took before each of its samples."""
 
     def __init__(self, controller: Controller) -> None:
-        self.own, self.answered, self.seconds = controller, math.nan, list[float]()
+        self.controller, self.answered, self.seconds = controller, math.nan, list[float]()
 
-    def sample(self, given: Sample) -> Command:
-        """As the controller answers."""
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample, timed."""
         self.seconds.append(perf_counter() - self.answered)
-        command = self.own.sample(given)
+        command = self.controller.sample(sample)
         self.answered = perf_counter()
         return command
 
 
 def _speed_row(wet: TyreTable) -> Row:
-    """Of the tenth part of samples that the rest of the machine disturbs least."""
+    """Row on the computing time: of the tenth part of samples that the rest of the machine disturbs least."""
     vehicle, controller = braked(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))

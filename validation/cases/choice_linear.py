@@ -157,7 +157,7 @@ def _identity_row(choices: list[Judged]) -> Row:
 
 
 def _equal_rows(choices: list[Judged]) -> list[Row]:
-    """Of all scenes: the tolerance nearby, and what is saved, by routes that the choice does not go."""
+    """Rows over all scenes: the tolerance nearby, and what is saved, by routes that the choice does not go."""
     told = sum(bool(each.choice.said) and not each.choice.left_out for each in choices)
     gaps = [abs(each.saving / each.measured - 1.0) for each in choices]
     saving = [each for each in choices if each.choice.left_out]

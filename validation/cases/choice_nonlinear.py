@@ -56,10 +56,10 @@ def judged_ride(asked: Bent) -> JudgedByRuns:
     return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 
-def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
+def _sure(full: np.ndarray, reduced: np.ndarray) -> float:
     """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
-    picked = np.random.default_rng(AGAIN).integers(len(whole), size=(RESAMPLED, len(whole)))
-    changes = np.abs(np.sqrt(rest[picked].mean(axis=1) / whole[picked].mean(axis=1)) - 1.0)
+    picked = np.random.default_rng(AGAIN).integers(len(full), size=(RESAMPLED, len(full)))
+    changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full[picked].mean(axis=1)) - 1.0)
     return float(np.quantile(changes, UNSURE))
 
 

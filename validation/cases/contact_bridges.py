@@ -1,4 +1,4 @@
-"""What a contact kernel costs inside an engine: the kernel itself, the bridge to it, and the engine around both."""
+"""Cost of a contact kernel inside an engine: the kernel itself, the bridge to it, and the engine around both."""
 
 import time
 from collections.abc import Callable
@@ -49,9 +49,8 @@ WHY = "median of the ratios within interleaved rounds, seconds of the processor;
 
 @dataclass(frozen=True)
 class Setup:
-    """One way of marching. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory and cells,
-    None where nothing is computed.
-    """
+    """Set-up of a march with contact. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory
+    and cells, None where nothing is computed."""
 
     engine: str
     method: str
@@ -73,11 +72,11 @@ class Setup:
 
     @property
     def without(self) -> "Setup":
-        """The same without contact."""
+        """A copy of the set-up without contact."""
         return replace(self, bridge="none", law=None)
 
     def wheels(self) -> Wheels:
-        """What is marched."""
+        """The wheels that are marched."""
         theory, cells = self.law or ("none", 21)
         return Wheels(self.count, cast(Theory, theory), cells or 21)
 
@@ -100,7 +99,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def every() -> list[Setup]:
-    """All of them."""
+    """All set-ups."""
     setups = []
     for engine, (usual, fine) in ENGINES.items():
         best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
@@ -210,7 +209,7 @@ def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
 
 
 def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The same law by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
+    """The law of the contact by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
@@ -270,7 +269,7 @@ def _threads_row() -> Row:
 
 
 def _agreement_row() -> Row:
-    """Both engines by Runge-Kutta's method over 0.1 s."""
+    """Row: agreement of both engines by Runge-Kutta's method over 0.1 s."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()
     with installed(kernel_law(forces)):

@@ -57,7 +57,7 @@ def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
 
 
 def _on_grid(ratio: float, nu: float, cells: int) -> Array:
-    """The same on one grid, from a unit of each creepage; C23 is the mean of Fy by spin and Mz by xi_y."""
+    """Creepage coefficients on a grid, from a unit of each creepage; C23 is the mean of Fy by spin and Mz by xi_y."""
     a, b = ratio**0.5, ratio**-0.5
     more = max(1.0, max(ratio, 1.0 / ratio) / 10.0)
     columns, rows = round(cells * (more if a > b else 1.0)), round(cells * (more if b > a else 1.0))
@@ -127,7 +127,7 @@ def _worst(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row
 
 
 def _misprint(nodes: Array) -> Row:
-    """What the same comparison says of the misprint."""
+    """Row: the comparison's error with the misprinted coefficient."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINT / node[4] - 1.0)
     return behaves(

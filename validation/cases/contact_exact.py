@@ -214,7 +214,7 @@ def _symmetry_rows() -> list[Row]:
 
 
 def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
-    """What is left to the limit of no cells, from the two finest grids at order 1."""
+    """Rows: error against the limit of infinitely small cells, from the two finest grids at order 1."""
     rows = []
     for name, values in refined.items():
         left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)

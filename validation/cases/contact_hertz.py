@@ -82,7 +82,7 @@ def _complete(g: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _pi() -> Decimal:
-    """By Gauss and Legendre."""
+    """The number pi by the method of Gauss and Legendre."""
     a, b, t, p = Decimal(1), 1 / Decimal(2).sqrt(), Decimal(1) / 4, Decimal(1)
     for _ in range(7):
         a, b, t, p = (a + b) / 2, (a * b).sqrt(), t - p * ((a - b) / 2) ** 2, 2 * p
@@ -112,7 +112,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
 
 
 def _turned(touching: Hertz) -> Hertz:
-    """The same contact with x and y exchanged."""
+    """The contact with x and y exchanged."""
     return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 
 

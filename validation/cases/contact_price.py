@@ -111,7 +111,7 @@ def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
 
 
 def _total_rows(cases: list[Case]) -> list[Row]:
-    """What is stated of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
+    """Rows: stated errors of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
         contact = case.contact(Fastsim, **BEST)

@@ -93,7 +93,7 @@ def largest_jump(patch: Patch, steps: int) -> float:
 
 
 def _jump(load: Callable[[float], float], low: float, high: float) -> float:
-    """What is left of the change between two depths when they are as near as floating point allows."""
+    """Jump of the load between two depths that are as near as floating point allows."""
     at_low, at_high = load(low), load(high)
     while high - low > 1e-15 * high:
         middle = 0.5 * (low + high)
@@ -134,7 +134,7 @@ def _approach_of(shape: Shape) -> dict[str, float]:
 
 
 def _placed() -> dict[str, dict[str, float]]:
-    """The same of wheels on rails, which have no common net."""
+    """Errors of wheels on rails, which have no common net, by the ways of fitting."""
     errors = {}
     for position in placed():
         pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
@@ -333,7 +333,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def _said(shapes: dict[str, dict[str, Any]]) -> str:
-    """What the ways show, in figures: means over all shapes."""
+    """Sentence on the errors of the ways of fitting: means over all shapes."""
 
     def mean(way: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
@@ -353,7 +353,7 @@ def _said(shapes: dict[str, dict[str, Any]]) -> str:
 
 
 def _settled(nets: dict[str, dict[str, float]]) -> str:
-    """What the size of the net does."""
+    """Sentence on the errors by the size of the net."""
     sizes = (next(iter(nets)), str(PLAIN.net), list(nets)[-1])
     first, used, last = (100.0 * abs(nets[net]["approach"]) for net in sizes)
     area, peak = (100.0 * nets[sizes[-1]][key] for key in ("area", "peak"))

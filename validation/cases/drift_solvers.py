@@ -1,4 +1,4 @@
-"""What drift depends on and what not: solver and tolerance, interpolation, smoothing, the order of the scheme.
+"""Drift's dependence: solver and tolerance, interpolation, smoothing, the order of the scheme.
 
 The paper remarks that drift does not depend on the solver, and that smoothing or better schemes only rescale the
 error. Here the error of the interpolation between the samples stands apart from that of the integrator: the first

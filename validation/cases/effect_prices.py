@@ -1,4 +1,4 @@
-"""What a scene without effects costs beside a model built by hand, and what each effect of the vehicle adds to it."""
+"""Cost of a scene without effects beside a model built by hand, and the cost that each effect of the vehicle adds."""
 
 import tempfile
 import time
@@ -117,10 +117,10 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
     ]
 
 
-def slower(row: str, what: str, ratio: tuple[float, float, float], why: str) -> Row:
+def slower(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
     """A ratio of seconds with its interval."""
     value, low, high = ratio
-    return Observed(row, SYSTEM, f"{what}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
+    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:

@@ -74,7 +74,7 @@ def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> 
 
 
 def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
-    """The same rows on a few paths of a second, in threads, which start at once."""
+    """Rows of a quick report: a few paths of a second, in threads, which start at once."""
     paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
         two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
@@ -88,7 +88,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
 
 
 def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
-    """Path 7 is the scene that names it."""
+    """Row: path 7 of the ensemble equals the run of a scene that names path 7."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
@@ -100,14 +100,14 @@ def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _same_row(id: str, what: str, first: Arrays, other: Arrays) -> Row:
+def _same_row(id: str, title: str, first: Arrays, other: Arrays) -> Row:
     """Whether two ensembles are equal to the last bit."""
     count = len(other["drift_off"])
     equal = all(np.array_equal(first[name][:count], other[name], equal_nan=True) for name in first)
     return behaves(
         f"ensemble.{id}",
         SYSTEM,
-        what,
+        title,
         SAME if equal else "different bits",
         SAME,
         "a sample belongs to seed, path and place alone",
@@ -156,7 +156,7 @@ def _slowly(job: NoisePaths, blocks: Path) -> None:
 
 
 def _alone(function: Callable[..., Any], *args: Any) -> Any:
-    """What a function gives in a process of its own, whose memory is that of nothing else."""
+    """Value of a function run in a separate process, so that its memory can be measured alone."""
     with processes(1) as pool:
         return pool.submit(function, *args).result()
 
@@ -297,7 +297,7 @@ def _half_step_row(forces: Path) -> Row:
 
 
 def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
-    """What the tables and the figure show."""
+    """Saved numbers for the tables and the figure."""
     errors = paths["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
     quantiles = [[level, *quantile(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]

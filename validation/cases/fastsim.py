@@ -142,7 +142,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
 
 
 def _invariants(batches: int, count: int, first: int) -> list[Row]:
-    """Everything that must always hold, over random contacts."""
+    """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batches):
         options = OPTIONS[i % len(OPTIONS)]

@@ -231,7 +231,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
     ]
 
 
-def _body_row(key: str, what: str, road: Saved) -> Row:
+def _body_row(key: str, title: str, road: Saved) -> Row:
     """No growth for a vehicle that does not couple heave to pitch; one that does is told, not judged.
 
     Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
@@ -239,8 +239,8 @@ def _body_row(key: str, what: str, road: Saved) -> Row:
     """
     if road["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
-        return Observed(key, SYSTEM, what, road["body"], "1/s").beside("small", why, "none")
-    return Observed(key, SYSTEM, what, road["body"], "1/s").within(
+        return Observed(key, SYSTEM, title, road["body"], "1/s").beside("small", why, "none")
+    return Observed(key, SYSTEM, title, road["body"], "1/s").within(
         0.0, road["body error"], "zero within its error; the wheels' inertia makes a slow swing of it", "closed form"
     )
 
@@ -261,7 +261,7 @@ def _twin_row(folder: Path) -> Row:
 
 
 def _engine_rows(folder: Path) -> list[Row]:
-    """The same noise file in all implementations, compared before the pitch is 0.05 rad off."""
+    """Rows: paths of all implementations under one noise file, compared before the pitch error is 0.05 rad."""
     true = drive(folder, LENGTH)
     runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
     base = runs["reference"]

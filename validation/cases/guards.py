@@ -27,7 +27,7 @@ Runner = Callable[..., Any]
 
 
 def ending(attempt: Callable[[], Any]) -> str:
-    """How an attempt ends: "refused", "raised" or "answered"."""
+    """Ending of an attempt: "refused", "raised" or "answered"."""
     try:
         attempt()
     except InputError:
@@ -98,7 +98,8 @@ def constrained(engine: str) -> dict[str, str]:
 
 
 def constrained_unchecked() -> dict[str, str]:
-    """The same past the check, explicit integrators of Exudyn: the multiplier is compared with the balance."""
+    """Endings of constrained runs without the check, by Exudyn's explicit integrators: the multiplier is compared with
+    the balance."""
     names = [name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED.values()]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
     scene = prescribed_pitch.scene()

@@ -187,7 +187,7 @@ def _stop_rows() -> list[Row]:
 
 
 def _transfer_rows() -> list[Row]:
-    """Of the car and of a box on four springs, by what all of their bodies together ask for."""
+    """Rows: load transfer of the car and of a box on four springs, against the balance of all their bodies."""
     rows = []
     for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
         braking = braked_error(driven("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
@@ -263,7 +263,7 @@ def _swap_axles(handling: Handling) -> None:
 
 
 def _turn_wrong(handling: Handling) -> None:
-    """One front wheel is steered the other way."""
+    """Plant a fault: one front wheel is steered the other way."""
     handling.tyre_numbers(1)[at.STEERED] *= -1.0
 
 

@@ -86,7 +86,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def _catalogue(data: Saved) -> Table:
-    """Which cases stand for each number of the catalogue."""
+    """Table of the cases that stand for each number of the catalogue."""
     words = {name: ["in full"] for _, name in data["known"]}
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
     rows = tuple(

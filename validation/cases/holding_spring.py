@@ -65,7 +65,8 @@ class FreeRuns:
 @allowing("a spring that is too soft lets the run drift off, which is what is shown", "upright")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
+    """Rows: for each setting a spring of 0.6 of the predicted stiffness fails, of 1.2 holds; in full also the stiffness
+    by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
     rows = [row for setting in settings for row in _ends(setting, measured, "reference")]
@@ -138,7 +139,7 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
 
 
 def tables(data: Saved) -> list[Table]:
-    """Stiffness found in each setting."""
+    """Table of the least stiffness that holds in each setting."""
     rows = tuple(
         (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{data['law']:.1f}")
         for name, stiffness in data["found"]

@@ -246,7 +246,7 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
 
 
 def _scene(frame: str) -> HubScene:
-    """That of the study, 8 s long."""
+    """The scene of the study, 8 s long."""
     tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame}}
     return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 

@@ -1,4 +1,4 @@
-"""What a step costs in instructions, which do not wander as seconds do, and how well their count repeats.
+"""Cost of a step in instructions, which do not wander as seconds do, and how well their count repeats.
 
 Every method with fixed steps is counted by valgrind. Two processes march the same, copies of one that has loaded
 everything without being counted; within each, two numbers of steps are differenced, so that the start of a run drops

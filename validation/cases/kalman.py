@@ -130,7 +130,7 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
 
 
 def _band(freedom: int) -> tuple[float, float]:
-    """Of the mean of a chi-square sample per degree of freedom."""
+    """Band for the mean of a chi-square sample per degree of freedom."""
     low, high = chi2.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], freedom) / freedom
     return float(low), float(high)
 

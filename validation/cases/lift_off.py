@@ -181,7 +181,7 @@ def _order(halvings: int) -> Row:
     "tyres not flat",
 )
 def _energy(duration: float) -> list[Row]:
-    """What a bouncing vehicle gains, and what one without dampers loses."""
+    """Rows: energy that a bouncing vehicle gains, and that a vehicle without dampers loses."""
     rows = []
     for engine in ALL:
         undamped = scene(duration=duration, override=UNDAMPED)
@@ -214,7 +214,7 @@ def _energy(duration: float) -> list[Row]:
 
 @allowing("what the linear tyre does is what is shown")
 def _pulls(quick: bool) -> list[Row]:
-    """What the paper's linear tyre does on the study road, and what difference it makes."""
+    """Rows: how far the paper's linear tyre pulls on the study road, and the difference that makes."""
     lifting_scene = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
     lifting, linear = simulate(lifting_scene, "reference"), simulate(without(lifting_scene, "lift_off"), "reference")
     loads = _loads(linear)

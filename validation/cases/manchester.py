@@ -170,7 +170,7 @@ def _axle_row(placed: Placed) -> Row:
 
 
 def _split_rows(placed: Placed) -> list[Row]:
-    """How two patches share the load at 5 mm, in case A-2."""
+    """Rows: shares of the load on two patches at 5 mm, in case A-2."""
     forces = [place.normal for place in placed.right]
     total = sum(forces)
     contact = contact_of("A-2")

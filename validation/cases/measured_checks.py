@@ -206,7 +206,7 @@ def _strangers(folder: Path) -> list[Row]:
 
 
 def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
-    """Three faults at once: all of them named."""
+    """Rows: three faults at once are all named."""
     spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
     findings = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})
     what, checks = (
@@ -283,7 +283,7 @@ def _moving_car(folder: Path) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """What an engineer is told."""
+    """Table of the findings that an engineer is told."""
     rows = tuple((name, text) for name, text in data["said"].items())
     return [Table("What the checks say of planted faults", "The first sentence of each.", ("planted", "said"), rows)]
 

@@ -64,7 +64,7 @@ PROOFS = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """In full every proof with ten samples of noise, the engines and the predicted time of trust."""
+    """Rows: in full every proof with ten samples of noise, the engines and the predicted time of trust."""
     if quick:
         return _quick(folder), {}
     rows, data = list[Row](), dict[str, Any]()
@@ -199,7 +199,7 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
 
 
 def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
-    """The same recording free, and held by both engines; what the verdicts say."""
+    """Rows: the recording run free and held by both engines; the verdicts."""
     free = held(first, true.vehicle, Hold("none"))
     jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}

@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _exact(name: str) -> list[Row]:
-    """What needs no integration, on a motion whose derivatives are closed forms."""
+    """Rows: errors of quantities that need no integration, on a motion whose derivatives are closed forms."""
     array = sensor_array(ARRAYS[name])
     clean = readings_on_path(array.positions)
     spins, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
@@ -243,7 +243,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
 
 
 def _follows(
-    way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
+    rule: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
 ) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
     followed = motion(array, felt, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
@@ -254,7 +254,7 @@ def _follows(
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
         Observed(
-            f"motion.recovered.{way}.{what}.{engine}",
+            f"motion.recovered.{rule}.{what}.{engine}",
             SYSTEM,
             f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
@@ -342,7 +342,7 @@ def _held(curves: Saved, quick: bool) -> list[Row]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """What a flat arrangement costs."""
+    """Table of the errors of a flat arrangement of sensors."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
         for height, *gains in data["gains"]

@@ -46,7 +46,7 @@ EVERY, LEAST = 16, 40
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Rows by system and, in full, of the whole; quick: every sixteenth fault of each system."""
+    """Rows on planted faults by system and, in full, over all systems; quick: every sixteenth fault of each system."""
     plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
     data: Saved = {
         "pitch-plane": plane,
@@ -68,7 +68,7 @@ def _enough(data: Saved) -> Row:
 
 
 def _lines(data: Saved) -> list[tuple[str, ...]]:
-    """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
+    """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed it."""
     return [
         *pitch_plane.lines(data["pitch-plane"]),
         *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
@@ -93,5 +93,5 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """How far above its tolerance each check of the pitch plane stands, fault by fault."""
+    """Draw how far above its tolerance each check of the pitch plane stands, fault by fault."""
     return pitch_plane.draw(data["pitch-plane"])

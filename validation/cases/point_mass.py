@@ -62,7 +62,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _power(matrix: Matrix, n: int) -> Matrix:
-    """A matrix to a whole power, by squaring."""
+    """An integer power of a matrix, by squaring."""
     size = range(len(matrix))
     product = [[Decimal(int(i == j)) for j in size] for i in size]
     while n:
@@ -90,7 +90,7 @@ def _exponential(matrix: Matrix) -> Matrix:
 
 
 def _continuous_error(damped: float) -> float:
-    """Of d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv)."""
+    """Error of d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv)."""
     eta = damped / TIME
     with localcontext(prec=DIGITS):
         e, t = Decimal(eta), Decimal(TIME)
@@ -106,7 +106,7 @@ def _continuous_error(damped: float) -> float:
 
 
 def _discrete_error(damped: float, steps: int) -> float:
-    """Of the covariance recursion of one Euler step; the step is such that ``steps`` of them make TIME."""
+    """Error of the covariance recursion of one Euler step; the step is such that ``steps`` of them make TIME."""
     step = TIME / steps
     eta = min(damped / TIME, 1.9 / step)
     with localcontext(prec=DIGITS):

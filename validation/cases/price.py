@@ -82,7 +82,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _beside(quick: bool) -> CaseAnswer:
-    """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
+    """Answers of price cases without a problem for the runner: ride, the parts of a step, force calls, claims about
+    speed."""
     road = assemble(road_excited.scene())
     rows, prices = ride.measure(quick, ROUNDS[quick], LEAST[True])
     rounds, least, duration = 2 * ROUNDS[quick], 2 * LEAST[quick], road_excited.DURATION
@@ -97,7 +98,7 @@ def _beside(quick: bool) -> CaseAnswer:
 
 
 def _priced(quick: bool, make: Make) -> CaseAnswer:
-    """One problem: its rows, and what is saved of it."""
+    """The rows and the saved data of a problem."""
     problem = make(quick)
     measured = runner.measure(problem, quick, ROUNDS[quick], LEAST[quick])
     return rows_of(problem, measured, quick), asdict(measured)
@@ -114,7 +115,7 @@ def _shared() -> tuple[list[CaseAnswer], CaseAnswer]:
 
 
 def _road_rows(saved: Saved) -> list[Row]:
-    """What must coincide on the road, and what Exudyn names without having it."""
+    """Rows: curves that must coincide on the road, and methods that Exudyn names without having them."""
     road = runner.of_saved(saved)
     groups = [" = ".join(sorted(group)) for group in road.same()]
     rows = [
@@ -149,7 +150,7 @@ def _at_1_ms(setting: Setting) -> Setting:
 
 
 def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
-    """What the adapters say about their force calls against calls counted from outside."""
+    """Row: force calls that the adapters state, against calls counted from outside."""
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [

@@ -44,7 +44,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _shared(folder: Path) -> list[Judged]:
-    """The same by as many processes as there are processors, two at most; long ones first."""
+    """Judged recommendations, computed by as many processes as there are processors, two at most; long ones first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
         return [

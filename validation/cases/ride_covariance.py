@@ -180,7 +180,7 @@ def _limit_rows() -> list[Row]:
 
 
 def _inputs_row() -> Row:
-    """What the system says of the heights under its own wheels."""
+    """Row: covariance of the road heights under the wheels, as the system's outputs state it."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
     for met, case in zip(five_cases(vehicle.wheels, road).values(), CASES.values(), strict=True):

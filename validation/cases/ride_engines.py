@@ -202,7 +202,8 @@ def _at_rest() -> list[Row]:
 
 
 def _shift() -> list[Row]:
-    """What gravity and preload change, from both engines; the zero eigenvalues of a free vehicle move by rounding."""
+    """Rows: shift of the eigenvalues by gravity and preload, from both engines; the zero eigenvalues of a free vehicle
+    move by rounding."""
     rows = []
     for name in SHARES[1]:
         analytic = shift(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))

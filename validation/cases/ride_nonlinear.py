@@ -180,7 +180,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
 
 
 def _linear_copies() -> Row:
-    """What the copies do without bent springs is what the covariance says."""
+    """Row: without bent springs the copies' variances agree with the covariance."""
     vehicle, road = ride("quarter_car")
     exact = stationary(excited(linearise(vehicle), road, SPEED))
     copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)

@@ -48,7 +48,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _paper_rows() -> list[Row]:
-    """What the paper's figure lets one read, and the label."""
+    """Rows: values read from the paper's figure, and the label."""
     road = road_of_level(HALF_TRACK)
     spectrum = road.spectrum(np.array([1e4]), HALF_TRACK)[0] * 1e8
     variance = 2.0 * quad(lambda k: float(road.spectrum(np.array(k), HALF_TRACK)), 0.0, math.inf, epsabs=1e-18)[0]

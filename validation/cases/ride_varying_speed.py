@@ -246,7 +246,7 @@ def _constant() -> list[Row]:
 
 
 def _timed(run: Callable[..., Any], *given: Any, **more: Any) -> tuple[Any, float]:
-    """What a call returns, and its processor seconds."""
+    """Value of a call, and its processor seconds."""
     start = time.process_time()
     return run(*given, **more), time.process_time() - start
 

@@ -99,7 +99,7 @@ def _closed(load: np.ndarray) -> float:
 
 
 def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
-    """The same run at rest and sinking as a whole: its heave runs away, and no section force knows."""
+    """Rows: a run at rest and one sinking as a whole: heave runs away, section forces stay the same."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         drive(folder, duration)
@@ -140,7 +140,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
 
 
 def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
-    """On a grade of 0.1 rad a spring is wrong and a prescribed pitch is right, in each implementation."""
+    """Rows: on a grade of 0.1 rad a holding spring is wrong and a prescribed pitch is right, in each implementation."""
     scene = load(SCENE, SHORT)
     options = read(Options, scene.options, "", "options")
     (folder / "short").mkdir()

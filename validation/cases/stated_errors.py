@@ -90,7 +90,7 @@ def ratio(true: float, stated: float) -> float:
 
 
 def _rows(samples: list[Saved], quick: bool) -> list[Row]:
-    """What is asked of all systems together; shares of the few samples of a quick run are reported."""
+    """Rows on the stated errors of all systems together; shares of a quick run's few samples are only reported."""
     known = [sample for sample in samples if sample["ratio"] is not None]
     right = _share(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
     useless = _share(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
@@ -154,7 +154,7 @@ def _cost(name: str, samples: list[Saved]) -> float:
 
 
 def _of_system(name: str, samples: list[Saved]) -> list[Row]:
-    """The same of one system, reported."""
+    """Rows on the stated errors of one system, reported."""
     of_system = [sample for sample in samples if sample["system"] == name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
     told = f"{name}, {len(known)} of {len(of_system)} samples"

@@ -65,15 +65,15 @@ def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
     return rows
 
 
-def _compare(what: str, scenes: list[Scene]) -> list[Row]:
+def _compare(title: str, scenes: list[Scene]) -> list[Row]:
     """Rows of both engines: the largest difference to the reference over all scenes."""
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)
     return [
         Observed(
-            f"twin.{engine}.{what}",
+            f"twin.{engine}.{title}",
             SYSTEM,
-            f"largest difference of the states in {engine} from the reference, RK4 at {steps} ms, {what}",
+            f"largest difference of the states in {engine} from the reference, RK4 at {steps} ms, {title}",
             max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
             "m, rad, m/s, rad/s",
         ).at_most(BOUND, WHY, "native")

@@ -124,7 +124,7 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
 
 
 def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
-    """What all implementations say of a wheelset without a critical speed."""
+    """Row: all implementations find no critical speed for a wheelset that has none."""
     said = set()
     for engine in IMPLEMENTATIONS:
         try:
@@ -276,7 +276,8 @@ def _order_row() -> Row:
 
 
 def _energy_rows() -> list[Row]:
-    """What the ledger of a path below the flanges leaves open, and how it falls with the step, by either law."""
+    """Rows: residual of the energy ledger of a path below the flanges, and how it falls with the step, by either
+    law."""
     rows = list[Row]()
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
         equations = Equations(CHOSEN, 60.0, law, 11)  # type: ignore[arg-type]
@@ -304,7 +305,7 @@ def _energy_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """What a small fault in one implementation does to the figures above."""
+    """Rows: changes of the figures above by a small fault in one implementation."""
     equations, engine = Equations(CHOSEN, 60.0), implementation("mujoco")(CHOSEN, 60.0)
     state = equations.displaced(3e-3)
     right = off(engine.rates(state), equations.rates(state))

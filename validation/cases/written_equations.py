@@ -88,7 +88,7 @@ def _hubs(states: int, duration: float) -> list[Row]:
 
 
 def _rolling(states: int, duration: float) -> list[Row]:
-    """On tyres that roll."""
+    """Rows: cars on rolling tyres."""
     rows = []
     for name, car in rolling_cars().items():
         for engine in ENGINES:

@@ -1,1 +1,1 @@
-"""What validation cases of choices of effects share."""
+"""Common parts of the validation cases of choices of effects."""

@@ -14,7 +14,7 @@ from models.advice.ride_choice.candidates import Set, largest
 from models.advice.ride_choice.choose import Choice, Chooser
 from models.advice.ride_choice.march import longest_step
 from models.advice.ride_choice.neighbourhood import OFF, changed, parameters
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import confirmed
 from models.ride.frequency import spectra
 from models.systems.ride.reduced_scene import ReducedScene, without
@@ -29,7 +29,7 @@ OMEGA = np.geomspace(1e-2, 3e5, 3000)
 
 
 def asked(drawn: Drawn) -> Chooser:
-    """Of a range of speeds about that of the scene."""
+    """Chooser over a range of speeds about that of the scene."""
     return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
 
 
@@ -43,10 +43,10 @@ def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
     return largest(np.sqrt(ratios) - 1)
 
 
-def _by_frequency(whole: Whole, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
-    rest = whole.reduced(scene)
-    densities = spectra(rest.vehicle, rest.excitation, whole.speed, OMEGA)[:, rows]
+    rest = full_scene.reduced(scene)
+    densities = spectra(rest.vehicle, rest.excitation, full_scene.speed, OMEGA)[:, rows]
     return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 
@@ -58,7 +58,7 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     for _ in range(draws):
         factors = dict(zip(names, 1.0 + OFF * random.uniform(-1.0, 1.0, len(names)), strict=True))
         full, left = (replace(scene, vehicle=changed(scene.vehicle, factors)) for scene in (chooser.scene, rest))
-        whole = Whole(full, float(random.uniform(low, high)))
+        whole = FullScene(full, float(random.uniform(low, high)))
         ratio = confirmed(whole.reduced(left), chooser.rows) / confirmed(whole.full, chooser.rows)
         worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))
     return worst / chooser.tolerance

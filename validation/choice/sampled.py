@@ -1,4 +1,5 @@
-"""What a run in time samples of a linear scene, by a covariance of its steps: no sum over frequencies and no chance.
+"""Statistics that a run in time samples of a linear scene, by a covariance of its steps: no sum over frequencies, no
+chance.
 
 Axle i meets the road D_i seconds late and moves the vehicle by x_i, so that x = sum x_i. A step of the classical
 Runge-Kutta method reads the filters f of the road at its begin, middle and end:
@@ -62,12 +63,12 @@ class Sampled:
 
     @cached_property
     def _rate(self) -> np.ndarray:
-        """Of the filters in time (m, m), 1/s."""
+        """Rate matrix of the road filters in time (m, m), 1/s."""
         return self.march.speed * self.march.reduced.excitation.F
 
     @cached_property
     def _variance(self) -> np.ndarray:
-        """Of the filters (m, m)."""
+        """Covariance of the road filters (m, m)."""
         G = self.march.reduced.excitation.G
         return solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T)
 

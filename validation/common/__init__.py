@@ -1,1 +1,1 @@
-"""What all cases share: rows and their verdicts, bands, timing, scenes, kept results."""
+"""Common parts of all cases: rows and their verdicts, bands, timing, scenes, kept results."""

@@ -64,7 +64,7 @@ class Bounces:
         return after, expm(self.rates[states] * after) @ x
 
     def _states(self, x: np.ndarray) -> Pair:
-        """What each tyre does."""
+        """States of contact of each tyre."""
         p = self.p
         return _state(p.k1 * x[0], p.d1 * x[4]), _state(p.k2 * x[1], p.d2 * x[5])
 

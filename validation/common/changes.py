@@ -1,4 +1,4 @@
-"""What changed between two reports: rows that are new, gone, or found something else than before."""
+"""Changes between two reports: rows that are new, gone, or have another value than before."""
 
 import json
 from collections.abc import Iterator
@@ -49,7 +49,7 @@ def _provenance(content: Saved) -> Saved:
 
 
 def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
-    """What ``results.json`` keeps of the comparison: with what, notes, all changes.
+    """The comparison with an earlier report for ``results.json``: its source, notes, all changes.
 
     source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
     """
@@ -92,7 +92,7 @@ def changes(before: dict[str, Saved], after: dict[str, Saved]) -> list[Change]:
 
 
 def _rank(status: Any) -> int:
-    """What is worse now is told first; a value that is no status has no rank."""
+    """Rank of a status for sorting: the worst first; 0 for a value that is no status."""
     return STATUSES.index(status) if status in STATUSES else 0
 
 

@@ -27,7 +27,7 @@ SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 
 
 def engine(name: str) -> Make:
-    """The engine as it is."""
+    """The unchanged engine by its name."""
     return partial(build, name)
 
 
@@ -83,7 +83,7 @@ def state_gap(path: Trajectory | None, other: Trajectory) -> float:
 
 
 def order_gap(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
-    """How far the observed order is from the declared one, from the settings' step and its half.
+    """Difference between observed and declared order, from the settings' step and its half.
 
     ``truth`` is a path of the reference over the same time at a step finer by a whole factor.
     """
@@ -100,7 +100,7 @@ def observed_order(make: Make, assembly: Assembly, settings: Settings, truth: Tr
 
 
 def equilibrium_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
-    """How far any state moves away from the closed form of the static equilibrium on a flat road.
+    """Largest distance by which any state moves away from the closed form of the static equilibrium on a flat road.
 
     ``assembly`` is the vehicle on its tyres with nothing that drives it.
     """
@@ -148,7 +148,7 @@ def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
 
 
 def by_hand(settings: Settings) -> Settings:
-    """The same step and duration for the reference's Runge-Kutta."""
+    """The reference's classical Runge-Kutta settings with the step and duration of others."""
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 

@@ -1,4 +1,4 @@
-"""What a full disk leaves of the files of a run, tried at moments from before the first byte to after the last one.
+"""Files of a run on a full disk, tried at moments from before the first byte to after the last one.
 
 A limit on the size of the files of this process stands for the disk: the system answers a write beyond it as it
 answers one on a full disk.
@@ -32,7 +32,7 @@ def files_of_at_most(size: int) -> Iterator[None]:
 
 
 def damage(folder: Path) -> int:
-    """How many of the moments left a file that is not whole, or passed without the system's own word."""
+    """Number of moments at which a broken file was left, or no error of the operating system was reported."""
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
     _save(result, folder / "whole")

@@ -1,4 +1,4 @@
-"""What rows rest on: the assumptions that were broken by the runs which were made before them.
+"""Broken assumptions that rows rest on: those of the runs that were made before a row.
 
 While a case is measured, every result that is judged is noted. A row rests on the results that were judged between the
 rows before it and itself, and so do those that follow it until another result is judged, or until the part of the case
@@ -48,7 +48,7 @@ class Grounds:
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY, "")))
 
     def rest(self, allowed: bool) -> str:
-        """What the row that is made now rests on, with or without leave."""
+        """Text of the broken assumptions that the current row rests on, with or without leave."""
         same_part = self.part == _part()
         self.rested, self.closed = True, self.closed or same_part
         return "" if self.closed and not same_part else self.told(allowed)
@@ -76,7 +76,8 @@ Answer = TypeVar("Answer")
 
 
 def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
-    """What a case answers, its rows resting on its runs; and what runs after its last row broke without leave."""
+    """A case's answer, with the broken assumptions of its runs in its rows; and those that runs after its last row
+    broke without leave."""
     grounds = Grounds()
     before = _GROUNDS.set(grounds)
     try:
@@ -88,7 +89,7 @@ def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
 
 
 def _part() -> int:
-    """Which part of ``measure`` is at work, by its instruction; it may be decorated."""
+    """Index of the instruction of ``measure`` that is at work; ``measure`` may be decorated."""
     frame, outer = sys._getframe(), sys._getframe()
     while frame.f_back is not None and frame.f_code is not measured.__code__:
         outer = outer if frame.f_globals["__name__"] == "contextlib" else frame
@@ -107,12 +108,12 @@ def allowing(why: str, *names: str) -> Iterator[None]:
 
 
 def broken() -> str:
-    """What the row that is made now rests on and must not."""
+    """Broken assumptions without leave that the current row rests on."""
     grounds = _GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=False)
 
 
 def allowed() -> str:
-    """What the row that is made now rests on and may."""
+    """Broken assumptions with leave that the current row rests on."""
     grounds = _GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=True)

@@ -155,7 +155,7 @@ def failed(id: str, quantity: str, reason: str) -> Row:
 
 
 def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
-    """What a case answers; rows fail that rest on an assumption which was broken without leave.
+    """A case's answer, whose rows fail if they rest on an assumption that was broken without leave.
 
     What runs after the last row broke has a row of its own.
     """

@@ -20,7 +20,7 @@ COURSE = "detrended_rms_course_2in.crg"
 
 
 def on_paper_road() -> ContextDecorator:
-    """What runs of the paper's vehicle on its road may break, and those that its wheel forces drive."""
+    """Leave for runs of the paper's vehicle, on its road or on its wheel forces, to break named assumptions."""
     why = "the paper's linear tyres pull or lie on their rims at times on its road, on both sides of a comparison alike"
     return allowing(why, "tyres press", "springs compressed", "tyres not flat")
 

@@ -34,12 +34,12 @@ class Right:
         return rate
 
     def told(self, states: np.ndarray) -> np.ndarray:
-        """States (n, 8) as they are told."""
+        """States (n, 8) that the engine reports."""
         return states
 
 
 class Still(Right):
-    """The vehicle stays where it begins."""
+    """A wrong engine whose vehicle stays where it begins."""
 
     def told(self, states: np.ndarray) -> np.ndarray:
         """The start, at all times."""

@@ -105,12 +105,12 @@ def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     )
 
 
-def kept(name: str, held: Held) -> tuple[float, float]:
+def kept(name: str, constant: Held) -> tuple[float, float]:
     """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
-    moment = moment_band(name, held.used_with_moment, held.spinning)
+    moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
-        float(np.mean(held.error <= band(name, held.used, held.spinning))),
-        float(np.mean(held.moment_error <= moment + ROUNDING)),
+        float(np.mean(constant.error <= band(name, constant.used, constant.spinning))),
+        float(np.mean(constant.moment_error <= moment + ROUNDING)),
     )
 
 

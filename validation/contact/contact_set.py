@@ -60,7 +60,7 @@ def drawn(part: int) -> list[Case]:
 
 def wide(part: int) -> list[Case]:
     """A part of the wide contacts, without their forces."""
-    bodies = [Material(E=PAIR.one.E, nu=nu) for nu in POISSON]
+    bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE[FITTED]) * part
     streams = enumerate(WIDE[part], first)
     return [case for stream in streams for case in _drawn(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)]

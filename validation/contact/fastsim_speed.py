@@ -1,4 +1,4 @@
-"""What FASTSIM costs, beside the least that its arithmetic can: one root and one division per cell."""
+"""Cost of FASTSIM beside the least that its arithmetic can take: one root and one division per cell."""
 
 import time
 from collections.abc import Callable

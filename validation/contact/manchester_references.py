@@ -1,4 +1,4 @@
-"""What others publish of the Manchester contact benchmark, and second ways to the same figures.
+"""Published results of the Manchester contact benchmark, and second ways to the same figures.
 
 Published are the reference outputs mbench_a22_right and mbench_a22_left that CONTACT comes with (revision 2447 of
 2023-11-04, Vtech CMCC, Apache 2.0): case A-2.2, exact half-space contact on one plane for all patches, cells of 0.2 mm.

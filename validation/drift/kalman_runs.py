@@ -154,7 +154,8 @@ def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Over COARSE: transition, and what the input's samples at the start and at the end of the step add."""
+    """First-order hold over COARSE: transition, and what the input's samples at the start and at the end of the step
+    add."""
     n, m = b.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b
@@ -229,7 +230,8 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
 
 
 def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
-    """What a gyro alone leaves unknown of the pitch (rad) after a long run, and what the averaged instability says.
+    """Standard deviation of the pitch (rad) by a gyro alone after a long run, and the value by the averaged
+    instability.
 
     The law: the stationary Riccati equation of pitch'' = lambda^2 pitch + noise with the rate measured. About a
     vehicle that stands level, A(0), the same gyro leaves a random walk.

@@ -70,7 +70,7 @@ class Swing:
         return Ladder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
 
     def second(self, last: Setting) -> None:
-        """None: the checks know the closed form."""
+        """None, as no second method is needed: the checks know the closed form."""
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times, values, calls."""
@@ -90,7 +90,7 @@ class Swing:
         return Answer(times, values[:, None], {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Its name."""
+        """Lines for a scene file: the setting's name."""
         return [setting.label()]
 
 

@@ -61,27 +61,27 @@ class Bench:
 
     @cached_property
     def road(self) -> Assembly:
-        """On the study road."""
+        """The vehicle on the study road."""
         return assemble(bench_scene(self.parameters, self.duration))
 
     @cached_property
     def flat(self) -> Assembly:
-        """On a flat road, at rest."""
+        """The vehicle on a flat road, at rest."""
         return replace(self.road, mode="free", input=None)
 
     @cached_property
     def linear(self) -> Assembly:
-        """Under wheel forces that are linear between their samples."""
+        """The vehicle under wheel forces that are linear between their samples."""
         return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=False))
 
     @cached_property
     def held(self) -> Assembly:
-        """Under wheel forces that are constant over each sample."""
+        """The vehicle under wheel forces that are constant over each sample."""
         return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=True))
 
     @cached_property
     def guided(self) -> Assembly:
-        """Under wheel forces, with a prescribed pitch."""
+        """The vehicle under wheel forces, with a prescribed pitch."""
         start = self.road.initial
         pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], PERIOD, derivatives=2, degree=5)
         forces = Smooth(self._forces(), PERIOD)
@@ -89,7 +89,7 @@ class Bench:
 
     @cached_property
     def on_rails(self) -> Assembly:
-        """Under wheel forces, with heave and pitch prescribed."""
+        """The vehicle under wheel forces, with heave and pitch prescribed."""
         start = self.road.initial
         motion = start[2:4] + np.column_stack([0.01 * self._swell(9.0), 0.05 * self._swell(7.0)])
         parts = (Smooth(self._forces(), PERIOD), Smooth(motion, PERIOD, derivatives=2, degree=5))
@@ -97,7 +97,8 @@ class Bench:
 
     @cached_property
     def stabilised(self) -> Assembly:
-        """Under held wheel forces, with an added moment and a spring whose dead band the pitch leaves."""
+        """The vehicle under sampled wheel forces, with an added moment and a spring whose dead band the pitch
+        leaves."""
         moment = Sampled(3e3 * self._swell(31.0)[:, None], PERIOD, held=False)
         spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
         vehicle = replace(self.held.vehicle, pitch_springs=(spring,))
@@ -120,7 +121,7 @@ class Bench:
         return checks.accelerations(reference, getattr(self, situation), settings, random_states())
 
     def _swell(self, frequency: float) -> np.ndarray:
-        """From 0 to 1 and back with a smooth start; frequency in rad/s."""
+        """Samples of a swell from 0 to 1 and back with a smooth start; frequency in rad/s."""
         times = PERIOD * np.arange(round(self.duration / PERIOD) + 4)
         return 0.5 * (1 - np.cos(frequency * times))
 
@@ -163,7 +164,7 @@ def _momentum(bench: Bench, engine: str, make: Make) -> float:
 
 
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
-    """How far enforced moment and force are from the eliminated form."""
+    """Error of enforced moment and force against the eliminated form."""
     return lambda bench, engine, make: enforced_gap(
         make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
     )

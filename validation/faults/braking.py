@@ -51,7 +51,7 @@ def _light() -> float:
 
 @cache
 def _way() -> float:
-    """The exact way (m)."""
+    """The exact stopping distance (m)."""
     return exact(stops.FRONT, DRY, LEVEL, 11.11)
 
 
@@ -180,7 +180,7 @@ def _spin(factor: float) -> Patch:
 
 
 def _one_bit_less(real: Any) -> Any:
-    """Converts with a bit less than it is told."""
+    """Fault: a signal is converted with a bit less than stated."""
     return lambda table, *rest: real(table.model_copy(update={"bits": table.bits - 1}), *rest)
 
 

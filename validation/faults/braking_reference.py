@@ -17,7 +17,7 @@ from models.tyre.tyre_table import Tables
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
-from validation.braking.compiled_brakes import held_in
+from validation.braking.compiled_brakes import wheel_forces_in
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -32,7 +32,7 @@ def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60)
 
 
 def _accelerations() -> float:
-    """Of a vehicle that is built anew, with the fault."""
+    """Difference in accelerations of a vehicle that is built anew, with the fault."""
     accelerations = whole.accelerations(whole.bent.__wrapped__(), ENGINE, COUNT)
     return whole.apart(accelerations, whole.plain_accelerations("bent", COUNT))
 
@@ -148,13 +148,13 @@ def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
 
 
 def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    held_in(engine.numbers).spun[:] *= 1.01
+    wheel_forces_in(engine.numbers).spun[:] *= 1.01
     return march(engine, *state)
 
 
 def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    """Of the front wheels."""
-    forces = held_in(engine.numbers).forces
+    """Fault: the forces of the front wheels are exchanged."""
+    forces = wheel_forces_in(engine.numbers).forces
     forces[:2] = forces[1::-1].copy()
     return march(engine, *state)
 
@@ -228,19 +228,19 @@ def _longer(real: Any) -> Any:
 
 
 def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
-    """What tyres on the suspension lag by, changed."""
+    """Patch that changes the lag of tyres on the suspension."""
     return attribute("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
 
 
 def _half_as_far(contacts: Any, half: float, *rest: Any) -> tuple[Any, ...]:
-    """Without the half of the step before."""
+    """Fault: the lag is advanced without the half of the step before."""
     lag = rest[1]
     lag.behind[0] = 0.0
     return contacts, half, *rest
 
 
 def _faster(contacts: Any, *rest: Any) -> tuple[Any, ...]:
-    """By speeds along the wheels that are 1 % too large."""
+    """Fault: the lag is advanced by speeds along the wheels that are 1 % too large."""
     return contacts._replace(along=1.01 * contacts.along), *rest
 
 

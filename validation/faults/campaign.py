@@ -27,7 +27,7 @@ class Check:
     measure: Callable[[], float]
 
     def size(self) -> float:
-        """What is measured; infinite where the fault lets a run fail."""
+        """The measured error; infinite where the fault lets a run fail."""
         try:
             return self.measure()
         except RunFailed:
@@ -100,7 +100,7 @@ class Campaign:
         ]
 
     def table(self, records: list[Record]) -> Table:
-        """Every fault with what sees it."""
+        """Table of every fault with the checks that see it."""
         lines = tuple(
             (
                 record["fault"],
@@ -119,7 +119,8 @@ class Campaign:
         )
 
     def lines(self, records: list[Record]) -> list[tuple[str, ...]]:
-        """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
+        """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed
+        it."""
         return [
             (
                 self.system,

@@ -50,7 +50,7 @@ def _by_frequency() -> tuple[Choice, np.ndarray, float]:
 
 
 def _by_runs() -> JudgedByRuns:
-    """The same of the half car."""
+    """The choice by runs for the half car."""
     return _runs_by(Chooser.__init__, Chooser.confirm, Screen.shares)
 
 

@@ -50,7 +50,7 @@ def _variance() -> float:
 
 
 def _again() -> float:
-    """A stream in pieces against the whole."""
+    """Difference between a stream read in pieces and read whole."""
     parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
 

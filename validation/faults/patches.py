@@ -47,7 +47,7 @@ def _owner(path: str) -> tuple[Any, str]:
 
 
 def with_globals(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
-    """The same function with other globals."""
+    """A copy of the function with other globals."""
     return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
 
 

@@ -123,7 +123,7 @@ def _hidden(faulty: list[Saved]) -> Row:
 
 
 def lines(data: Saved) -> list[tuple[str, ...]]:
-    """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
+    """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed it."""
     return [
         (
             "pitch-plane",

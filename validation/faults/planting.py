@@ -58,7 +58,7 @@ class Planted:
             return self.model.acceleration(time, q, v)
 
     def plan(self) -> dict[str, int]:
-        """What was built."""
+        """Counts of what the engine with the planted fault built."""
         return self.model.plan()
 
 

@@ -61,7 +61,7 @@ def _closed_form() -> float:
 
 @cache
 def _covariance_of_heights() -> np.ndarray:
-    """Of each wheel of R19-ride, and of the sum of the left ones."""
+    """Variances of the road heights under each wheel of R19-ride, and of the sum of the left ones."""
     wheels = spatial_linear.wheels(vehicle_file.load_vehicle("r19_ride"))
     P = two_track.input_covariance(two_track.road_of_level(two_track.half_track(wheels)), wheels)
     left = [i for i, wheel in enumerate(wheels) if wheel.y > 0]

@@ -188,7 +188,7 @@ def _shared(contacts: Any, slip: Any) -> None:
 def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
     """The creep law with the moment of spin the other way."""
     wf.creep(contacts, slip, *rest)
-    rest[-1].found["mz"] *= -1.0
+    rest[-1].forces["mz"] *= -1.0
 
 
 def _swapped(touches: Any) -> None:

@@ -107,7 +107,7 @@ def crossings(implementation: str, folder: Path) -> float:
 
 
 def far_seeds(implementation: str, folder: Path) -> float:
-    """How many of the seeds around 2^63 and at the end have a stream that another one has, too."""
+    """Number of seeds around 2^63 and at the end of the range whose stream another seed has, too."""
     seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
     return float(len(seeds) - len({float(normal(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
 

@@ -267,7 +267,7 @@ CASES = (
         for name, run in (
             (
                 "torque that drives the wheel",
-                lambda: braked(wheels.ONE, stacked([DRY]), EVEN, np.full(3, -1.0), wheels.STEP, wheels.SPEED),
+                lambda: braked(wheels.QUARTER, stacked([DRY]), EVEN, np.full(3, -1.0), wheels.STEP, wheels.SPEED),
             ),
             ("table that ends before it locks", lambda: bent((0.0, 0.0), (0.9, 0.8))),
             ("table with friction at no slip", lambda: bent((0.0, 0.1), (1.0, 0.8))),

@@ -1,4 +1,4 @@
-"""What a hard case is, and how an implementation's answer to it is judged."""
+"""Definition of a hard case, and how an implementation's answer to it is judged."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ class Case:
         return self.expected.get(implementation, "right")
 
     def judged(self) -> tuple[str, ...]:
-        """The implementations in which it is judged."""
+        """The implementations in which the case is judged."""
         return IMPLEMENTATIONS[:1] if self.once else IMPLEMENTATIONS
 
     def independence(self, implementation: str) -> Independence:
@@ -55,7 +55,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """word : how it ended; error : in the case's unit, None where there is no answer; message : what was said."""
+    """Outcome of a hard case. word : how it ended; error : in the case's unit, None where there is no answer; message :
+    what was said."""
 
     word: Word
     error: float | None = None

@@ -25,7 +25,7 @@ def no_creepage(implementation: str, folder: Path) -> float:
 
 
 def no_creepage_naive(folder: Path) -> str:
-    """The weighted flexibility as it is printed."""
+    """Error at no creepage with the weighted flexibility as it is printed."""
     with np.errstate(invalid="ignore"):
         weighted = np.float64(0.0) / np.float64(0.0)
     return f"the weighted flexibility of 1982 is 0/0 there: {weighted}"

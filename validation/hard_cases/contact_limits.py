@@ -32,7 +32,7 @@ def few_cells(implementation: str, folder: Path) -> float:
 
 
 def few_cells_naive(folder: Path) -> str:
-    """A whole first step at the leading edge."""
+    """Error on few cells with a whole first step at the leading edge."""
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
@@ -66,7 +66,7 @@ def power(implementation: str, folder: Path) -> float:
 
 
 def only_spin(implementation: str, folder: Path) -> float:
-    """Nothing but spin: force along the rail, and of small spin across it against the linear theory."""
+    """Errors under pure spin: force along the rail, and of small spin across it against the linear theory."""
     small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), PAIR)
     large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), PAIR)
     wanted = float(forces(A, B, 0.0, 0.0, 1e-6, PAIR)[1])

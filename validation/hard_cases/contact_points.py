@@ -41,7 +41,7 @@ def step_answer(engine: str, folder: Path) -> float:
 
 
 def step_answer_naive(folder: Path) -> str:
-    """The same state as a native MuJoCo activation with its usual filter."""
+    """The answer to a step by a native MuJoCo activation with MuJoCo's usual filter."""
     ends = []
     for integrator in ("Euler", "RK4"):
         model = mujoco.MjModel.from_xml_string(
@@ -80,7 +80,7 @@ def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
 
 
 def stamps(engine: str, folder: Path) -> float:
-    """The same ramp along an adaptive run, whose rows lie anywhere."""
+    """Error of the sampled ramp along an adaptive run, whose rows lie anywhere."""
     return _ramp_error(engine, 1e-3, {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4"))
 
 

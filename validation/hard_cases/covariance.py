@@ -43,7 +43,7 @@ def _recursion() -> np.ndarray:
 
 
 def van_loan_naive(folder: Path) -> str:
-    """The same process noise over one and over twenty periods by filterpy's van Loan discretisation."""
+    """Process noise over one and over twenty periods by filterpy's van Loan discretisation."""
     from filterpy.common import van_loan_discretization
 
     from models.engines.stability import first_order, linearised

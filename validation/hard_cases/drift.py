@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.result import Result
 from models.drift.growth import drift_off_time
-from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
+from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors, figures_of_run, verdict
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
@@ -43,13 +43,13 @@ def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, t
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
-def figures(run: Result, truth: Result, scene: Scene) -> tuple[Own, Errors]:
-    """What is known of a run without the truth, and with it."""
-    return own_figures(run, scene.vehicle_parameters()), errors(run, truth)
+def figures(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
+    """Figures of a run without the truth, and its errors against the truth."""
+    return figures_of_run(run, scene.vehicle_parameters()), errors(run, truth)
 
 
 def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
-    """The verdicts with the truth and without it."""
+    """The words of the verdicts with and without the true run."""
     scores, wrong = figures(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
     return verdict(scores, wrong, scene.effects, Limits()).word, known.word
@@ -62,7 +62,7 @@ def tumbled(engine: str, folder: Path) -> float:
 
 
 def tumbled_naive(folder: Path) -> str:
-    """What its vertical forces say."""
+    """Damage of a tumbled run by its vertical forces alone."""
     scene = follow(folder, measured(), tilt=TILT)
     scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
@@ -81,7 +81,7 @@ def soft(engine: str, folder: Path) -> float:
 
 
 def soft_naive(folder: Path) -> str:
-    """What the run itself shows."""
+    """Figures of the run itself, which do not show that its stabiliser is soft."""
     scene = follow(folder, measured(), SPRING, TILT)
     scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
@@ -97,7 +97,7 @@ def graded(engine: str, folder: Path) -> float:
 
 
 def graded_naive(folder: Path) -> str:
-    """What the run itself shows."""
+    """Figures of the run itself on a graded road."""
     scene = follow(folder, measured(0.1), FIRM)
     scores, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
     return (
@@ -119,7 +119,7 @@ def broken_load(engine: str, folder: Path) -> float:
 
 
 def broken_load_naive(folder: Path) -> str:
-    """What the library makes of it."""
+    """Damage of a load with a value that is no number, by the rainflow library."""
     from rainflow import extract_cycles
 
     load = _walk().copy()
@@ -160,7 +160,7 @@ def two_points(engine: str, folder: Path) -> float:
 
 
 def two_points_naive(folder: Path) -> str:
-    """What the library makes of it."""
+    """Damage of a load of two points, by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"

@@ -54,7 +54,7 @@ def undamped_naive(folder: Path) -> str:
 
 
 def undamped_euler(engine: str, folder: Path) -> float:
-    """The same with a first-order explicit method."""
+    """Growth of the undamped oscillation by a first-order explicit method."""
     return _ringing(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
@@ -64,7 +64,7 @@ def light_wheel(engine: str, folder: Path) -> float:
 
 
 def light_wheel_implicit(engine: str, folder: Path) -> float:
-    """The same with an implicit integrator."""
+    """Error of the light wheel by an implicit integrator."""
     return _settled(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
 
 
@@ -74,7 +74,7 @@ def stiff_tyre(engine: str, folder: Path) -> float:
 
 
 def stiff_tyre_implicit(engine: str, folder: Path) -> float:
-    """The same with an implicit integrator."""
+    """Error on the stiff tyre by an implicit integrator."""
     return _settled(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
 
 

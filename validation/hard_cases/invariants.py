@@ -20,7 +20,7 @@ G = 9.81
 
 
 def rest(engine: str, folder: Path) -> float:
-    """Both vehicles, exact and linear geometry, 2 s from their static equilibrium."""
+    """Largest motion of both vehicles, exact and linear geometry, in 2 s from their static equilibrium."""
     worst = 0.0
     for parameters in VEHICLES:
         for geometry in ("exact", "linear"):
@@ -30,7 +30,7 @@ def rest(engine: str, folder: Path) -> float:
 
 
 def rest_naive(folder: Path) -> str:
-    """What a start at zero, the unstressed vehicle, does."""
+    """Motion from a start at zero, the unstressed vehicle."""
     base = vehicle(initial=np.zeros(8))
     fall = largest(run("reference", base, 1e-3, 2.0).states[:, 4:7])
     return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
@@ -132,7 +132,7 @@ def _tumbled() -> np.ndarray:
 
 
 def tumbling(engine: str, folder: Path) -> float:
-    """Over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
+    """Error of a vehicle that turns over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
     states = run(engine, _spun("exact"), 2.5e-4, 1.0).states
     truth = _tumbled()
     if truth[:, 3].max() < np.pi / 2:
@@ -160,7 +160,7 @@ def _measured() -> Sampled:
 
 
 def growth(engine: str, mode: Mode) -> float:
-    """How a pitch error of 1e-6 rad at the start has grown at the end of the drive."""
+    """Growth factor of a pitch error of 1e-6 rad over the drive."""
     base = vehicle()
     start = base.initial.copy()
     start[3] += 1e-6
@@ -177,7 +177,7 @@ def body_frame(engine: str, folder: Path) -> float:
 
 
 def body_frame_naive(folder: Path) -> str:
-    """The same forces, vertical in the inertial frame."""
+    """The body-fixed forces taken as vertical in the inertial frame."""
     return f"vertical forces let the error grow {growth('reference', 'force'):.0f}-fold in {DRIVE:.0f} s"
 
 

@@ -126,7 +126,7 @@ def stiff(engine: str, folder: Path) -> float:
 
 
 def stiff_naive(folder: Path) -> str:
-    """filterpy's own discretisation."""
+    """The stiff case by filterpy's own discretisation."""
     a, b, wanted = _exact()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW), SLOW)[1]
     times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()

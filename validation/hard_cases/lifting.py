@@ -74,7 +74,8 @@ def gained(**override: float) -> Error:
 
 
 def at_the_switch(engine: str, folder: Path) -> float:
-    """Without gravity the wheels rest on the road at no load: nothing may move, and no noise of rounding grow."""
+    """Largest motion without gravity: the wheels rest on the road at no load: nothing may move, and no noise of
+    rounding grow."""
     assembly = vehicle(np.zeros(8), "linear", {"g": 0.0})
     return setups.largest(setups.run(engine, assembly, 1e-3, 1.0).states)
 

@@ -18,14 +18,14 @@ CHECKS = {
 
 
 def cut_number(folder: Path) -> str:
-    """What numpy makes of a number that was cut off."""
+    """The value that numpy reads of a number that was cut off."""
     path = raw(csv.whole()[:-3].encode())(folder)
     last = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last:g}, which was {FX[-1]:g}"
 
 
 def invalid_samples(folder: Path) -> str:
-    """What asammdf makes of samples marked as invalid."""
+    """The values that asammdf reads of samples marked as invalid."""
     path = next(each for each in mdf4.FILES if each.name == "MDF 4 with invalid samples").make(folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
@@ -33,7 +33,7 @@ def invalid_samples(folder: Path) -> str:
 
 
 def cut_segment(folder: Path) -> str:
-    """What npTDMS makes of a file that was cut off."""
+    """The channels that npTDMS reads of a file that was cut off."""
     with Bounded(tdms.cut_by(100)(folder)) as file:
         lengths = [len(channel) for group in opened(folder, file).groups() for channel in group.channels()]
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"

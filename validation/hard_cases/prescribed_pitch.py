@@ -132,20 +132,21 @@ def undamped_multiplier(engine: str, folder: Path) -> float:
 class AsItComes(exudyn_engine.ExudynModel):
     """Exudyn without our checks of its multiplier."""
 
-    _found: np.ndarray | None = None
+    _forces: np.ndarray | None = None
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self._found is None:  # the start needs the balance; the check after the run gets what was found
+        if self._forces is None:  # the start needs the balance; the check after the run gets what was found
             return super()._balance(time, state)
-        return self._found[round(time / self.settings.step)], np.zeros(1)
+        return self._forces[round(time / self.settings.step)], np.zeros(1)
 
     def _enforced(self) -> np.ndarray | None:
-        self._found = super()._enforced()
-        return self._found
+        self._forces = super()._enforced()
+        return self._forces
 
 
 class Inconsistent(AsItComes):
-    """The same with its own start: the constraint's acceleration is not among the initial values."""
+    """The prescribed pitch with an inconsistent start: the constraint's acceleration is not among the initial
+    values."""
 
     def _consistent_start(self, options: object) -> None:
         self._first = np.zeros(1)
@@ -170,12 +171,12 @@ def undamped_multiplier_naive(folder: Path) -> str:
 
 
 def noisy(engine: str, folder: Path) -> float:
-    """What noise of 1e-6 rad on the samples adds to the moment, in units of its finite-difference value."""
+    """Moment by noise of 1e-6 rad on the samples, in units of its finite-difference value."""
     return _noisy(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
-    """The same at 0.125 ms."""
+    """Moment by noise of 1e-6 rad on samples at 0.125 ms, in units of its finite-difference value."""
     return _noisy(engine, 1.25e-4)
 
 
@@ -219,7 +220,7 @@ class Straight:
         return np.column_stack([self.angles[index] + (place - index) * slope, slope / self.period, 0 * slope])
 
     def at(self, time: float) -> np.ndarray:
-        """The same at one time."""
+        """The straight line's values at one time."""
         return self.sample(time, 1.0, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:

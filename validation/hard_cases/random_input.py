@@ -150,7 +150,7 @@ def _law(x: Decimal) -> float:
 
 
 def no_growth_naive(folder: Path) -> str:
-    """The law as it is printed."""
+    """The case without growth by the law as it is printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
 

@@ -32,7 +32,7 @@ def spoilt(
 
 
 def clean(implementation: str, folder: Path) -> float:
-    """Errors and doubts in the recording as it is."""
+    """Number of errors and doubts found in a clean recording."""
     return float(len(bench.planted(bench.measurement(road=ROAD), folder)))
 
 

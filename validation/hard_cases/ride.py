@@ -149,7 +149,7 @@ def mirrored(implementation: str, folder: Path) -> float:
     deviations = []
     for side in (1.0, -1.0):
         springs = tuple(
-            replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0)) for s in car.springs
+            replace(s, stiffness=s.stiffness * (2.0 if side * s.first_point[1] > 0 else 1.0)) for s in car.springs
         )
         vehicle = linear(replace(car, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]

@@ -68,7 +68,7 @@ def impulse(engine: str, folder: Path) -> float:
 
 
 def impulse_naive(folder: Path) -> str:
-    """How far the two rules are apart in pitch."""
+    """Difference in pitch between the two rules for an impulse."""
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
@@ -98,7 +98,7 @@ class ByTime(Sampled):
 
 
 def halved_naive(folder: Path) -> str:
-    """The same with a force that is looked up at each stage's time."""
+    """Pitch under a force that is looked up at each stage's time."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
     truth = exact(setups.driven(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
@@ -149,7 +149,7 @@ def noise_adaptive(engine: str, folder: Path) -> float:
 
 
 def noise_adaptive_naive(folder: Path) -> str:
-    """scipy's RK45 straight across the jumps."""
+    """Error of noisy forces by scipy's RK45 straight across the jumps."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven(base, forces)
@@ -188,7 +188,7 @@ def damaged(engine: str, folder: Path) -> float:
 
 
 def damaged_past_reader(engine: str, folder: Path) -> float:
-    """The same NaN given past the reader: the guard after the run must see it."""
+    """Largest state of a run on a NaN that was given past the reader: the guard after the run must see it."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
@@ -220,7 +220,7 @@ def bump(engine: str, folder: Path) -> float:
 
 
 def bump_naive(folder: Path) -> str:
-    """scipy's LSODA as it comes."""
+    """The bump by scipy's LSODA with its default settings."""
     assembly = vehicle().with_input("road", _bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
@@ -264,7 +264,7 @@ def passed_over(engine: str, folder: Path) -> float:
 
 
 def passed_over_naive(folder: Path) -> str:
-    """The same without its error, and in steps that see every wave."""
+    """The passed-over waves without the stated error, and in steps that see every wave."""
     ends = [_over_waves("reference", step)["z1_rate"][-1] for step in (2e-3, 1e-4)]
     return f"without its error the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
 

@@ -86,7 +86,7 @@ def run(
 def unchecked(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
 ) -> Trajectory:
-    """The same past the checks before a run, so that only the guard after it stands."""
+    """Run a model without the checks before a run, so that only the guard after it stands."""
     engine_settings = settings(engine, step, duration, integrator, **other)
     return build_unchecked(engine, assembly, engine_settings).run()
 

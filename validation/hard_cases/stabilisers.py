@@ -39,7 +39,7 @@ NOISE = 1e-6
 
 
 def sprung(band: float) -> Assembly:
-    """Under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
+    """The vehicle under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
@@ -60,7 +60,7 @@ def _kink_truth() -> Trajectory:
 
 
 def kink_naive(folder: Path) -> str:
-    """Exudyn's own limit stops in place of the law."""
+    """Error at the kink with Exudyn's limit stops in place of the force law."""
     with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
         pitch_error = kink("exudyn", folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
@@ -131,7 +131,8 @@ def _free_motion() -> np.ndarray:
 
 
 def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
-    """That motion prescribed, with noise (m, rad) on its samples, to a vehicle with ``mass`` times its chassis."""
+    """Assembly whose motion is prescribed, with noise (m, rad) on its samples, to a vehicle with ``mass`` times its
+    chassis."""
     states = _free_motion()
     motion = states[:, 2:4] + noise * np.random.default_rng(7).standard_normal((len(states), 2))
     base = vehicle("asymmetric_twin")
@@ -156,7 +157,7 @@ def missing_mass(engine: str, folder: Path) -> float:
 
 
 def missing_mass_naive(folder: Path) -> str:
-    """What the states of the guided run say of it."""
+    """Difference between the states of guided runs with the true and a wrong mass, as a sentence."""
     whole, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
     return f"the states of the guided run differ by {largest(whole - other):.1e}: only the force can tell"
 
@@ -193,7 +194,7 @@ def smoothed(engine: str, folder: Path) -> float:
 
 
 def smoothed_naive(folder: Path) -> str:
-    """The same pitch as it is."""
+    """The noisy pitch used without smoothing."""
     raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
     assert raw is not None
     return f"without a bandwidth the moment is {rms(raw):.1e} N m rms, and Exudyn's multiplier raises"
@@ -206,7 +207,7 @@ def beyond_nyquist(engine: str, folder: Path) -> float:
 
 
 def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
-    """A scene under wheel forces with these effects."""
+    """Check that a scene under wheel forces with these effects is refused."""
 
     def error(engine: str, folder: Path) -> float:
         measured_pitch(folder)  # writes the files

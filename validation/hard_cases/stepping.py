@@ -62,7 +62,7 @@ def _against_tight(assembly, states, step: float) -> float:
 
 
 def beyond_limit_naive(folder: Path) -> str:
-    """The same run without the check."""
+    """The run beyond the stability limit without the check."""
     assembly = vehicle(effects=ROAD)
     shares = [
         _against_tight(assembly, unchecked(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
@@ -134,7 +134,7 @@ def sudden_naive(folder: Path) -> str:
 
 
 def repeat(engine: str, folder: Path) -> float:
-    """The same model run twice, asked for an acceleration in between: the same bits."""
+    """Difference between two runs of one model, asked for an acceleration in between: the same bits."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
@@ -181,7 +181,7 @@ ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
 def keeps_order(engine: str, folder: Path) -> float:
-    """By how much the observed order falls short while the step is halved four times, from 2 ms on."""
+    """Amount by which the observed order falls short while the step is halved four times, from 2 ms on."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact(base, 0.1, 2)[-1], []

@@ -66,8 +66,7 @@ def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
 
 
 def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
-    """The same as a recording, past all files and maps, which is made unless it is there; ``path`` is where its samples
-    lie."""
+    """The long run as a recording, without files and maps, made unless it exists; ``path`` is where its samples lie."""
     signals, _ = pattern(repeated)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
     for values in blocks(seconds, repeated) if columns.done == 0 else ():
@@ -129,8 +128,8 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
 def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
     """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
 
-    def told(done: float, of: float) -> None:
-        print(done, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
+    def told(completed: float, of: float) -> None:
+        print(completed, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
 
     job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
     run(job, Path(folder) / "run", told, float(block))

@@ -80,10 +80,10 @@ def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: fl
 
 
 @spoiling
-def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, part: float) -> None:
+def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, share: float) -> None:
     """The largest samples of a channel cut off."""
     (column,) = columns(virtual, name)
-    samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - part))
+    samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - share))
 
 
 @spoiling
@@ -154,7 +154,7 @@ def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> 
 def planted(
     virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
 ) -> tuple[Finding, ...]:
-    """What is found in a recording with faults of its transducers, and spoilt samples."""
+    """Findings on a recording with planted faults of its transducers, and spoilt samples."""
     samples = virtual.samples(Faults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
     for change in spoil:
         if change is not None:

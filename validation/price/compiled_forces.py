@@ -75,7 +75,7 @@ class CompiledForces:
             return self.coast()
 
     def coast(self) -> np.ndarray:
-        """The same model with no forces but its weight."""
+        """A copy of the model with no forces but its weight."""
         start = np.concatenate(([0.0], self.assembly.initial))
         path, _ = rollout.rollout(self.model, self.data, start[None, :], nstep=self.settings.steps)
         return np.vstack([self.assembly.initial, path[0, :, 1:9]])

@@ -110,7 +110,7 @@ def _styles(measured: Measured) -> dict[str, Style]:
 
 
 def _colour(point: Point, measured: Measured) -> str:
-    """That of its implementation, or else the next of MORE."""
+    """Colour of a point's implementation, or the next of MORE."""
     engine = point.setting.engine
     others = [name for name in dict.fromkeys(p.setting.engine for p in measured.points) if name not in COLOURS]
     return COLOURS[engine] if engine in COLOURS else MORE[others.index(engine) % len(MORE)]
@@ -190,7 +190,7 @@ def _drawn(ax: Axes) -> np.ndarray:
 
 
 def _emptiest(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
-    """Of CORNERS, one whose name keeps off what is taken, near its own place where several do.
+    """The corner of CORNERS at which a name covers nothing, near its own place where several do.
 
     names : middles of names that stand already, through which no line to this one shall lead.
     """
@@ -217,7 +217,7 @@ def _failures(ax: Axes, measured: Measured, top: float) -> None:
 
 
 def _expected(p: Point, measured: Measured) -> float:
-    """What a failed setting cost, or one with fixed steps would have, from its neighbours on the curve."""
+    """Expected cost of a failed setting, from its neighbours on the curve."""
     work = measured.costs[0]
     if p.counts:
         return p.cost(work)

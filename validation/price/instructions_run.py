@@ -64,7 +64,7 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
 
 
 def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
-    """Likewise, in MuJoCo's own loop."""
+    """The marches in MuJoCo's own loop."""
     import mujoco
 
     bodies = "".join(

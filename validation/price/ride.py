@@ -87,7 +87,7 @@ def problem() -> Ride:
 
 
 def direct(ride: Ride) -> np.ndarray:
-    """By one Lyapunov equation."""
+    """Standard deviations by a Lyapunov equation."""
     return stationary(excited(ride.vehicle, ride.road, SPEED)).deviation
 
 
@@ -98,7 +98,8 @@ def fast(ride: Ride, count: int) -> np.ndarray:
 
 
 def grid(ride: Ride, count: int, last: float, even: bool = False) -> np.ndarray:
-    """By the trapezoidal rule on a grid of frequencies up to ``last`` (Hz), in their logarithm or evenly."""
+    """Standard deviations by the trapezoidal rule on a grid of frequencies up to ``last`` (Hz), in their logarithm or
+    evenly."""
     frequency = np.linspace(last / count, last, count) if even else np.geomspace(LOWEST, last, count)
     omega = 2 * np.pi * frequency
     return np.sqrt(2 * np.trapezoid(spectra(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))

@@ -147,7 +147,7 @@ def _sweep(measured: Measured) -> Row:
 
 
 def _losses(measured: Measured) -> list[Row]:
-    """What each default loses at the middle tolerance."""
+    """Rows: loss of each default at the middle tolerance."""
     return [
         row
         for owner, p in measured.defaults.items()

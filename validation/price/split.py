@@ -1,4 +1,4 @@
-"""What a step in an engine is made of: the engine, the bridge to the forces, and the forces' own kernel.
+"""Parts of a step's time in an engine: the engine, the bridge to the forces, and the forces' own kernel.
 
 Three runs tell, which differ in the callback alone: an empty one (the engine), a cheap one, which is handed all
 positions and rates and hands back a damper's forces (more than that by the bridge), and the real one (the kernel).
@@ -168,7 +168,7 @@ def _named(saved: Saved) -> str:
 
 
 def table(data: list[Saved], problem: str) -> list[Table]:
-    """What a step of a problem is made of; nothing where it was not split."""
+    """Table of the parts of a step's time of a problem; none where the step was not split."""
     lines = []
     for saved in data:
         if saved["problem"] == problem:

@@ -57,7 +57,7 @@ def cheapest(measured: Measured) -> Table:
 
 
 def rounds_of(points: list[Point]) -> str:
-    """How many settings have how many rounds, and how far these wander."""
+    """Sentence: how many settings have how many timed rounds, and how far their seconds scatter."""
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
     numbers = Counter(map(len, in_rounds))
@@ -91,7 +91,7 @@ def _coarsest(least: Reach) -> str:
 
 
 def losses(measured: Measured) -> Table:
-    """What each engine's default method costs beside the cheapest one, for the same error."""
+    """Table of the cost of each engine's default method divided by the cheapest's, for the same error."""
     owners = measured.defaults
     rows = tuple(
         (
@@ -183,7 +183,7 @@ def _number(least: Reach | None, scale: float, form: str) -> str:
 
 
 def outcomes(measured: Measured) -> Table:
-    """How many settings of each engine ended in which way."""
+    """Table of how many settings of each engine ended in which way."""
     ended = Counter((p.setting.engine, status) for p in measured.points for status in ("", p.status))
     engines = dict.fromkeys(p.setting.engine for p in measured.points)
     rows = tuple((LABELS[engine], *(str(ended[engine, status]) for status in ("", *STATUSES))) for engine in engines)
@@ -196,7 +196,7 @@ def outcomes(measured: Measured) -> Table:
 
 
 def failures(measured: Measured) -> Table:
-    """Everything that gave no answer to rely on, with what was said."""
+    """Table of the settings without a reliable answer, with their messages."""
     labels_of = defaultdict(list)
     for p in measured.points:
         if p.status != "ok":

@@ -45,7 +45,7 @@ CHANGED = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4", "a")
 
 @dataclass(frozen=True)
 class Drawn:
-    """A scene with a question about it."""
+    """A drawn scene with a quantity and a tolerance to price."""
 
     scene: Scene
     quantity: str
@@ -54,8 +54,9 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of one recommended setting. errors in the quantity's unit; floor : how well the search knew the truth; slower :
-    than the engine's default that meets the tolerance, in force calls, or beyond doubt in seconds, as ``kind`` says."""
+    """Verdict on a recommended setting. errors in the quantity's unit; floor : how well the search knew the truth;
+    slower : than the engine's default that meets the tolerance, in force calls, or beyond doubt in seconds, as ``kind``
+    says."""
 
     title: str
     curve: str
@@ -69,7 +70,7 @@ class Verdict:
 
     @property
     def meets(self) -> bool:
-        """Whether the tolerance is held."""
+        """Whether the true error is within the tolerance."""
         return self.true <= self.tolerance
 
     @property
@@ -182,7 +183,7 @@ def judge(drawn: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
 def verdicts(
     drawn: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
 ) -> list[Verdict]:
-    """The same by what a function makes of the recommendation and its settings: the true error of each."""
+    """Verdicts on drawn recommendations, by a function that gives the true error of each recommended setting."""
     recommendation = recommend(priced(drawn.scene, drawn.quantity, engines), drawn.tolerance)
     errors = true(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))

@@ -1,4 +1,4 @@
-"""What the commands of a job answer: exit codes, messages, every array that they save or print; kept, and compared."""
+"""Answers of a job's commands: exit codes, messages, every array that they save or print; kept, and compared."""
 
 import csv
 import json
@@ -113,7 +113,7 @@ def _masked(text: str) -> str:
 
 
 def _saved(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
-    """Of all files but those that were given."""
+    """Arrays of all files in the folder but those that were given."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
         if read is not None and path.name not in given:
@@ -181,14 +181,15 @@ def load(folder: Path, name: str) -> Answer | None:
 
 @dataclass
 class Difference:
-    """What differs, a sentence each: ``wrong`` fails a replay, ``other`` (messages, new channels) is told."""
+    """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``other`` (messages, new channels) is
+    told."""
 
     wrong: list[str] = field(default_factory=list)
     other: list[str] = field(default_factory=list)
 
 
 def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, str]) -> Difference:
-    """Of an answer from a recorded one.
+    """Difference of an answer from a recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
     names of channels to later ones; a channel that is in another file now is looked for by its name.
@@ -222,7 +223,7 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
 
 
 def _changed(before: np.ndarray, now: np.ndarray, bound: float) -> str:
-    """What changed of an array, "" if nothing beyond the bound."""
+    """Text on the changes of an array, "" if none is beyond the bound."""
     if before.dtype.kind == now.dtype.kind == "U" and before.size == now.size == 1:
         return "" if before == now else f"{before} is {now}"
     if before.shape != now.shape or before.dtype != now.dtype:

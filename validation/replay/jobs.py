@@ -1,4 +1,4 @@
-"""What is recorded: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
+"""Jobs to record: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
 
 import copy
 import subprocess
@@ -39,7 +39,7 @@ class Job:
 
 
 def jobs(command: str) -> list[Job]:
-    """All of them; ``command``: the twinrig that lists the shipped scenes."""
+    """All jobs; ``command``: the twinrig that lists the shipped scenes."""
     return [Job("list", (("list",),)), *_shipped(command), *_written(), *_bases(), *_varied()]
 
 

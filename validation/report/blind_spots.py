@@ -42,7 +42,7 @@ def _told(line: Line) -> Saved:
 
 
 def _modules(lines: list[Line]) -> list[tuple[str, int, int, int]]:
-    """Of each module: functions, those that something independent notices, those that anything does."""
+    """Counts for each module: functions, those that something independent notices, those that anything does."""
     of: dict[str, list[Line]] = {}
     for line in lines:
         of.setdefault(line.function.partition(":")[0], []).append(line)

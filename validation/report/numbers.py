@@ -91,7 +91,8 @@ def powers(cell: Any) -> Markup:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
-    """Which columns of a table, ``count`` or more, hold numbers and go to the right; the first one never does."""
+    """Flags for the columns of a table, ``count`` or more, that hold numbers and go to the right; the first one never
+    does."""
     columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
     right = [all(map(NUMERIC.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column) for column in columns]
     return [False, *right[1:]]

@@ -93,7 +93,8 @@ def _cases(rows: list[Saved], seconds: dict[str, float], drawn: dict[str, Saved]
 
 
 def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
-    """How many rows of each case rest on which kind of second side; drawn : what is shown of each, by name."""
+    """Number of rows of each case by the kind of their second side; drawn : the shown tables and figures of each case,
+    by name."""
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
         kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]

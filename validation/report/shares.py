@@ -37,7 +37,7 @@ assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values())
 
 @cache
 def full() -> dict[str, Saved]:
-    """What the last full report had of each case: "rows" by system, "seconds", "commit"."""
+    """Shares of each case in the last full report: "rows" by system, "seconds", "commit"."""
     kept: dict[str, Saved] = json.loads(KEPT.read_text(encoding="utf-8"))
     return kept
 

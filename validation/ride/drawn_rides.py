@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from models.advice.ride_choice.in_time import InTime, in_time
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.reduced import FullScene
 from models.ride.covariance import FINITE, stationary
 from models.systems.ride.omissions import wheels_of
 from models.systems.ride.reduced_scene import ReducedScene
@@ -45,7 +45,7 @@ class Bent:
     tolerance: float
 
     def opened(self, copies: int = COPIES, seed: int = 1) -> InTime:
-        """As it is run, with so many copies."""
+        """The drawn ride as run in time, with so many copies."""
         options = {"copies": copies, "lasting": LASTING, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 
@@ -74,7 +74,7 @@ def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> D
     cutoff = draw.between(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
     scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
-    ride = stationary(Whole(scene, speed).full.system)
+    ride = stationary(FullScene(scene, speed).full.system)
     silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
     told = [n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent]
     count = min(len(told), int(rng.integers(1, 3)))

@@ -64,7 +64,7 @@ def _passed(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
 
 
 def measured() -> tuple[list[Row], list[dict[str, Any]]]:
-    """What measured roads are, and what cannot be told from them."""
+    """Rows: properties of measured roads, and what cannot be told from them."""
     data = data_folder()
     if data is None:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
@@ -97,7 +97,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
 
 
 def _shown(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
-    """What the figure and the table need."""
+    """Saved numbers for the figure and the table."""
     spectra = fitted.spectra
     some = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
     fits = [
@@ -123,7 +123,7 @@ def _verdict(resolved: bool, residual: float) -> str:
 
 
 def fits_table(roads: list[dict[str, Any]]) -> Table:
-    """Both processes of every road, with what is not known."""
+    """Table of both fitted processes of every road, with their uncertainty."""
     rows = []
     for road in roads:
         for process, unit, values in zip(("mean", "roll"), ("m", "1/m"), road["fits"], strict=True):

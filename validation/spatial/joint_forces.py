@@ -1,4 +1,4 @@
-"""What guides transmit, by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
+"""Forces in guides by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
 
 Here springs, mounts, bars and hubs are loads at their points, worked out from where MuJoCo says that these are; the
 chassis takes what they leave, so that they are forces inside. In Exudyn the bodies are free and their guides are
@@ -31,7 +31,8 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 
 
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """The same (guides, 6) in the axes of what carries each body, at rest; exact where at most one angle is free."""
+    """Forces and moments of guides (guides, 6) from Exudyn's constraints in the axes of what carries each body, at
+    rest; exact where at most one angle is free."""
     import exudyn as exu
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
@@ -124,11 +125,14 @@ class _Loaded:
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, chassis, spin, 0)
         for e in self.vehicle.elements:
             axis = turn @ e.axis
-            (from_point, fast_one), (two, fast_two) = self._point(e.one, e.point_one), self._point(e.two, e.point_two)
-            travel = axis @ (two - from_point) - e.axis @ (e.point_two - e.point_one)
+            (from_point, fast_one), (two, fast_two) = (
+                self._point(e.first_body, e.first_point),
+                self._point(e.second_body, e.second_point),
+            )
+            travel = axis @ (two - from_point) - e.axis @ (e.second_point - e.first_point)
             rate = axis @ (fast_two - fast_one - np.cross(spin[:3], two - from_point))
             force = (e.held + e.stiffness * travel + e.damping * rate) * axis
-            for body, place, part in ((e.one, from_point, force), (e.two, two, -force)):
+            for body, place, part in ((e.first_body, from_point, force), (e.second_body, two, -force)):
                 if body != self.vehicle.chassis:
                     self._add(body, place, part)
                     self._add(self.vehicle.chassis, place, -part)

@@ -42,7 +42,8 @@ def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) ->
 
 
 def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
-    """The same of compiled forces and of ``SpatialReference``, which share no code, without hub forces."""
+    """Largest relative difference between accelerations by compiled forces and by ``SpatialReference``, which share no
+    code, without hub forces."""
     still = Drive(0.0 * static(vehicle, 3).hubs)
     compiled, equations = HubModel("reference", vehicle, still, STEP, STEP), written(vehicle)
     paths = [

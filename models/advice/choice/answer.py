@@ -1,4 +1,4 @@
-"""What a run of any scene answered, as numbers that two runs can be compared by, and what it cost."""
+"""Results of any scene as numbers by which two runs can be compared, and the cost of the run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np
 
 @dataclass(frozen=True)
 class Quantity:
-    """Its unit and its values in every case.
+    """A quantity's unit and its values in every case.
 
     sampled : cases are mean squares (m,) of samples that know nothing of each other; it is the root of their mean.
     """
@@ -31,7 +31,7 @@ class Quantity:
 
     @property
     def sizes(self) -> np.ndarray:
-        """What its changes are relative to, case by case."""
+        """Sizes to which changes of the quantity are relative, case by case."""
         return np.sqrt([case.mean() for case in self.cases]) if self.sampled else sizes(self.cases)
 
 
@@ -59,7 +59,7 @@ class Answer:
 
 
 def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
-    """What changes are relative to, case by case: the standard deviation of a path, the magnitude of a number.
+    """Sizes to which changes are relative, case by case: the standard deviation of a path, the magnitude of a number.
 
     A case that hardly moves beside the others is held to what it is of them.
     """

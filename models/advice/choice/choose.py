@@ -95,10 +95,10 @@ class Chooser:
         self.whole = Screen(Variants(scene, engine), quantities)
         self.alike = self.whole.sampled == set(quantities)
         part = self._part(window)
-        self.own, self.error = self._steps(part)
+        self.step_factor, self.error = self._steps(part)
         self.teller = self._coarse(self.whole)
         self.screen = self._coarse(part) if self.alike else self.teller
-        self.lengths = [self.own * k for k in self.screen.variants.lengths()]
+        self.lengths = [self.step_factor * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
         self._reach: dict[Set, int] = {}
         self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
@@ -114,17 +114,17 @@ class Chooser:
         return self.whole if part is whole else Screen(part, self.whole.quantities)
 
     def _coarse(self, screen: Screen) -> Screen:
-        """In the steps of the screen."""
+        """The screen of the scene in the screen's longer steps."""
         runs = screen.variants
-        coarse = Variants(runs.changed(frozenset(), self.own), runs.engine)
-        return screen if self.own == 1 else Screen(coarse, screen.quantities)
+        coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine)
+        return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
-    def _steps(self, part: Screen) -> tuple[int, np.ndarray]:
+    def _steps(self, screen: Screen) -> tuple[int, np.ndarray]:
         """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
         whole = self.whole.variants
-        lengths = [k for k in whole.lengths() if k in part.variants.lengths()]
+        lengths = [k for k in whole.lengths() if k in screen.variants.lengths()]
         allowed = (ROUGH if self.alike else FINE) * self.tolerance
-        longest, error = self._longest(part, frozenset(), lengths, allowed)
+        longest, error = self._longest(screen, frozenset(), lengths, allowed)
         while whole.of(times=longest) is None:  # its run fails after that part
             longest = max(k for k in lengths if k < longest)
         return longest, error
@@ -162,8 +162,8 @@ class Chooser:
         return self._reach[chosen]
 
     def work(self, chosen: Set) -> float:
-        """Of a run without these effects, at the longest step; infinite if it fails."""
-        return self.screen.variants.work(chosen, self.reach(chosen) // self.own)
+        """Work of a run without these effects, at the longest step; infinite if it fails."""
+        return self.screen.variants.work(chosen, self.reach(chosen) // self.step_factor)
 
     def confirm(self, chosen: Set) -> np.ndarray:
         """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so; what chance
@@ -272,7 +272,7 @@ class Chooser:
             return screen.predicted(chosen)
         shorter = [k for k in reversed(runs.lengths()) if times % k == 0 and (SHARPER * k <= times or k == 1)]
         step = screen.between(runs.of(chosen, times), next(filter(None, (runs.of(chosen, k) for k in shorter)), None))
-        if change is None or step is None or times % self.own:
+        if change is None or step is None or times % self.step_factor:
             return screen.predicted(chosen) + screen.shares(step)
         return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
 
@@ -280,7 +280,7 @@ class Chooser:
         """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
 
         Only those that may go, and whose going would save anything at the same step."""
-        shares, times = {}, self.reach(chosen) // self.own
+        shares, times = {}, self.reach(chosen) // self.step_factor
         for effect in self.effects:
             further = chosen | {effect}
             if effect not in chosen and self.screen.variants.work(further, times) < self.work(chosen):

@@ -1,4 +1,4 @@
-"""What leaving effects out changes, predicted from runs without one and without two of them.
+"""Changes by leaving effects out, predicted from runs without each and without each two of them.
 
 With y(S) the quantities' paths without the effects S, to the second order
 
@@ -64,11 +64,11 @@ class Screen:
         return self._judged(change)[0]
 
     def chance(self, change: Changes | None) -> np.ndarray:
-        """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
+        """Chance error of predicted changes (quantities,): zero where a quantity is no mean of samples."""
         return self._judged(change)[1]
 
     def _judged(self, change: Changes | None) -> np.ndarray:
-        """Both (2, quantities)."""
+        """Relative change and its chance error (2, quantities)."""
         if change is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
@@ -83,9 +83,9 @@ class Screen:
         """d of an effect."""
         return self.change(frozenset([effect]))
 
-    def second(self, first: str, two: str) -> Changes | None:
+    def second(self, first: str, second_effect: str) -> Changes | None:
         """e of a pair."""
-        sets = map(frozenset, ((first, two), (first,), (two,)))
+        sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
         both, *singles = (self.change(effects) for effects in sets)
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:
@@ -106,7 +106,8 @@ class Screen:
         return self.shares(self.change(chosen)) if chosen else np.zeros(len(self.quantities))
 
     def remainder(self, chosen: Set) -> np.ndarray:
-        """What third and higher orders may add (quantities,): the second, by as much as it lies below the first."""
+        """Bound on changes of third and higher orders (quantities,): the second, by as much as it lies below the
+        first."""
         none = np.zeros(len(self.quantities))
         if len(chosen) <= 2:
             return none

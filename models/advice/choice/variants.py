@@ -71,7 +71,7 @@ class Variants:
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Effects that it does not name."""
+        """Effects that the scene does not name."""
         return tuple(self.scene.absent) if self._opened else absent(self.scene)
 
     def beside(self, name: str) -> Any:
@@ -79,7 +79,7 @@ class Variants:
         return self.scene.beside(name) if self._opened else beside(self.scene, name)
 
     def says(self, name: str) -> str:
-        """What an effect is, or what leaving it out means."""
+        """Sentence on what an effect is, or what leaving it out means."""
         told = self.scene.said if self._opened else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
@@ -126,8 +126,8 @@ class Variants:
         return rebuilt(table, scene)
 
     def work(self, left_out: Set, times: int = 1) -> float:
-        """Of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through, and
-        one for each effect that is left; infinite where there is no run."""
+        """Work of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through,
+        and one for each effect that is left; infinite where there is no run."""
         run = self.of(left_out, times)
         if run is None:
             return math.inf
@@ -146,7 +146,7 @@ class Variants:
         return self._costs[left_out]
 
     def lengths(self) -> list[int]:
-        """How many times as long a step may be, as far as whole numbers of them make up the run."""
+        """Factors by which a step may be longer, such that whole numbers of steps make up the run."""
         count = self.system.parts(self.scene)
         return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 

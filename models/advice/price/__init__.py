@@ -35,7 +35,7 @@ class Ladder:
         return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
 
     def work(self, before: float, now: float) -> float:
-        """How many times the work of one value another one takes: cells lie along and across."""
+        """Ratio of the work at one setting's value to that at another: cells lie along and across."""
         return 1.0 if self.adaptive else (before / now) ** (2 if self.cells else 1)
 
 
@@ -43,7 +43,7 @@ class InCells(Setting):
     """One whose value is the share of a contact's length that a cell has."""
 
     def label(self) -> str:
-        """How many cells lie along the contact."""
+        """Number of cells along the contact, as text."""
         return f"{round(1.0 / self.value)} cells"
 
 
@@ -57,21 +57,21 @@ class Answer:
 
 
 class OwnScene(Protocol):
-    """What the search asks of a scene."""
+    """Protocol of a priced scene, which the search for settings uses."""
 
     @property
     def title(self) -> str:
-        """Of the scene."""
+        """Title of the scene."""
         ...
 
     @property
     def quantity(self) -> str:
-        """What the tolerance is set on."""
+        """The quantity that the tolerance is set on."""
         ...
 
     @property
     def unit(self) -> str:
-        """Of the quantity."""
+        """Unit of the quantity."""
         ...
 
     @property
@@ -81,7 +81,7 @@ class OwnScene(Protocol):
 
     @property
     def first(self) -> float:
-        """Length of the part that is searched, s."""
+        """Length (s) of the first part of the run, in which settings are searched."""
         ...
 
     @property
@@ -91,7 +91,7 @@ class OwnScene(Protocol):
 
     @property
     def note(self) -> str:
-        """What is left out, "" if nothing is."""
+        """Text on what the price leaves out, "" if nothing."""
         ...
 
     @property

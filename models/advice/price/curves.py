@@ -1,4 +1,4 @@
-"""What a work-precision curve says: its order, which curves coincide, and what an error costs on it."""
+"""Figures of a work-precision curve: its order, which curves coincide, and the cost of an error on it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
 
 @dataclass(frozen=True)
 class Reach:
-    """What it takes to meet a tolerance: cost, the setting's value, and how both were found.
+    """Cost of meeting a tolerance: cost, the setting's value, and how both were found.
 
     "tried" : the first setting that does, nothing in between; "coarsest" : already the coarsest setting
     does; "extrapolated" : not even the finest does.

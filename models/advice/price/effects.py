@@ -62,7 +62,8 @@ class Price:
 
 @dataclass(frozen=True)
 class PriceList:
-    """Of a scene in one implementation. each : steps of one run, at most, of the ``whole`` ones that it may have.
+    """Price list of a scene's effects in an implementation. each : steps of one run, at most, of the ``whole`` ones
+    that it may have.
 
     micros : CPU microseconds of a step of the scene as it is, median and median absolute deviation.
     """
@@ -143,15 +144,15 @@ def _price(
     variants: Variants,
     name: str,
     base: Answer,
-    other: Answer | None,
+    other_answer: Answer | None,
     took: np.ndarray | None,
     unchanged: np.ndarray,
     why: str,
 ) -> Price:
     there, says = name in variants.effects, variants.says(name)
-    if other is None or took is None:
+    if other_answer is None or took is None:
         return Price(name, there, says, why)
-    before, after = (other, base) if there else (base, other)
+    before, after = (other_answer, base) if there else (base, other_answer)
     slow, fast = (unchanged, took) if there else (took, unchanged)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in after.quantities if key not in before.quantities)
@@ -163,13 +164,13 @@ def _price(
         (before.counts, after.counts),
         spread(slow - fast),
         paired_ratio(*seconds),
-        _changes(base, other),
+        _changes(base, other_answer),
         gone,
     )
 
 
 def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
-    """Of what both have, by the scene's own size."""
+    """Changes of the quantities that both runs have, relative to the scene's size."""
     changed = []
     for name, quantity in base.quantities.items():
         if name in other.quantities:

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.advice.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
 from models.advice.ride_choice.march import cost
-from models.advice.ride_choice.reduced import Reduced, Whole
+from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import confirmed
 from models.core.errors import InputError
 from models.core.runge_kutta import step_on
@@ -30,7 +30,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()
     with told_by(scene):
-        whole = Whole(ReducedScene.whole(scene), float(speeds[len(speeds) // 2]))
+        whole = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
         effects = effects_of(whole.scene)
         rests = {effect.name: _rest(whole, effect) for effect in effects}
     more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
@@ -50,13 +50,13 @@ def price_list_of_ride(scene: Any) -> PriceList:
     )
 
 
-def _rest(whole: Whole, effect: Effect) -> Reduced | str:
+def _rest(full_scene: FullScene, effect: Effect) -> Reduced | str:
     """The scene without an effect, or why there is none."""
     why = illegal([effect])
     if why:
         return why
     try:
-        return whole.reduced(without(whole.scene, [effect]))
+        return full_scene.reduced(without(full_scene.scene, [effect]))
     except InputError as error:
         return error.allowed
 
@@ -64,7 +64,7 @@ def _rest(whole: Whole, effect: Effect) -> Reduced | str:
 def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
     """The scene with one more effect at its usual values, or why there is none."""
     try:
-        return Whole(ReducedScene.whole(beside(scene, name)), speed).full
+        return FullScene(ReducedScene.complete(beside(scene, name)), speed).full
     except InputError as error:
         return error.allowed
 
@@ -95,12 +95,12 @@ def _timed(A: np.ndarray) -> float:
 
 
 def _price(
-    whole: Whole, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray], there: bool = True
+    full_scene: FullScene, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray], there: bool = True
 ) -> Price:
-    """Of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
+    """Price of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
     if isinstance(other, str):
         return Price(name, there, says, other)
-    without_it, with_it = ((other, micros[name]), (whole.full, micros[""]))[:: 1 if there else -1]
+    without_it, with_it = ((other, micros[name]), (full_scene.full, micros[""]))[:: 1 if there else -1]
     gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
     return Price(
         name,
@@ -110,19 +110,19 @@ def _price(
         (_counts(without_it[0]), _counts(with_it[0])),
         spread(with_it[1] - without_it[1]),
         paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
-        _changes(whole, other),
+        _changes(full_scene, other),
         gone,
     )
 
 
-def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
+def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[Changed, ...]:
     """Standard deviations, exact; infinite where white noise reaches a quantity."""
-    names = whole.full.system.names
-    units = [output.unit for output in whole.linear.outputs]
+    names = full_scene.full.system.names
+    units = [output.unit for output in full_scene.linear.outputs]
     units += ["m/s^2"] * (len(names) - len(units))  # weighted accelerations come last
     try:
         with np.errstate(invalid="ignore"):
-            full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (whole.full, rest))
+            full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (full_scene.full, reduced))
     except InputError:
         return ()
     changes = [

@@ -16,7 +16,7 @@ NOTHING = 1e-12
 
 
 def lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    """What the scene costs, then every effect with what it costs and changes."""
+    """Lines of text: the cost of the scene, then every effect with its cost and its changes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
@@ -46,7 +46,7 @@ def _micros(spread: tuple[float, float]) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """So many digits, without an exponent where a number is large."""
+    """A number with so many digits, without an exponent where a number is large."""
     large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
@@ -66,7 +66,7 @@ def _price(price: Price, quantities: list[str]) -> list[str]:
 
 
 def _counts(price: Price) -> str:
-    """Counts that it changes."""
+    """Text of the counts that an effect changes."""
     before, after = price.counts
     told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
     return "; " + ", ".join(told) if told else ""
@@ -88,7 +88,7 @@ def _changed(change: Changed) -> str:
 
 
 def as_dict(prices: PriceList) -> dict[str, Any]:
-    """All of it as JSON keeps it; None for what is not finite."""
+    """The price list as plain values for JSON; None for what is not finite."""
     plain: dict[str, Any] = _plain(asdict(prices))
     return plain
 

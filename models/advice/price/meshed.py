@@ -1,4 +1,4 @@
-"""What scenes have in common whose contacts are cut into cells: settings are steps and cells of any engine's RK4."""
+"""Common part of scenes whose contacts are cut into cells: settings are steps and cells of any engine's RK4."""
 
 import math
 from abc import ABC, abstractmethod
@@ -26,15 +26,15 @@ TIGHT = 1e-8
 """Relative tolerance of the second solver, which has its own steps."""
 
 
-def first_part(whole: float, most: float) -> float:
+def first_part(duration: float, longest: float) -> float:
     """A whole part of a run (s), at most so long (s)."""
-    return whole / math.ceil(whole / most * (1 - 1e-9))
+    return duration / math.ceil(duration / longest * (1 - 1e-9))
 
 
 @dataclass(frozen=True)
 class Meshed(ABC):
-    """See ``models.advice.price.OwnScene``. own : engine of the reference; step : the scene's (s); longest :
-    step (s) of the reference's first rung; cells : the scene's, 0 where its contacts have none."""
+    """See ``models.advice.price.OwnScene``. reference_engine : that runs the reference; step : the scene's (s); longest
+    : step (s) of the reference's first rung; cells : the scene's, 0 where its contacts have none."""
 
     title: str
     quantity: str
@@ -43,7 +43,7 @@ class Meshed(ABC):
     whole: float
     first: float
     engines: tuple[str, ...]
-    own: str
+    reference_engine: str
     step: float
     longest: float
     cells: int
@@ -55,7 +55,7 @@ class Meshed(ABC):
 
     @abstractmethod
     def exact(self, cells: int, step: float, duration: float) -> Any:
-        """A run by DOP853 about the accelerations of ``own``, with rows every ``step`` (s)."""
+        """A run by DOP853 about the accelerations of ``reference_engine``, with rows every ``step`` (s)."""
 
     @abstractmethod
     def read(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
@@ -92,8 +92,15 @@ class Meshed(ABC):
     def reference(self) -> Ladder:
         """Twice the cells on every rung and half the step on every second; or half the step alone."""
         if not self.cells:
-            return Ladder(self.own, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4)
-        return Ladder(self.own, TOGETHER, tuple(1.0 / (ROUGH * 2**k) for k in range(DOUBLED)), 2, cells=True, sure=SURE)
+            return Ladder(self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4)
+        return Ladder(
+            self.reference_engine,
+            TOGETHER,
+            tuple(1.0 / (ROUGH * 2**k) for k in range(DOUBLED)),
+            2,
+            cells=True,
+            sure=SURE,
+        )
 
     def second(self, last: Setting) -> Setting | None:
         """DOP853; None where there are cells, for all solvers share the error that these have."""
@@ -131,7 +138,7 @@ def chosen(quantity: str, known: dict[str, Any]) -> str:
 
 
 def part_of(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
-    """Which of a scene's runs is asked about, and for what: RUN.QUANTITY, of the first run where none is named."""
+    """The run and the quantity of a scene that a user names: RUN.QUANTITY, of the first run where none is named."""
     name, _, asked = (quantity or usual).rpartition(".")
     name = name or next(iter(runs))
     if name not in runs:

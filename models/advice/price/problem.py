@@ -1,4 +1,4 @@
-"""What the work-precision runner asks of a problem, and one way to solve it."""
+"""Protocols of a work-precision problem and of one way to solve it."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -47,7 +47,7 @@ class Solver(Protocol):
 
 
 class Problem(Protocol):
-    """What the runner asks of a problem.
+    """Protocol of a problem that the work-precision runner measures.
 
     key : part of the rows' names; title : what is computed; note : what a reader of its figure must know;
     duration : of the run, s; units : unit of each error, the quantity that

@@ -101,7 +101,7 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnSce
     """A scene as its system's file gives it to the search; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
-        priceable: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
+        priceable: OwnScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
         return priceable
     package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
     why = getattr(package, "NO_PRICE", "has no steps to choose")
@@ -147,7 +147,7 @@ def _timed(search: Search) -> list[Choice]:
 
 
 def _rivals(attempts: list[Tried]) -> list[Tried]:
-    """Those that may be an engine's fastest, or the fastest of all, where there is more than one."""
+    """The settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
     rivals = dict[Tried, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
         alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
@@ -287,7 +287,7 @@ def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tup
 
 
 def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
-    """What the engine's default does as it comes, and what it takes to meet the tolerance."""
+    """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
     if not tried:

@@ -66,7 +66,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Loss:
-    """How many times the cheapest setting's cost a default method takes for the same error.
+    """Cost of a default method divided by that of the cheapest setting, for the same error.
 
     factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``Reach``, for the
     default's side.
@@ -95,12 +95,12 @@ class Measured:
 
     @property
     def quantity(self) -> str:
-        """What tolerances are set on."""
+        """The quantity that tolerances are set on."""
         return next(iter(self.units))
 
     @property
     def unit(self) -> str:
-        """Of that quantity."""
+        """Unit of the quantity that tolerances are set on."""
         return self.units[self.quantity]
 
     @property
@@ -110,7 +110,7 @@ class Measured:
 
     @property
     def costs(self) -> tuple[str, str]:
-        """What work is counted in, and seconds."""
+        """Names of the two costs: the unit of counted work, and seconds."""
         return next(kind for kind in WORK if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
@@ -119,7 +119,7 @@ class Measured:
         return {p.setting.default: p for p in self.points if p.setting.default}
 
     def error(self, p: Point) -> float:
-        """Of the quantity that tolerances are set on."""
+        """Error of a point in the quantity that tolerances are set on."""
         return p.errors[self.quantity]
 
     def floor(self, quantity: str = "") -> float:
@@ -168,7 +168,7 @@ class Measured:
         return wrong
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
-        """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
+        """Cost at which each curve meets ``target``, in one of ``costs``; curves that do not meet it are left out."""
         reaches = {
             curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
@@ -240,7 +240,7 @@ TUPLES = ("seconds", "broken")
 
 
 def of_saved(saved: dict[str, Any]) -> Measured:
-    """The same from what ``dataclasses.asdict`` made of it."""
+    """A ``Measured`` from the dictionary that ``dataclasses.asdict`` made of it."""
     points = [
         Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLES})
         for p in saved["points"]

@@ -69,7 +69,7 @@ class Search:
         return self
 
     def attempt(self, setting: Setting) -> Tried:
-        """Try one setting, and keep what became of it."""
+        """Try a setting, and keep its result."""
         begun = time.process_time()
         try:
             with breaches() as broken:
@@ -118,7 +118,7 @@ class Search:
                 low = i + 1
 
     def meeting(self, engine: str = "") -> list[Tried]:
-        """Those that meet the tolerance, of one engine or of all."""
+        """The tried settings that meet the tolerance, of one engine or of all."""
         return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
     def meets(self, attempt: Tried) -> bool:

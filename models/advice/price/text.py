@@ -102,7 +102,7 @@ def _defaults(recommendation: Recommendation) -> list[str]:
 
 
 def _lost(recommendation: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
-    """What the default method costs beside the engine's cheapest and the cheapest of all, once refined."""
+    """Text: cost of the refined default method beside the engine's cheapest setting and the cheapest of all."""
     if refined is None:
         return "; no step tried gives an answer"
     parts = [
@@ -136,7 +136,7 @@ def _failures(tried: tuple[Tried, ...]) -> list[str]:
 
 
 def _into_the_scene(recommendation: Recommendation) -> list[str]:
-    """What to write into the scene to have the recommended setting."""
+    """Lines of a scene file that give the recommended setting."""
     best = recommendation.winners.get(("", "seconds"))
     if best is None:
         return []
@@ -144,7 +144,7 @@ def _into_the_scene(recommendation: Recommendation) -> list[str]:
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:
-    """All of it as JSON keeps it."""
+    """The recommendation as plain values for JSON."""
     scene = recommendation.scene
     return {
         "scene": scene.title,

@@ -1,4 +1,4 @@
-"""What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
+"""The true value of a scene's quantity: a reference refined until it no longer matters, and how well it is known."""
 
 import time
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ class Truth:
     broken: tuple[Broken, ...] = ()
 
     def beside(self, broken: Mapping[str, Broken]) -> list[Broken]:
-        """Of assumptions by name, those that the reference keeps."""
+        """The broken assumptions that the reference keeps."""
         known = {assumption.name for assumption in self.broken}
         return [assumption for name, assumption in broken.items() if name not in known]
 

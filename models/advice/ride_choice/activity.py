@@ -10,23 +10,28 @@ Activity knows nothing of the question asked, and ranks elements one by one.
 
 import numpy as np
 
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.reduced import FullScene
 from models.ride.covariance import stationary
 from models.vehicles.spatial import FREEDOMS
 from models.vehicles.spatial_linear import Kinematics, slopes_at_rest
 
 
-def activity(whole: Whole) -> dict[str, float]:
+def activity(full_scene: FullScene) -> dict[str, float]:
     """Watts by element: springs, dampers, bars, tyres, and every body's inertia along and about each axis.
 
     A wheel that meets white noise through a damped tyre has an acceleration without variance: its inertia is inf.
     """
-    vehicle, system, n, states = whole.scene.vehicle, whole.full.system, len(whole.linear.mass), whole.full.states
+    vehicle, system, n, states = (
+        full_scene.scene.vehicle,
+        full_scene.full.system,
+        len(full_scene.linear.mass),
+        full_scene.full.states,
+    )
     P, A, motion = stationary(system).P[:states, :states], system.A[:states, :states], Kinematics(vehicle)
     noise, watts = np.hstack([b[n : 2 * n] for b in system.B]), dict[str, float]()
 
     def elastic(name: str, k: float, c: float, row: np.ndarray, road: np.ndarray | float = 0.0) -> None:
-        """Of a deflection: its coordinates' row, less a road height's."""
+        """Add the watts of an elastic deflection: its row of coordinates, less a road height's."""
         u = np.concatenate([row, np.zeros(states - n)]) - road
         s_u, s_v = _deviation(u, P), _deviation(u @ A, P)
         if k:
@@ -35,12 +40,14 @@ def activity(whole: Whole) -> dict[str, float]:
             watts[f"damper {name}"] = c * s_v**2
 
     for spring in vehicle.springs:
-        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+        apart = motion.shift(spring.second_body, spring.second_point) - motion.shift(
+            spring.first_body, spring.first_point
+        )
         elastic(spring.name, *slopes_at_rest(spring), np.array(spring.axis) @ apart)
     for bar in vehicle.bars:
         risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
         elastic(bar.name, bar.stiffness, bar.damping, motion.coordinate(bar.body, "rx") - risen / bar.track)
-    heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *whole.excitation.heights])
+    heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *full_scene.excitation.heights])
     for tyre, height in zip(vehicle.tyres, heights, strict=True):
         row = motion.shift(tyre.body, tyre.point)[2]
         elastic(f"tyre {tyre.name}", tyre.stiffness, tyre.damping, row, height)

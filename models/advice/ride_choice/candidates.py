@@ -1,4 +1,4 @@
-"""What any set of effects changes and costs that a scene's quantities may do without: predicted, confirmed, looked at
+"""Changes and savings by leaving out any set of effects of a ride: predicted, confirmed, examined
 nearby, and run."""
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import Reduced, Whole
+from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import Screen, confirmed, silent
 from models.core.errors import InputError
 from models.core.runge_kutta import STAGES
@@ -49,7 +49,7 @@ class Candidates:
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
         self.answers: dict[tuple[Any, ...], Any] = {}
-        self.wholes = [Whole(scene, float(speed)) for speed in speeds]
+        self.wholes = [FullScene(scene, float(speed)) for speed in speeds]
         names = self.wholes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
@@ -65,9 +65,9 @@ class Candidates:
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
-        """Those of a scene that asks for a choice."""
+        """The candidate effects of a scene that asks for a choice."""
         assert ride.speeds is not None and ride.tolerance is not None
-        return cls(ReducedScene.whole(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
+        return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
     def _plain(self, quantity: str) -> tuple[int, str]:
         """Row of the vehicle's output, and its weighting or ""."""
@@ -76,26 +76,26 @@ class Candidates:
         return [output.name for output in self.scene.vehicle.outputs].index(name), by
 
     def rest(self, chosen: Set) -> ReducedScene:
-        """The scene less these effects."""
+        """The reduced scene without these effects."""
         return without(self.scene, sorted(chosen, key=lambda effect: effect.name))
 
     @remembered
-    def system(self, whole: Whole, chosen: Set) -> Reduced | None:
-        """The scene less these effects at a speed; None where nothing sensible is left."""
+    def system(self, full_scene: FullScene, chosen: Set) -> Reduced | None:
+        """System matrices of the scene without these effects at a speed; None where no sensible vehicle remains."""
         try:
-            return whole.reduced(self.rest(chosen))
+            return full_scene.reduced(self.rest(chosen))
         except InputError:
             return None
 
-    def screen(self, whole: Whole, chosen: Set) -> Screen | None:
+    def screen(self, full_scene: FullScene, chosen: Set) -> Screen | None:
         """Covariance and adjoints of the scene less the singular ones of these effects."""
         base = frozenset(effect for effect in chosen if effect.singular)
         needs = {name for effect in base for name in effect.needs}
-        return self._screen(whole, base | {effect for effect in chosen if effect.name in needs})
+        return self._screen(full_scene, base | {effect for effect in chosen if effect.name in needs})
 
     @remembered
-    def _screen(self, whole: Whole, base: Set) -> Screen | None:
-        reduced = self.system(whole, base)
+    def _screen(self, full_scene: FullScene, base: Set) -> Screen | None:
+        reduced = self.system(full_scene, base)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
         except InputError:
@@ -107,29 +107,29 @@ class Candidates:
         return self._worst(self.screened, chosen, self._predict)
 
     def confirm(self, chosen: Set) -> np.ndarray:
-        """The same by the exact solve, of all listed speeds."""
+        """Relative changes by leaving effects out, from the exact solve at all listed speeds."""
         return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
 
     def certified(self, chosen: Set) -> np.ndarray:
-        """What ``confirm`` finds; inf where it holds the tolerance, but the identity of covariance and adjoint, which
+        """Changes by ``confirm``; inf where it holds the tolerance, but the identity of covariance and adjoint, which
         certifies it, is not exact at a screened speed."""
         changes = self.confirm(chosen)
         exact = not self.holds(changes) or all(self._exact(whole, chosen) for whole in self.screened)
         return changes if exact else np.full(len(changes), inf)
 
-    def _exact(self, whole: Whole, chosen: Set) -> bool:
-        screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
+    def _exact(self, full_scene: FullScene, chosen: Set) -> bool:
+        screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, chosen)
         if screen is None or reduced is None:
             return False
         two, variance = screen.identity(reduced)
         return bool((abs(two / variance - 1.0) <= CERTAIN).all())
 
-    def _predict(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
-        screen = self.screen(whole, chosen)
+    def _predict(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+        screen = self.screen(full_scene, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
     def _worst(
-        self, wholes: Sequence[Whole], chosen: Set, variances: Callable[[Whole, Set, Reduced], np.ndarray]
+        self, wholes: Sequence[FullScene], chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
     ) -> np.ndarray:
         changes = []
         for whole in wholes:
@@ -150,7 +150,7 @@ class Candidates:
 
     @remembered
     def off(self, chosen: Set) -> np.ndarray:
-        """The same with parameters off, in the corner that is worst for each quantity."""
+        """Relative changes with parameters varied to the corner that is worst for each quantity."""
         rest = self.rest(chosen)
         return largest(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 
@@ -165,14 +165,16 @@ class Candidates:
 
     @remembered
     def cost(self, chosen: Set) -> Cost:
-        """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
+        """Cost of a run without these effects at the longest stable step of the dearest screened speed; infinite where
+        no sensible vehicle remains."""
         systems = [self.system(whole, chosen) for whole in self.screened]
         costs = (Cost(0, 0.0, inf) if system is None else cost(system) for system in systems)
         return max(costs, key=lambda c: c.calls)
 
     @remembered
     def accurate(self, chosen: Set) -> Cost:
-        """At the longest step that keeps the tolerance at all screened speeds, what is left out and steps together."""
+        """Cost of a run at the longest step that keeps the tolerance at all screened speeds, what is left out and steps
+        together."""
         return self.at_step(chosen, longest_step(self.marches(chosen), self.exact(), self.tolerance))
 
     def exact(self) -> list[np.ndarray]:
@@ -191,5 +193,5 @@ class Candidates:
 
 
 def largest(changes: np.ndarray) -> np.ndarray:
-    """Of changes (n, quantities) the largest of each quantity, with its sign."""
+    """The largest change of each quantity among changes (n, quantities), with its sign."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

@@ -75,7 +75,7 @@ class Chooser(Candidates):
 
     @cached_property
     def singles(self) -> list[Set]:
-        """Every effect with those that it needs."""
+        """Sets of an effect with all effects that it needs."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
@@ -94,7 +94,8 @@ class Chooser(Candidates):
         return not why
 
     def _cancels(self, chosen: Set) -> str:
-        """Which effect alone, or which one's coming back, breaks the tolerance that all together keep; or empty.
+        """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
+        is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
@@ -138,7 +139,7 @@ class Chooser(Candidates):
         )
 
     def _reasons(self, chosen: Set) -> tuple[str, ...]:
-        """Of the larger sets that kept the tolerance as they stood, and were refused all the same."""
+        """Reasons why larger sets that kept the tolerance were refused."""
         larger = {refused - chosen: why for refused, why in self.refused.items() if refused - chosen}
         return tuple(
             f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
@@ -166,9 +167,9 @@ class Chooser(Candidates):
         return kept[-1], rounds
 
     def _worthwhile(self, chosen: Set) -> Set:
-        """Less every effect that may come back for hardly more calls at equal accuracy, or without a shorter stable
-        step: calls that are fewer then are so because errors of what is left out and of steps make up for each other.
-        """
+        """The choice without every effect that may come back for hardly more calls at equal accuracy, or without a
+        shorter stable step: calls that are fewer then are so because errors of what is left out and of steps make up
+        for each other."""
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
             if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
@@ -209,7 +210,8 @@ class Chooser(Candidates):
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _steps(self) -> list[Set]:
-        """These, and where white noise would pass, the same with damping of the tyres, by which it comes."""
+        """The smallest sets that can be left out; those that let white noise pass, also with the tyres' damping,
+        through which it enters."""
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
         return self.singles + [step | damping for step in white]

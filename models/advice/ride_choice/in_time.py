@@ -35,7 +35,7 @@ ROOM = 3e8
 
 
 class Samples(Strict):
-    """What a scene's [options] say of its copies."""
+    """Number and length of the copies by a scene's [options]."""
 
     copies: int = Field(default=48, ge=FEWEST, le=100_000, description="of the vehicle, each on a road of its own")
     lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
@@ -44,8 +44,8 @@ class Samples(Strict):
 
 @dataclass(frozen=True)
 class Pace:
-    """At one speed (m/s): the road's ``half`` step (s), steps before outputs count and while they do, and how the bent
-    springs of the whole vehicle move."""
+    """Time steps of the copies at a speed (m/s): the road's ``half`` step (s), steps before outputs count and while
+    they do, and how the bent springs of the whole vehicle move."""
 
     speed: float
     half: float
@@ -55,7 +55,7 @@ class Pace:
 
     @property
     def steps(self) -> int:
-        """Of a copy."""
+        """Number of steps of a copy."""
         return self.settling + self.counted
 
 
@@ -83,7 +83,7 @@ class InTime:
 
     @property
     def said(self) -> dict[str, str]:
-        """What leaving each of all effects out means."""
+        """Sentences on what leaving out each effect means."""
         return {effect.name: effect.says for effect in self.effects}
 
     @property
@@ -92,18 +92,18 @@ class InTime:
         return absent(self.scene.ride)
 
     def beside(self, name: str) -> "InTime":
-        """With one of these at its usual values; InputError where it cannot be."""
-        scene = ReducedScene.whole(beside(self.scene.ride, name))
+        """The scene with an absent effect at its usual values; InputError where the effect cannot be added."""
+        scene = ReducedScene.complete(beside(self.scene.ride, name))
         _check(scene)
         return replace(self, scene=scene)
 
     @property
     def steps(self) -> int:
-        """Of all copies at all speeds."""
+        """Number of steps of all copies at all speeds."""
         return self.samples.copies * sum(pace.steps for pace in self.paces) // self.times
 
     def without(self, names: Iterable[str]) -> "InTime":
-        """Less these effects; InputError where they may not go."""
+        """The scene without these effects; InputError where they may not be left out."""
         left_out = self.left_out | set(names)
         chosen = [effect for effect in self.effects if effect.name in left_out]
         why = illegal(chosen)
@@ -113,11 +113,11 @@ class InTime:
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
     def longer(self, times: int) -> "InTime":
-        """With steps so many times as long."""
+        """The scene in steps so many times as long."""
         return replace(self, times=self.times * times)
 
     def fewer(self, steps: int) -> "InTime":
-        """With as many copies as take about so many steps, and no fewer than tell a standard error."""
+        """The scene with as many copies as take about so many steps, and no fewer than tell a standard error."""
         copies = max(FEWEST, -(-self.samples.copies * steps // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
@@ -126,7 +126,7 @@ class InTime:
         return self.scene.excitation()
 
     def vehicle(self, pace: Pace) -> SpatialVehicle:
-        """What is left of the vehicle at a speed; InputError where a run in time cannot do without it."""
+        """The vehicle without the effects at a speed; InputError where a run in time needs an effect."""
         return left(self.scene, pace.springs)
 
     def roads(self, pace: Pace) -> np.ndarray:
@@ -149,7 +149,7 @@ class InTime:
 
 
 def in_time(scene: ReducedScene) -> InTime:
-    """The whole of a scene; InputError for one that has a closed form, or that no copies answer."""
+    """The copies in time of a whole scene; InputError for one that has a closed form, or that no copies answer."""
     _check(scene)
     speeds, options = scene.ride.speeds, scene.ride.options
     assert speeds is not None
@@ -182,13 +182,15 @@ def _may_go(scene: ReducedScene, effect: Effect) -> bool:
     """Whether a run in time can do without an effect and all that it takes along."""
     rest = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in rest.rigid)
-    return not rest.massless and not any({spring.one, spring.two} & wheels_of(scene.vehicle) for spring in rigid)
+    return not rest.massless and not any(
+        {spring.first_body, spring.second_body} & wheels_of(scene.vehicle) for spring in rigid
+    )
 
 
 def left(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
     """The vehicle of what is left; ``moving``: how bent springs move, for the gains of straight laws."""
     springs = scene.vehicle.springs
-    seats = {s.one: s.two for s in springs if s.name in scene.rigid and s.two is not None}
+    seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
 
     def body(before: Body) -> Body:
         if before.name in seats:

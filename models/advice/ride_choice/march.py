@@ -1,4 +1,5 @@
-"""What a run in time makes of deviations, by the classical Runge-Kutta method at a step in closed form, and its cost.
+"""Standard deviations that a run in time has, by the classical Runge-Kutta method at a step in closed form, and its
+cost.
 
 A run reads the road's filters at the begin, the middle and the end of a step (f0, fm, f1). In a motion of rate s, with
 z = h s, a step is x1 = R x0 + h (c0 g0 + cm gm + c1 g1), g the force of the road on it and
@@ -101,7 +102,7 @@ class March:
         return max(ALIKE, int(np.ceil(BEYOND * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
-        """Up to those of which a step sees but two values."""
+        """Frequencies up to those with two steps per period."""
         highest = np.pi / step
         delay = max(self.reduced.excitation.lengths) / self.speed
         return frequencies(self.motions[0], delay, (LOWEST * highest, highest))

@@ -1,4 +1,4 @@
-"""What leaving effects out changes near a scene: between its speeds, and with parameters a few per cent off.
+"""Changes by leaving effects out, near a scene: between its speeds, and with parameters a few per cent off.
 
 A change e of a deviation is told by sums over frequencies, J = sum of |H(w) u(w)|^2, H the outputs by the heights u of
 the road, for the whole scene and for what is left. With Z q = B u the dynamic stiffness and y = C q, a parameter moves
@@ -94,16 +94,16 @@ class Neighbourhood:
         self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, FEW).round().astype(int))]
         self.whole, self.at_few = self.spectra(scene, self.speeds), self.spectra(scene, self.few, True)
 
-    def changes(self, rest: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
+    def changes(self, reduced: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
         """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
         full = self.whole if factors is None else self.spectra(_off(self.scene, factors), self.speeds)
-        left = self.spectra(_off(rest, factors or {}), self.speeds)
+        left = self.spectra(_off(reduced, factors or {}), self.speeds)
         return np.sqrt(left.variances / full.variances) - 1.0
 
-    def corners(self, rest: ReducedScene) -> list[dict[Parameter, float]]:
+    def corners(self, reduced: ReducedScene) -> list[dict[Parameter, float]]:
         """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few
         speeds."""
-        left, full = self.spectra(rest, self.few, True), self.at_few
+        left, full = self.spectra(reduced, self.few, True), self.at_few
         ratio = np.sqrt(left.variances / full.variances)
         logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
@@ -173,9 +173,9 @@ class Response:
         return C, read.road + self.s * read.road_rate
 
 
-def _less(spectra: Any, other: Any, keys: Iterable[str]) -> Any:
+def _less(spectra: Any, subtrahend: Any, keys: Iterable[str]) -> Any:
     """One less another in some of its arrays."""
-    return replace(spectra, **{key: getattr(spectra, key) - getattr(other, key) for key in keys})
+    return replace(spectra, **{key: getattr(spectra, key) - getattr(subtrahend, key) for key in keys})
 
 
 def _off(scene: ReducedScene, factors: Mapping[Parameter, float]) -> ReducedScene:

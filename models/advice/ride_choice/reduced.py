@@ -37,7 +37,7 @@ class Reduced:
     states: int
 
 
-class Whole:
+class FullScene:
     """A scene with all its effects at a speed (m/s), from which systems without some of them are made."""
 
     def __init__(self, scene: ReducedScene, speed: float) -> None:
@@ -49,7 +49,7 @@ class Whole:
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
-        """What is left of the scene; raises InputError where it is no system."""
+        """The scene without the effects; raises InputError where what remains has no equations of motion."""
         key = (scene.vehicle, *_road(scene), scene.massless, scene.rigid, scene.locked)
         if key not in self._made:
             self._made[key] = self._make(scene)
@@ -61,7 +61,7 @@ class Whole:
         return replace(rest, system=system, T=block_diag(rest.T, more), left=block_diag(rest.left, more))
 
     def _make(self, scene: ReducedScene) -> Reduced:
-        """Before weightings."""
+        """The reduced system before the outputs are weighted."""
         constrained, N = constrain(scene, self.speed)
         excitation, Tf, left_f = self._heights(scene)
         system, Tq, back = first_order(constrained, excitation, self.speed)
@@ -77,7 +77,7 @@ class Whole:
         return Reduced(constrained, N, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
-        """The road that is left, and ``_of_road`` of it."""
+        """The reduced scene's road, and its relation to the whole road by ``_of_road``."""
         key = _road(scene)
         if key not in self._roads:
             excitation = scene.excitation()
@@ -86,7 +86,7 @@ class Whole:
 
 
 def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
-    """What tells one road of a scene less some effects from another."""
+    """Key that is equal for reduced scenes with the same road."""
     return scene.ride.road, tuple(tables_of(scene.ride))
 
 
@@ -101,17 +101,17 @@ def _linear(vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
 
 
 def _of_road(
-    scene: ReducedScene, whole: Excitation, less: ReducedScene, rest: Excitation
+    scene: ReducedScene, full: Excitation, less: ReducedScene, reduced: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
-    count, cutoff = whole.G.shape[1], scene.ride.road.cutoff
+    count, cutoff = full.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
     if cutoff is not None and less.ride.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
-    added = np.eye(len(whole.F) - len(onto), len(rest.F) - len(back))
+    added = np.eye(len(full.F) - len(onto), len(reduced.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)
-    axles = len(whole.heights)
-    if len(rest.heights) == axles:
+    axles = len(full.heights)
+    if len(reduced.heights) == axles:
         return np.kron(np.eye(axles), onto), np.kron(np.eye(axles), back)
     return np.kron(np.ones((axles, 1)), onto), np.kron(np.eye(axles)[:1], back)

@@ -1,4 +1,4 @@
-"""What leaving effects out does to quantities, from one covariance and one adjoint solve of the whole scene each.
+"""Changes of quantities by leaving effects out, from one covariance and one adjoint solve of the whole scene each.
 
 The variance of a reduced system, A_r, C_r, noise Q_r, is for **any** symmetric matrix P_m exactly
 

@@ -47,7 +47,7 @@ def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> n
 def at_axles(
     each: np.ndarray, excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
 ) -> np.ndarray:
-    """What one axle meets, (v, w, m, k), met by all after their delays: (v, w, axles m, noises).
+    """Input of all axles (v, w, axles m, noises): that of one axle (v, w, m, k), each after its delay.
 
     Axles that are ``apart`` (w,), or independent, have noises of their own, axles k; all others share the first k.
     """

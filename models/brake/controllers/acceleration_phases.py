@@ -53,10 +53,10 @@ class AccelerationPhases(Common):
 
 class _Logic:
     def __init__(self, settings: AccelerationPhases) -> None:
-        self._own, self._phase, self._rose, self._count = settings, FIRST, False, 0
+        self._settings, self._phase, self._rose, self._count = settings, FIRST, False, 0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        settings, phase = self._own, self._phase
+        settings, phase = self._settings, self._phase
         falls = gains < settings.falls
         if phase == FIRST and falls:
             phase = WAIT
@@ -74,7 +74,7 @@ class _Logic:
         return self._valve(phase)
 
     def _recovering(self, slip: float, gains: float) -> int:
-        settings = self._own
+        settings = self._settings
         self._rose = self._rose or gains > settings.rises
         if gains > settings.rises_fast and slip < settings.slip:
             return OVERSHOOT
@@ -88,9 +88,9 @@ class _Logic:
     def _valve(self, phase: int) -> int:
         if phase in (FIRST, OVERSHOOT):
             return APPLY
-        if phase == STEP_UP and self._own.slow:
+        if phase == STEP_UP and self._settings.slow:
             return SLOW
         if phase == STEP_UP:
             self._count += 1
-            return APPLY if self._count % self._own.pulse == 1 % self._own.pulse else HOLD
+            return APPLY if self._count % self._settings.pulse == 1 % self._settings.pulse else HOLD
         return RELEASE if phase == LET_GO else HOLD

@@ -64,22 +64,22 @@ def rate(phase: int, settings: FivePhase) -> float:
 
 class _Logic:
     def __init__(self, settings: FivePhase) -> None:
-        self._own, self._phase, self._pressure = settings, FIRST, 0.0
+        self._settings, self._phase, self._pressure = settings, FIRST, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        sign, level = end_of(self._phase, self._own)
+        sign, level = end_of(self._phase, self._settings)
         if sign * (gains - level) >= 0.0:
             self._phase = self._phase % 5 + 1
         elif self._rolls_on(slip, gains):
             self._phase = 5
-        if self._phase != 1 and slip > self._own.deep:
+        if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
-        raised = self._pressure + rate(self._phase, self._own) * self._own.period
+        raised = self._pressure + rate(self._phase, self._settings) * self._settings.period
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 
     def _rolls_on(self, slip: float, gains: float) -> bool:
         """Whether a wheel gains speed no more, or rolls with no pressure left."""
         if self._phase == 1:
-            return self._pressure == 0.0 and slip <= self._own.deep
-        return self._phase == 2 and gains <= self._own.e4
+            return self._pressure == 0.0 and slip <= self._settings.deep
+        return self._phase == 2 and gains <= self._settings.e4

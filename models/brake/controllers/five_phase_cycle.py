@@ -28,8 +28,8 @@ CLOSED = 1e-9
 
 
 class State(NamedTuple):
-    """Of a wheel: pressure (bar) and torque (N m) of its brake, speed of turning (rad/s), time (s), and the integral of
-    the tyre's force over that time (N s)."""
+    """State of a wheel in the five-phase cycle: pressure (bar) and torque (N m) of its brake, speed of turning (rad/s),
+    time (s), and the integral of the tyre's force over that time (N s)."""
 
     pressure: float
     torque: float
@@ -80,7 +80,7 @@ class Frozen:
 
     @cached_property
     def driven(self) -> Driven:
-        """As compiled functions take it."""
+        """The frozen vehicle as compiled functions take it."""
         tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
@@ -105,8 +105,8 @@ def go_on(state, rate, time, driven):
     """The state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
     pressure = max(state.pressure + rate * time, 0.0)
     after = torque(0, pressure, state.torque, driven.brakes)
-    given = StepInput(driven.speed, driven.speed, state.torque, after, time)
-    rolled = wheel_step(given, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
+    drive = StepInput(driven.speed, driven.speed, state.torque, after, time)
+    rolled = wheel_step(drive, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
     return State(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 
 
@@ -196,7 +196,7 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
 
 
 def _cycle(at: list[State], frozen: Frozen) -> Cycle:
-    """Of the states at the six switches of one."""
+    """The ``Cycle`` of the states at its six switches."""
     last, slips = at[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in at]
     durations = tuple(np.diff([state.time for state in at]).tolist())
     return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
@@ -222,8 +222,8 @@ def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: i
     starts: list[State] = []
     while len(starts) <= cycles + skip:
         wheels = np.array([frozen.radius * state.turning])
-        given = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
-        pressure = float(np.asarray(controller.sample(given).pressures)[0])
+        sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
+        pressure = float(np.asarray(controller.sample(sample).pressures)[0])
         if pressure < state.pressure and not falling:
             starts.append(state)
         falling, number = pressure < state.pressure, number + 1

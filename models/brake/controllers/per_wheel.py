@@ -1,4 +1,5 @@
-"""What all controllers share: a logic per wheel or axle, the vehicle's speed, and an end of control when it is slow."""
+"""The part that all controllers of wheel slip share: a logic per wheel or axle, the vehicle's speed, and an end of
+control when it is slow."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -48,9 +49,9 @@ class Common:
         """Have a logic of its own decide for each wheel or axle; ``pressures`` tells whether it answers with those."""
         self._loop = PerWheel(self.wheels, self, logic, pressures)
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """States of the valves, or pressures."""
-        return self._loop.command(given)
+        return self._loop.command(sample)
 
     def check(self, **bounds: tuple[float, float]) -> None:
         """Refuse what is no number, or is outside the bounds of its name: above the first, up to the second.
@@ -83,12 +84,12 @@ class PerWheel:
         self._estimate, self._before = SpeedEstimate(common.period), [np.nan] * len(self._groups)
         self._speed, self._slowing = np.nan, 0.0
 
-    def command(self, given: Sample) -> Command:
-        """Answer to one sample; without the brake switch all is released."""
-        wheels = given.wheels.tolist()
-        speed = speed_of(given.speed, wheels, self._estimate)
+    def command(self, sample: Sample) -> Command:
+        """Commands for a sample; without the brake switch all is released."""
+        wheels = sample.wheels.tolist()
+        speed = speed_of(sample.speed, wheels, self._estimate)
         slowing = self._mean_slowing(speed)
-        if not given.brake:
+        if not sample.brake:
             return self._all(0.0 if self._pressures else RELEASE)
         out = [0.0] * self._wheels
         for k, (first, last) in enumerate(self._groups):
@@ -97,10 +98,10 @@ class PerWheel:
             gains = (wheel - before) / self._common.period - slowing if before == before else 0.0
             self._before[k] = wheel
             if speed > 0.0:
-                answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, given.supply)
+                answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
                 out[first] = out[last] = answer
         if speed < self._common.cut_off:
-            return self._all(given.supply if self._pressures else APPLY)
+            return self._all(sample.supply if self._pressures else APPLY)
         return self._said(out)
 
     def _mean_slowing(self, speed: float) -> float:
@@ -122,7 +123,7 @@ class PerWheel:
 
 @dataclass
 class SpeedEstimate:
-    """The speed (m/s) by samples of the wheels' ones.
+    """Estimate of the vehicle's speed (m/s) by samples of the wheel speeds.
 
     sample : s between two of them; first : slope (m/s^2) until one is learnt, chosen: with 10 a slip bang-bang takes
     10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry road, as it lets

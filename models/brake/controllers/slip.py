@@ -30,12 +30,12 @@ class SlipBangBang(Common):
 
 class _BangBang:
     def __init__(self, settings: SlipBangBang) -> None:
-        self._own, self._valve = settings, APPLY
+        self._settings, self._valve = settings, APPLY
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        if slip > self._own.release:
+        if slip > self._settings.release:
             self._valve = RELEASE
-        elif slip < self._own.apply:
+        elif slip < self._settings.apply:
             self._valve = APPLY
         return self._valve
 
@@ -57,10 +57,10 @@ class SlipPI(Common):
 
 class _Loop:
     def __init__(self, settings: SlipPI) -> None:
-        self._own, self._sum = settings, 0.0
+        self._settings, self._sum = settings, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        settings = self._own
+        settings = self._settings
         error = settings.target - (slip - settings.mix * gains / 9.81)
         gain = settings.gain * speed
         total = self._sum + gain * error * settings.period / settings.reset

@@ -12,11 +12,11 @@ def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surfac
     return [_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
 
 
-def _under(road: Road, way: np.ndarray, kind: int) -> Surface:
-    (behind, ahead), (right, left) = np.sort(way[:, 0]), np.sort(way[:, 1])
+def _under(road: Road, distance: np.ndarray, kind: int) -> Surface:
+    (behind, ahead), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
     first, last = _stretch(road, behind), _stretch(road, ahead)
     if last > first:
-        on_left = way[:, 1].mean() >= road.line
+        on_left = distance[:, 1].mean() >= road.line
         sides = [int((road.left if on_left else road.right)[k]) for k in (first, last)]
         share = (ahead - road.starts[last]) / (ahead - behind)
     elif right < road.line <= left:

@@ -11,7 +11,7 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE
 from models.brake.plain.road import under_wheels, ways
-from models.brake.plain.suspension import Contact, Held, Suspension
+from models.brake.plain.suspension import Contact, Suspension, WheelForces
 from models.brake.plain.tyre import Braked, Motion, Surface, tyre
 from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
@@ -28,8 +28,8 @@ BLINK = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What a vehicle runs on: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below which
-    slip angles are those at it."""
+    """Course of a vehicle over a step: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below
+    which slip angles are those at it."""
 
     on: OnRoad
     steer: np.ndarray
@@ -45,7 +45,7 @@ class Moving:
     turning: np.ndarray
     changes: np.ndarray
     report: np.ndarray
-    found: np.ndarray
+    accelerations: np.ndarray
     lag: "Lagging | None" = None
 
 
@@ -65,11 +65,11 @@ class Steps:
             moving.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
         held = self._hold(moving, contacts, starts, under, middle, half)
         rates = self.vehicle.acceleration(q, v, held)
-        moving.found[:] = rates[: moving.found.size]
+        moving.accelerations[:] = rates[: moving.accelerations.size]
         rest = self.rests(moving)
         if rest is not None:
             moving.state[0] += rest * v + 0.5 * rest**2 * rates
-            moving.state[1, : moving.found.size], moving.turning[:] = 0.0, 0.0
+            moving.state[1, : moving.accelerations.size], moving.turning[:] = 0.0, 0.0
             return (AT_REST, rest) if rest < self.step else (self._upright(moving), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
         moving.changes[:] = (speeds(contacts) - starts) / half
@@ -107,7 +107,7 @@ class Steps:
         under: list[Surface],
         torques: np.ndarray,
         time: float,
-    ) -> Held:
+    ) -> WheelForces:
         """Forces over a time (s) by loads and motion at contacts; the reports are filled."""
         course = self.course
         for i, contact in enumerate(contacts):
@@ -118,11 +118,11 @@ class Steps:
             braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
             moving.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)
         spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
-        return Held(course.steer, moving.report[:, :2].copy(), spun)
+        return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
 
     def rests(self, moving: Moving) -> float | None:
         """Time (s) within the step at which the plane motion has least energy, where it was about to end in it."""
-        plane, v, a = self.course.on.plane, moving.state[1, :3], moving.found
+        plane, v, a = self.course.on.plane, moving.state[1, :3], moving.accelerations
         weights = np.array([plane.masses.sum(), plane.masses.sum(), plane.inertias[0]])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
         if speed == 0.0 and not moving.turning.any():

@@ -37,9 +37,9 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """What stays over a step, of each wheel: steer angles (rad), mean forces (W, 2) on the tyres along and across (N),
-    and the mean moments (N m) that speed up their turning."""
+class WheelForces:
+    """Wheel quantities that are constant over a step: steer angles (rad), mean forces (W, 2) on the tyres along and
+    across (N), and the mean moments (N m) that speed up their turning."""
 
     steer: np.ndarray
     forces: np.ndarray
@@ -67,7 +67,7 @@ class Suspension:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates of the suspended vehicle."""
         return self.bodies.size
 
     def contacts(self, motion: Motion, steer: np.ndarray) -> list[Contact]:
@@ -92,13 +92,13 @@ class Suspension:
         elastic = self.loads[i] - tyre.stiffness * (hub[PLACE, 2] - tyre.point[2])
         return float(max(elastic - tyre.damping * hub[RATE, 2], 0.0)) if elastic > 0.0 else 0.0
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, held: Held) -> np.ndarray:
+    def acceleration(self, q: np.ndarray, v: np.ndarray, constant: WheelForces) -> np.ndarray:
         """Accelerations (n,) at coordinates and rates (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._gravity)
         travels = self.parts.travels(motion, q, v)
         force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
-        force += self._by_tyres(motion, held) + self._by_air(motion)
+        force += self._by_tyres(motion, constant) + self._by_air(motion)
         accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
 
@@ -109,16 +109,16 @@ class Suspension:
         forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
         return forces
 
-    def _by_tyres(self, motion: Motion, held: Held) -> np.ndarray:
+    def _by_tyres(self, motion: Motion, constant: WheelForces) -> np.ndarray:
         """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to the chassis."""
         hubs, total = motion.at(self._hubs), np.zeros(self.size)
-        for i, contact in enumerate(self.contacts(motion, held.steer)):
-            creep = contact.along * held.forces[i, 0] + contact.axle * held.forces[i, 1]
+        for i, contact in enumerate(self.contacts(motion, constant.steer)):
+            creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
             moment = -contact.height * round_the_vertical(creep)
             rolling = contact.axle * (contact.axle @ moment)
             total += hubs[i, FIRST:] @ (creep + contact.load * UP)
             total += motion.by_moment(int(self._hubs.rows[i]), moment - rolling)
-            total += motion.by_moment(self._chassis, rolling - contact.axle * held.spun[i])
+            total += motion.by_moment(self._chassis, rolling - contact.axle * constant.spun[i])
         return total
 
     def liveliness(self) -> float:

@@ -31,7 +31,7 @@ def weights(nodes: np.ndarray, value: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Under one wheel: numbers of two tables, and the share of the second."""
+    """Surface under a wheel: numbers of two tables, and the share of the second."""
 
     first: int
     second: int
@@ -48,7 +48,7 @@ class Friction:
     load: float
 
     def mixed(self, values: np.ndarray) -> np.ndarray:
-        """Of values (t, ...) of all tables those of the surface."""
+        """Values on the surface, mixed from values (t, ...) of all tables."""
         share = self.under.share
         mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
         return mixed
@@ -69,8 +69,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class Motion:
-    """Of one wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds along and
-    across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those at it."""
+    """Motion of a wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds
+    along and across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those
+    at it."""
 
     start: float
     rate: float
@@ -96,8 +97,8 @@ class Motion:
 
 @dataclass(frozen=True)
 class Braked:
-    """Of one wheel over a step: torques of its brake (N m) at both ends, the step (s), radius (m), inertia (kg m^2),
-    and the turning at the start (rad/s)."""
+    """Braking of a wheel over a step: torques of its brake (N m) at both ends, the step (s), radius (m), inertia (kg
+    m^2), and the turning at the start (rad/s)."""
 
     torques: tuple[float, float]
     step: float

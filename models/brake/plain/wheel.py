@@ -37,7 +37,7 @@ class Force:
 
 @dataclass(frozen=True)
 class WheelStep:
-    """What moves a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
+    """Drive of a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
     on, linear in time) at both ends, step (s), radius (m), inertia (kg m^2)."""
 
     speeds: tuple[float, float]
@@ -72,7 +72,7 @@ class WheelStep:
 
 @dataclass
 class Progress:
-    """How far a wheel has come within its step: time (s), slip, impulse of the road on the vehicle (N s), integral of
+    """Progress of a wheel within a time step: time (s), slip, impulse of the road on the vehicle (N s), integral of
     the slip (s), time locked (s), and whether it has just been freed."""
 
     time: float
@@ -168,24 +168,24 @@ def _roll(of: WheelStep, at: Progress, force: Force) -> None:
     at.area += area
 
 
-def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, left: float) -> tuple[float, float, float]:
-    """Time (s) that passes, slip then and integral of the slip (s), for ``left`` seconds or until the last node.
+def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:
+    """Time (s) that passes, slip then and integral of the slip (s), for ``remaining`` seconds or until the last node.
 
     nodes, rates (k,) : the rate (1/s) of the slip is linear between the nodes.
     """
     rate, time, area = float(np.interp(slip, nodes, rates)), 0.0, 0.0
     if rate == 0.0:
-        return left, slip, slip * left
+        return remaining, slip, slip * remaining
     ahead = np.flatnonzero(nodes > slip) if rate > 0.0 else np.flatnonzero(nodes < slip)[::-1]
     for k in ahead:
         way, ratio = float(nodes[k]) - slip, float(rates[k]) / rate
         grows = (ratio - 1.0) * rate / way
         needed = way / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
-        if time + needed >= left:
-            rest = left - time
+        if time + needed >= remaining:
+            rest = remaining - time
             z = grows * rest
             moved = slip + rest * rate * _phi(1, z)
-            return left, moved, area + slip * rest + rate * rest**2 * _phi(2, z)
+            return remaining, moved, area + slip * rest + rate * rest**2 * _phi(2, z)
         area += slip * needed + rate * needed**2 * _phi(2, grows * needed)
         time, slip, rate = time + needed, float(nodes[k]), float(rates[k])
     return time, slip, area

@@ -41,26 +41,26 @@ class ControllerFailed(RunFailed):
     """A controller did not answer, or not with what can be done. name : one of ``NAMES``; number : of the sample;
     why : the fault, as a phrase."""
 
-    def __init__(self, given: Sample, name: str, reason: str) -> None:
+    def __init__(self, sample: Sample, name: str, reason: str) -> None:
         reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST]
-        self.name, self.number, self.why = name, given.number, reason
-        super().__init__("controller", f"sample {given.number}: {name}: {reason}", 1e-9 * given.time)
+        self.name, self.number, self.why = name, sample.number, reason
+        super().__init__("controller", f"sample {sample.number}: {name}: {reason}", 1e-9 * sample.time)
 
 
 def ask(
-    controller: Controller, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+    controller: Controller, sample: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
 ) -> Command:
     """A controller's answer, checked; most : largest pressure (bar).
 
     Raises ControllerFailed, whatever the controller raises.
     """
     try:
-        command = controller.sample(given)
+        command = controller.sample(sample)
     except RunFailed:
         raise
     except (Exception, SystemExit) as error:
-        raise ControllerFailed(given, "crash", raised(error)) from error
-    return checked(command, given, states, most)
+        raise ControllerFailed(sample, "crash", raised(error)) from error
+    return checked(command, sample, states, most)
 
 
 def raised(error: BaseException) -> str:
@@ -81,33 +81,34 @@ class Asked:
     inner: Controller
     states: frozenset[int] = STATES
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
-        return ask(self.inner, given, self.states, given.supply)
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample; raises ControllerFailed."""
+        return ask(self.inner, sample, self.states, sample.supply)
 
 
 def checked(
-    command: Command, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+    command: Command, sample: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
 ) -> Command:
-    """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
+    """The controller's answer, returned if each wheel has one state of its valve or one pressure; raises
+    ControllerFailed."""
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
-        raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
+        raise ControllerFailed(sample, "wrong frame", "needs either valves or pressures")
     valves = command.valves
     whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
-    if whole is not None and whole.shape == given.wheels.shape and states.issuperset(whole.tolist()):
+    if whole is not None and whole.shape == sample.wheels.shape and states.issuperset(whole.tolist()):
         return command
-    values = _array(command.pressures if command.valves is None else command.valves, given)
+    values = _array(command.pressures if command.valves is None else command.valves, sample)
     for value in values.tolist():
         if not math.isfinite(value):
-            raise ControllerFailed(given, "not a number", f"{value:g} for a wheel")
+            raise ControllerFailed(sample, "not a number", f"{value:g} for a wheel")
         if command.pressures is not None and value < 0.0:
-            raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
+            raise ControllerFailed(sample, "below zero", f"a pressure of {value:g} bar")
         if command.pressures is not None and value > most * (1.0 + ROUNDING):
             raise ControllerFailed(
-                given, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there are"
+                sample, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there are"
             )
         if command.valves is not None and value not in states:
-            raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of {_listed(states)}")
+            raise ControllerFailed(sample, "no state of a valve", f"{value:g} is none of {_listed(states)}")
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
 
 
@@ -115,17 +116,17 @@ def _listed(states: frozenset[int]) -> str:
     return ", ".join(map(str, sorted(states)))
 
 
-def _array(values: object, given: Sample) -> np.ndarray:
+def _array(values: object, sample: Sample) -> np.ndarray:
     if np.ma.is_masked(values):
-        raise ControllerFailed(given, "not a number", "a masked value for a wheel")
+        raise ControllerFailed(sample, "not a number", "a masked value for a wheel")
     try:
         array = np.asarray(values)
         if array.dtype.kind == "c":
             raise TypeError("complex numbers")
         array = array.astype(float)
     except (TypeError, ValueError) as error:
-        raise ControllerFailed(given, "wrong frame", str(error)) from None
-    if array.shape != given.wheels.shape:
+        raise ControllerFailed(sample, "wrong frame", str(error)) from None
+    if array.shape != sample.wheels.shape:
         size = " x ".join(map(str, array.shape)) or "one"
-        raise ControllerFailed(given, "wrong length", f"{size} values for {given.wheels.size} wheels")
+        raise ControllerFailed(sample, "wrong length", f"{size} values for {sample.wheels.size} wheels")
     return array

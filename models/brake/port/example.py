@@ -11,9 +11,9 @@ class Example:
     def __init__(self, wheels: int) -> None:
         self._valves = np.ones(wheels, dtype=np.int64)
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """States of the valves."""
-        slip = 1.0 - given.wheels / max(given.speed, 0.1)
+        slip = 1.0 - sample.wheels / max(sample.speed, 0.1)
         self._valves[slip > 0.15] = -1
         self._valves[slip < 0.08] = 1
         return Command(valves=self._valves.copy())

@@ -37,17 +37,17 @@ class Fault(Strict):
         return self
 
     def holds(self, time: float) -> bool:
-        """Whether it is there at a time (s)."""
+        """Whether the fault is active at a time (s)."""
         return self.start <= time and (self.end is None or time < self.end)
 
     def of(self, wheels: int) -> list[int]:
-        """Numbers of its wheels."""
+        """Numbers of the wheels that the fault affects."""
         return list(range(wheels)) if self.wheels is None else self.wheels
 
 
 @dataclass
 class Faulty:
-    """A controller with faults on its way in and out; fresh for every run."""
+    """A controller whose signals and commands pass through faults; fresh for every run."""
 
     inner: Controller
     faults: list[Fault]
@@ -58,11 +58,11 @@ class Faulty:
     def __post_init__(self) -> None:
         self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer to signals with faults, with faults."""
-        time = 1e-9 * given.time
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for signals with faults, themselves with faults."""
+        time = 1e-9 * sample.time
         here = [fault for fault in self.faults if fault.holds(time)]
-        command = self.inner.sample(given._replace(wheels=self._signals(given.wheels, here)))
+        command = self.inner.sample(sample._replace(wheels=self._signals(sample.wheels, here)))
         return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
 
     def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:

@@ -81,12 +81,14 @@ class FmuPort:
         self._answers = _references(names, self._mode, wheels)
         self._get = slave.getInteger if names[f"{self._mode}_1"][1] == "Integer" else slave.getReal
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """Outputs after one step."""
-        self._slave.setReal(self._references, given.wheels.tolist() + [getattr(given, name) for _, name in self._extra])
+        self._slave.setReal(
+            self._references, sample.wheels.tolist() + [getattr(sample, name) for _, name in self._extra]
+        )
         if self._brake:
-            self._slave.setBoolean(self._brake, [given.brake])
-        self._slave.doStep(given.number * self._step, self._step)
+            self._slave.setBoolean(self._brake, [sample.brake])
+        self._slave.doStep(sample.number * self._step, self._step)
         values = np.array(self._get(self._answers), dtype=float)
         return Command(valves=values) if self._mode == "valve" else Command(pressures=values)
 

@@ -47,11 +47,18 @@ class WrongFrame(ValueError):
         super().__init__(reason)
 
 
-def question(given: Sample) -> bytes:
+def question(sample: Sample) -> bytes:
     """Frame of one sample."""
-    flags = SWITCH * given.brake | GIVEN * (given.speed == given.speed)
+    flags = SWITCH * sample.brake | GIVEN * (sample.speed == sample.speed)
     return QUESTION.pack(
-        b"TRQ1", given.number, given.time, given.wheels.size, flags, given.supply, given.speed, *_eight(given.wheels)
+        b"TRQ1",
+        sample.number,
+        sample.time,
+        sample.wheels.size,
+        flags,
+        sample.supply,
+        sample.speed,
+        *_eight(sample.wheels),
     )
 
 
@@ -73,7 +80,7 @@ def answer(number: int, command: Command) -> bytes:
 
 
 def command(frame: bytes, number: int) -> Command:
-    """What an answer to the sample of this number commands; raises WrongFrame."""
+    """The commands in an answer frame to the sample of this number; raises WrongFrame."""
     magic, answered, mode, wheels, *values = ANSWER.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")

@@ -24,7 +24,8 @@ HEAD = struct.Struct("<4sI")
 
 
 class Guest(NamedTuple):
-    """What is to be made: name "module:Name" or "file.py:Name" of a callable, or else the path of an FMU.
+    """The controller that a process of its own is to make: name "module:Name" or "file.py:Name" of a callable, or else
+    the path of an FMU.
 
     folder : of the callable's path, or to which the FMU is unpacked; wheels : their number; sample : s; parameters : of
     the callable; file : of the scene, for messages.
@@ -54,7 +55,7 @@ def made(guest: Guest) -> Iterator[Controller]:
 
 
 def told(**what: Any) -> bytes:
-    """Frame of what went wrong."""
+    """Frame that reports a failure."""
     text = json.dumps(what, default=str).encode()
     return HEAD.pack(TOLD, len(text)) + text
 

@@ -30,7 +30,7 @@ STARTUP = 30.0
 
 
 class Failed(Exception):
-    """What the process told; what : its table."""
+    """Failure that the controller's process reported; what : its table."""
 
     def __init__(self, what: dict[str, Any]) -> None:
         self.what = what
@@ -58,26 +58,27 @@ class Hosted:
         except (OSError, EOFError):
             raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
+    def sample(self, sample: Sample) -> Command:
+        """The commands of a controller in another process for a sample; raises ControllerFailed."""
         try:
-            return command(self._got(question(given), ANSWER.size, b"", self.timeout), given.number)
+            return command(self._got(question(sample), ANSWER.size, b"", self.timeout), sample.number)
         except WrongFrame as error:
-            raise ControllerFailed(given, error.name, str(error)) from None
+            raise ControllerFailed(sample, error.name, str(error)) from None
         except Failed as error:
             name = str(error.what.get("name"))
-            raise ControllerFailed(given, name if name in NAMES else "crash", str(error.what.get("reason"))) from None
+            raise ControllerFailed(sample, name if name in NAMES else "crash", str(error.what.get("reason"))) from None
         except TimeoutError:
-            raise ControllerFailed(given, "silence", f"no answer within {self.timeout:g} s") from None
+            raise ControllerFailed(sample, "silence", f"no answer within {self.timeout:g} s") from None
         except (OSError, EOFError):
             lost = f"the controller was lost{fate(self.process, self.timeout)}"
-            raise ControllerFailed(given, "crash", lost) from None
+            raise ControllerFailed(sample, "crash", lost) from None
 
-    def _got(self, said: bytes, size: int, begins: bytes, seconds: float) -> bytes:
-        """What comes back within so many seconds; raises Failed, TimeoutError, OSError, EOFError."""
+    def _got(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
+        """The bytes that the process sends back within so many seconds; raises Failed, TimeoutError, OSError,
+        EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
-        self.link.sendall(said)
+        self.link.sendall(sent)
         got = self._more(b"", size, end)
         if got[:4] == TOLD:
             length = HEAD.unpack_from(got)[1]
@@ -86,24 +87,24 @@ class Hosted:
             raise EOFError
         return got
 
-    def _more(self, got: bytes, size: int, end: float) -> bytes:
-        """So many bytes, of which some are there; fewer if what went wrong is told in fewer."""
-        while len(got) < size and not (got[:4] == TOLD and HEAD.size <= len(got) == _told(got)):
-            part = self.link.recv(size - len(got))
+    def _more(self, received: bytes, size: int, end: float) -> bytes:
+        """Receive up to ``size`` bytes in all; fewer if the process reports a failure in fewer."""
+        while len(received) < size and not (received[:4] == TOLD and HEAD.size <= len(received) == _told(received)):
+            part = self.link.recv(size - len(received))
             left = end - time.perf_counter()
             if left <= 0.0:
                 raise TimeoutError
             if not part:
                 raise EOFError
-            got += part
-            if len(got) < size:
+            received += part
+            if len(received) < size:
                 self.link.settimeout(left)
-        return got
+        return received
 
 
-def _told(got: bytes) -> int:
+def _told(received: bytes) -> int:
     """Length of a frame that tells what went wrong."""
-    return HEAD.size + int(HEAD.unpack_from(got)[1])
+    return HEAD.size + int(HEAD.unpack_from(received)[1])
 
 
 def _as_input(what: dict[str, Any]) -> InputError | RunFailed:

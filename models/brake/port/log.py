@@ -31,11 +31,11 @@ class Logged:
     inner: Controller
     file: BinaryIO
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer, written down."""
-        asked = question(given)  # before a controller can write into what it is given
-        said = self.inner.sample(given)
-        self.file.write(asked + answer(given.number, said))
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample, which are also written to the log."""
+        asked = question(sample)  # before a controller can write into what it is given
+        said = self.inner.sample(sample)
+        self.file.write(asked + answer(sample.number, said))
         return said
 
 
@@ -74,12 +74,12 @@ class Replay:
             raise InputError(path.name, "replay", None, "is the log of another scene")
         self._records, self._path = records, path
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """The logged answer; raises RunFailed if the log has none, or if the question was another one."""
-        start = given.number * RECORD
-        record, place = self._records[start : start + RECORD], f"sample {given.number}: {self._path.name}"
+        start = sample.number * RECORD
+        record, place = self._records[start : start + RECORD], f"sample {sample.number}: {self._path.name}"
         if len(record) < RECORD:
-            raise RunFailed("replay", f"{place} has ended", 1e-9 * given.time)
-        if record[: QUESTION.size] != question(given):
-            raise RunFailed("replay", f"{place} was asked something else", 1e-9 * given.time)
-        return command(record[QUESTION.size :], given.number)
+            raise RunFailed("replay", f"{place} has ended", 1e-9 * sample.time)
+        if record[: QUESTION.size] != question(sample):
+            raise RunFailed("replay", f"{place} was asked something else", 1e-9 * sample.time)
+        return command(record[QUESTION.size :], sample.number)

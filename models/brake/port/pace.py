@@ -20,15 +20,15 @@ class WallClock:
     worst: float = 0.0
     _start: float | None = None
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer, asked for no sooner than at its time."""
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample, asked for no sooner than at the sample's time on the wall clock."""
         now = time.perf_counter()
         if self._start is None:
-            self._start = now - 1e-9 * given.time
-        due = self._start + 1e-9 * given.time
+            self._start = now - 1e-9 * sample.time
+        due = self._start + 1e-9 * sample.time
         if now < due:
             time.sleep(due - now)
-        command = self.inner.sample(given)
+        command = self.inner.sample(sample)
         late = time.perf_counter() - (due + self.period)
         if late > 0.0:
             self.overruns, self.worst = self.overruns + 1, max(self.worst, late)

@@ -17,7 +17,7 @@ from models.core.strict import Strict, quantity
 
 
 class Conversion(Strict):
-    """What becomes of a signal; with ``bits`` it needs a ``range``."""
+    """Conversion of a signal by its sensor; with ``bits`` it needs a ``range``."""
 
     gain: float = quantity("", "factor", default=1.0)
     offset: float = quantity("unit of the signal", "added", default=0.0, signed=True)
@@ -41,7 +41,7 @@ class Channels:
         self._block, self._noise = -1, np.zeros((0, count))
 
     def __call__(self, number: int, values: np.ndarray) -> np.ndarray:
-        """What arrives of the values (count,) of a sample."""
+        """The values (count,) of a sample after delay, noise and resolution of their sensors."""
         conversion = self.conversion
         if conversion.gain != 1.0 or conversion.offset != 0.0:
             values = conversion.gain * values + conversion.offset
@@ -74,13 +74,14 @@ class Sensed:
     pressures: Channels
     teeth: Counted | None = None
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer to what it sees, as it arrives; a pressure that arrives as one below none is none."""
-        seen = given.wheels if self.teeth is None else self.teeth(given)
-        command = self.inner.sample(given._replace(wheels=self.wheels(given.number, seen)))
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
+        zero."""
+        seen = sample.wheels if self.teeth is None else self.teeth(sample)
+        command = self.inner.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
         if command.pressures is None:
             return command
-        return Command(pressures=np.maximum(self.pressures(given.number, np.asarray(command.pressures)), 0.0))
+        return Command(pressures=np.maximum(self.pressures(sample.number, np.asarray(command.pressures)), 0.0))
 
 
 def sensed(inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any) -> Sensed:

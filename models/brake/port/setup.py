@@ -73,7 +73,7 @@ class PortTable(Strict):
 
 @dataclass(frozen=True)
 class Run:
-    """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
+    """Facts of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
     is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
     slow: whether valves can apply slowly.
     """
@@ -114,7 +114,7 @@ def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple
 
 @contextmanager
 def _behind(table: PortTable, run: Run, controller: Controller) -> Iterator[Controller]:
-    """What answers."""
+    """The controllers that can answer at the port for this table."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
             with _told_of_scene(table, run):
@@ -138,7 +138,7 @@ def _behind(table: PortTable, run: Run, controller: Controller) -> Iterator[Cont
 
 @contextmanager
 def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
-    """What is wrong with what a key names is told as that of the scene; what is wrong within a file, as the file's."""
+    """Turn errors of a named controller into errors of the scene's key; errors within a file name that file."""
     try:
         yield
     except InputError as error:

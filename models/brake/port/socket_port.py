@@ -36,23 +36,23 @@ class SocketPort:
     timeout: float
     process: subprocess.Popen[bytes] | None = None
 
-    def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
+    def sample(self, sample: Sample) -> Command:
+        """The commands of a controller behind a socket for a sample; raises ControllerFailed."""
         end = time.perf_counter() + self.timeout
         try:
             self.link.settimeout(self.timeout)
-            self.link.sendall(question(given))
-            return command(self._frame(given, end), given.number)
+            self.link.sendall(question(sample))
+            return command(self._frame(sample, end), sample.number)
         except WrongFrame as error:
-            raise ControllerFailed(given, error.name, str(error)) from None
+            raise ControllerFailed(sample, error.name, str(error)) from None
         except TimeoutError:
-            raise ControllerFailed(given, "silence", f"it does not read within {self.timeout:g} s") from None
+            raise ControllerFailed(sample, "silence", f"it does not read within {self.timeout:g} s") from None
         except OSError as error:
             raise ControllerFailed(
-                given, "crash", f"the connection broke: {error.strerror or error}{fate(self.process, self.timeout)}"
+                sample, "crash", f"the connection broke: {error.strerror or error}{fate(self.process, self.timeout)}"
             ) from None
 
-    def _frame(self, given: Sample, end: float) -> bytes:
+    def _frame(self, sample: Sample, end: float) -> bytes:
         """Exactly one answer; bytes beyond it would belong to a question not yet asked."""
         got = b""
         while len(got) < ANSWER.size:
@@ -61,10 +61,10 @@ class SocketPort:
             except TimeoutError:
                 part = None
             if part is None or time.perf_counter() > end:
-                raise ControllerFailed(given, "silence", f"{_some(got)} within {self.timeout:g} s")
+                raise ControllerFailed(sample, "silence", f"{_some(got)} within {self.timeout:g} s")
             if not part:
                 raise ControllerFailed(
-                    given, "crash", f"the connection was closed after {_some(got)}{fate(self.process, self.timeout)}"
+                    sample, "crash", f"the connection was closed after {_some(got)}{fate(self.process, self.timeout)}"
                 )
             got += part
             if len(got) < ANSWER.size:
@@ -75,7 +75,7 @@ class SocketPort:
 
 
 def fate(process: subprocess.Popen[bytes] | None, patience: float) -> str:
-    """How a process ended whose connection is closed, "" if it did not within some seconds."""
+    """How a process with a closed connection ended, as a phrase; "" if it did not end within some seconds."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):
@@ -90,8 +90,8 @@ def _signal(number: int) -> str:
     return f"signal {number}"
 
 
-def _some(got: bytes) -> str:
-    return f"{len(got)} of {ANSWER.size} bytes" if got else "no answer"
+def _some(received: bytes) -> str:
+    return f"{len(received)} of {ANSWER.size} bytes" if received else "no answer"
 
 
 @contextmanager

@@ -29,14 +29,14 @@ class Counted:
     """Teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s): whether one is missing."""
 
     def __init__(self, teeth: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
-        self._own, self._missing = teeth, missing
+        self._teeth, self._missing = teeth, missing
         self._way = (2.0 * math.pi / teeth.teeth * radius).tolist()
         self._wheels: list[_Wheel] = []
         self._before = 0.0
 
-    def __call__(self, given: Sample) -> np.ndarray:
+    def __call__(self, sample: Sample) -> np.ndarray:
         """Signals (W,) in m/s."""
-        speeds, now = np.abs(given.wheels).tolist(), 1e-9 * given.time
+        speeds, now = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
         if not self._wheels:
             self._wheels = [_Wheel(speed) for speed in speeds]
         elif now > self._before:
@@ -52,11 +52,11 @@ class Counted:
         edges = [
             k
             for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
-            if self._missing is None or not self._missing(i, k % self._own.teeth, now)
+            if self._missing is None or not self._missing(i, k % self._teeth.teeth, now)
         ]
         if edges:
             at = self._before + _instant((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
-            at = math.floor(at / self._own.tick) * self._own.tick
+            at = math.floor(at / self._teeth.tick) * self._teeth.tick
             if wheel.edge is not None and at > wheel.edge:
                 wheel.shown = len(edges) * way / (at - wheel.edge)
             wheel.edge = at
@@ -66,15 +66,15 @@ class Counted:
 
 
 class _Wheel:
-    """What its electronics and its angle remember: in teeth since the start, s, m/s."""
+    """State of a toothed wheel's sensor: in teeth since the start, s, m/s."""
 
     def __init__(self, speed: float) -> None:
         self.turned, self.speed, self.shown = 0.5, speed, speed
         self.edge: float | None = None
 
 
-def _instant(way: float, before: float, after: float, step: float) -> float:
+def _instant(distance: float, before: float, after: float, step: float) -> float:
     """Time after which a way is covered by a speed that goes linearly from one to another over a step."""
     slope = (after - before) / step
-    root = math.sqrt(max(before * before + 2.0 * slope * way, 0.0))
-    return min(2.0 * way / (before + root), step)
+    root = math.sqrt(max(before * before + 2.0 * slope * distance, 0.0))
+    return min(2.0 * distance / (before + root), step)

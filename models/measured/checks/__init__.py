@@ -61,7 +61,7 @@ def check(
 
 
 def findings(evidence: Evidence) -> tuple[Finding, ...]:
-    """The same, of evidence that is then at hand for figures."""
+    """Findings of all checks on a recording, from evidence that is also used for figures."""
     said = list(evidence.recording.noticed)
     for look in CHECKS:
         said += [finding for finding in look(evidence) if not _named(finding, said)]

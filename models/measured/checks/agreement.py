@@ -39,11 +39,12 @@ SMOOTHED = 9
 
 @dataclass(frozen=True)
 class Group:
-    """Signals that are wrong together. forces : whether of hubs; own : their numbers among those or the readings."""
+    """Signals that are wrong together. forces : whether of hubs; members : their numbers among those or the
+    readings."""
 
     name: str
     forces: bool
-    own: tuple[int, ...]
+    members: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Fault:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the signals."""
+        """Names of the signals with the fault."""
         return tuple(signal.name for signal in self.signals)
 
 
@@ -122,12 +123,13 @@ class Agreement:
 
     @property
     def rms(self) -> float:
-        """The same, root of the mean square."""
+        """Root mean square of the unexplained motion."""
         return float(np.sqrt(np.mean(self.unexplained**2)))
 
     @property
     def weights(self) -> np.ndarray:
-        """By the unexplained power itself, smoothed, so that a line that nobody explains counts for little."""
+        """Weights of the frequencies by the unexplained power, smoothed, so that a line that nobody explains counts for
+        little."""
         kernel = np.ones(SMOOTHED) / SMOOTHED
         known = KNOWN**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
         padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
@@ -146,7 +148,8 @@ class Agreement:
         return now, tuple(faults)
 
     def without(self, fault: Fault) -> "Agreement":
-        """With a fault put right: true by recorded forces, or recorded by true readings, in the response."""
+        """The agreement with a fault put right: true by recorded forces, or recorded by true readings, in the
+        response."""
         response = self.response.copy()
         if fault.kind == "swapped":
             to = dict(fault.exchanged)
@@ -207,7 +210,7 @@ class Agreement:
 
     def share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
-        pick = list(group.own)
+        pick = list(group.members)
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
             rest = self.between[:, :, pick] - self._told[:, :, pick] + response @ among
@@ -261,7 +264,7 @@ class Agreement:
                 yield fault
 
     def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
-        """What the response (f, k, c) gains, per m by which the moments of hubs are about a point above them.
+        """Change of the response (f, k, c) per m of height of the point about which hub moments are given.
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
         """
@@ -274,7 +277,7 @@ class Agreement:
         return out
 
     def _swapped(self, weights: np.ndarray) -> Iterator[Fault]:
-        """Two hubs as a whole, or two and two."""
+        """Faults of hubs with exchanged channels: two hubs, or two pairs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
@@ -312,13 +315,13 @@ class Agreement:
         return fall if fall > CERTAIN and self._worth(other, weights) else 0.0
 
     def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
-        """This with two channels exchanged, both of the forces or both of the readings."""
+        """The agreement with two channels exchanged, both of the forces or both of the readings."""
         response = self.response.copy()
         response[self._picked(pair)[1]] = self.response[self._picked(pair[::-1])[1]]
         return replace(self, response=response)
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> Fault | None:
-        """Of pairs of hubs; None where they do not have the same channels."""
+        """Fault of exchanged pairs of hubs; None where they do not have the same channels."""
         both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
         signals = tuple(s for s in self.inputs if s.at in dict(both))
         keys = {(s.at, s.quantity, s.component) for s in signals}
@@ -331,7 +334,7 @@ class Agreement:
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
         rest, smallest = WORTH * self._rest(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
-            for group in (group for group in self.groups() if len(group.own) == 1):
+            for group in (group for group in self.groups() if len(group.members) == 1):
                 power = weights * self.share(group)[1]
                 late, wrong = square @ power, power.sum(axis=0)
                 smallest[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
@@ -352,7 +355,7 @@ class Agreement:
         return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._rest(weights)))
 
     def _signals(self, group: Group) -> tuple[Signal, ...]:
-        return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.own)
+        return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.members)
 
 
 def _least(power: np.ndarray, rest: np.ndarray, small: float) -> float:

@@ -59,8 +59,8 @@ def _piled(values: np.ndarray, good: np.ndarray, end: float) -> bool:
     next_to = others[np.argmin(np.abs(others - end))]
     if at < LEAST or at < PILE * np.count_nonzero(good == next_to):
         return False
-    at_end = runs(values == end)
-    return bool(np.max(at_end[:, 1] - at_end[:, 0]) >= 2)
+    runs_at_limit = runs(values == end)
+    return bool(np.max(runs_at_limit[:, 1] - runs_at_limit[:, 0]) >= 2)
 
 
 def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding:

@@ -1,4 +1,4 @@
-"""What every check looks at: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
+"""Data that every check uses: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -63,7 +63,7 @@ class Evidence:
 
     @cached_property
     def lacking(self) -> str:
-        """What would be needed to set forces and motion against each other; empty if nothing."""
+        """Data that are missing for a comparison of forces and motion; empty if none."""
         if self.vehicle is None:
             return "a vehicle in space"
         bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
@@ -94,7 +94,7 @@ class Evidence:
         return {s: ratio for s, ratio in ratios.items() if wrong(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT}
 
     def mean(self, signal: Signal) -> float:
-        """Of all samples, under a window."""
+        """Mean of all samples, under a window."""
         return float(mean([partial(self.recording.samples, signal)])[0][0])
 
     def empty(self, signal: Signal) -> bool:
@@ -131,12 +131,12 @@ class Evidence:
 
     @property
     def frame(self) -> str:
-        """Of the hub forces."""
+        """Frame of the hub forces."""
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
     def searched(self) -> tuple[Agreement, tuple[Fault, ...]] | None:
-        """What is left of the agreement without its faults, and the faults, the worst first."""
+        """The agreement after its faults are taken out, and the faults, the worst first."""
         return self.agreement.search() if self.agreement else None
 
     @property

@@ -1,4 +1,4 @@
-"""What measured forces at the hubs do to accelerometers, gyros and angles of a vehicle: its linear response.
+"""Linear response of a vehicle's accelerometers, gyros and angles to measured hub forces.
 
 About its design position, by differences of the written-out equations: M q'' = ... becomes q'' = A q + D q' + B u. What
 is looked at lies well above the drift of the free vehicle, so that neither its start nor its growth matters.

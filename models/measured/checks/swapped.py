@@ -39,7 +39,7 @@ def _pair(fault: Fault) -> Finding:
 
 
 def _blind(evidence: Evidence) -> Finding:
-    """Which pairs move the vehicle too much alike to be told apart."""
+    """Finding on pairs of hubs that move the vehicle too much alike to be told apart."""
     assert evidence.searched is not None
     pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
     if not pairs:
@@ -52,7 +52,7 @@ def _blind(evidence: Evidence) -> Finding:
 
 
 def _rest(evidence: Evidence) -> Finding:
-    """How well forces and motion belong together without all that was found."""
+    """Finding on how well forces and motion agree once all faults are taken out."""
     assert evidence.searched is not None
     left = evidence.searched[0]
     share = left.unexplained

@@ -33,7 +33,7 @@ CERTAIN = 25.0
 
 @dataclass(frozen=True)
 class Balance:
-    """What is left of equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
+    """Residual of the equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
 
     columns (e, h) : of an excess that is a whole load at one hub. inverse (e, e) : of the covariance.
     """
@@ -112,7 +112,8 @@ def _coarse(evidence: Evidence, signal: Signal, load: float, static: float) -> F
 
 
 def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
-    """Of means (k,), or (k + 2,) with the angular accelerations of roll and pitch, which moments owe to the motion."""
+    """Equilibrium of mean signals (k,), or (k + 2,) with the angular accelerations of roll and pitch, which moments owe
+    to the motion."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
     unit = np.eye(WRENCH * hubs)[numbers]
     turning = whole.moments(unit)[:, :2].T

@@ -131,7 +131,7 @@ def unit_of(text: str) -> str:
 
 
 def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
-    """What the end of the file says of its being whole."""
+    """Findings on whether the file ends as a complete file does."""
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
     said, samples = list[Finding](), remarks.samples

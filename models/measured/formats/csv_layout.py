@@ -84,7 +84,7 @@ NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, a
 
 @dataclass
 class Top:
-    """What the first lines of a file say.
+    """Format facts from the first lines of a file.
 
     lines : those that are neither empty nor comments. hashed : comments that begin with ``#``. separator : as a line
     ``sep=`` says. foreign : numbers of lines that are no UTF-8. unit : of characters. stopped : number of the line
@@ -101,7 +101,7 @@ class Top:
 
 @dataclass
 class Remarks:
-    """What the comments of a file say."""
+    """Facts from the comments of a file."""
 
     comments: list[str] = field(default_factory=list)
     start: str = ""
@@ -175,7 +175,7 @@ def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
 
 
 def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Finding]]:
-    """What stands above the numbers, the column of time, the comments, and what is said of these lines."""
+    """The headings above the numbers, the column of time, the comments, and what is said of these lines."""
     head, known = _head(path, top)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
@@ -207,7 +207,7 @@ Known = Callable[[str], bool]
 
 
 def _head(path: Path, top: Top) -> tuple[Head, Known]:
-    """What stands above the numbers, by the first reading that makes sense of it; numpy writes headings behind #."""
+    """The headings above the numbers, by the first reading that makes sense of it; numpy writes headings behind #."""
     signs = (top.separator,) if top.separator else tuple(SEPARATORS)
     bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.hashed]
     every = sorted((*top.lines, *bare))
@@ -274,7 +274,7 @@ def first_rows(top: Top, head: Head) -> list[list[str]]:
 
 
 def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
-    """How the rows are written, from the first ones; InputError where two readings make sense."""
+    """How the rows of a CSV file are written, from the first ones; InputError where two readings make sense."""
     columns = first_rows(top, head)
     first = next(iter(columns[clock]), "")
     stamps = find_stamps(path, first, head.line + 1, head.names[clock]) if is_stamp(first) else None

@@ -36,7 +36,7 @@ _THOUSANDS = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([.,]\d+)?
 
 @dataclass(frozen=True)
 class Layout:
-    """How the rows are written.
+    """How the rows of a CSV file are written: separators, columns, clock.
 
     separator, decimal : signs. begin : byte where the rows begin. line : number of the line before them. names :
     headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. texts : columns
@@ -211,7 +211,7 @@ def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError |
 
 
 def _remedy(layout: Layout, cell: str) -> str:
-    """What to write in place of a cell that is no number."""
+    """Advice on what to write in place of a cell that is no number."""
     if _THOUSANDS.fullmatch(cell):
         return "write numbers without separators of thousands"
     if ("." if layout.decimal == "," else ",") in cell:

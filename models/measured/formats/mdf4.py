@@ -174,7 +174,8 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
 
 
 def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
-    """What can name a channel's group: as acquired, its source, the first line of its comment, the channel's source."""
+    """Texts that can name a channel's group: as acquired, its source, the first line of its comment, the channel's
+    source."""
     sources = [
         f"{getattr(source, 'name', '')} {getattr(source, 'path', '')}".strip()
         for source in (getattr(group, "acq_source", None), getattr(channel, "source", None))

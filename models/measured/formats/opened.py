@@ -1,4 +1,5 @@
-"""What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
+"""Functions that the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of
+error."""
 
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
@@ -91,7 +92,7 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
-    """What a reader has to say of a file that it read all the same."""
+    """Finding of a reader on a file that it could read all the same."""
     return Finding("file", weight, place or path.name, text)
 
 
@@ -112,9 +113,9 @@ class LeftOut:
         return [notice(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 
-def without_numbers(path: Path, said: Sequence[Finding]) -> InputError:
+def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
     """Error for a file that has no channel to read, with what was said of it."""
-    reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in said)]
+    reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in findings)]
     return InputError(path, "channels", None, "; ".join(reasons))
 
 

@@ -142,7 +142,7 @@ def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> 
 
 
 def _layout(path: Path, parameters: dict[str, str]) -> Layout:
-    """How the samples lie in the file."""
+    """Layout of the samples in the file: blocks, channels, bytes."""
     for name, allowed in (("FILE_TYPE", ("TIME_HISTORY",)), ("TIME_TYPE", HISTORIES), ("DATA_TYPE", tuple(TYPES))):
         type_of_file = parameters.get(name, allowed[0]).strip()
         if type_of_file not in allowed:

@@ -160,21 +160,21 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in with_clock))
 
 
-def _numeric(channel: Any, left: LeftOut) -> bool:
+def _numeric(channel: Any, left_out: LeftOut) -> bool:
     """Whether a channel holds real numbers, one or more."""
     if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
         return True
-    left.add("no numbers" if len(channel) else "no samples", repr(channel.name))
+    left_out.add("no numbers" if len(channel) else "no samples", repr(channel.name))
     return False
 
 
-def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Place | None:
+def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> Place | None:
     """Where a channel's samples and times are; None where it has no clock or is one."""
     properties, start = channel.properties, _started(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
     if str(properties.get("wf_xunit_string", "s")).casefold() not in SECONDS:
-        left.add("its clock does not count seconds", repr(channel.name))
+        left_out.add("its clock does not count seconds", repr(channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
         return Place(group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment)
@@ -186,7 +186,7 @@ def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Pl
     if channel.name.casefold() in CLOCKS and clocks:
         return None
     if len(clocks) != 1:
-        left.add("no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name))
+        left_out.add("no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name))
         return None
     return Place(group.name, channel.name, clocks[0].name, late, 0.0)
 

@@ -122,15 +122,15 @@ def new_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def write_csv(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
-    """Write the header to the file ``part``, then rows of shortest numbers, block by block."""
+def write_csv(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Write the header to the file ``temporary``, then rows of shortest numbers, block by block."""
     group = _single(path, groups, "CSV")
     for name, unit in zip(group.names, group.units, strict=True):
         if is_clock(name):
             raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
         if heading(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
             raise InputError(path, f"channel {name!r}, unit", unit, "a unit in CSV has no brackets and no line ends")
-    with part.open("w", encoding="utf-8", newline="\n") as file:
+    with temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_csv_header(group, start, comment))
         for first, values in group.rows(path):
             times = [f"{t:.15g}" for t in (group.period * np.arange(first, first + len(values))).tolist()]
@@ -150,13 +150,13 @@ def _csv_header(group: Group, start: datetime | None, comment: str) -> str:
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()
 
 
-def write_mdf(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
-    """Append the blocks to a temporary file beside ``part``, then save it as a whole."""
+def write_mdf(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Append the blocks to a temporary file beside ``temporary``, then save it as a whole."""
     try:
         from asammdf import MDF
     except ImportError:
         raise missing(path, "MDF", "asammdf") from None
-    mdf = MDF(version="4.10", temporary_folder=str(part.parent))
+    mdf = MDF(version="4.10", temporary_folder=str(temporary.parent))
     try:
         if start is None:
             mdf.header.abs_time = 0
@@ -167,7 +167,7 @@ def write_mdf(path: Path, part: Path, groups: Sequence[Group], start: datetime |
             for first, values in group.rows(path):
                 _append(mdf, index, group, group.period * np.arange(first, first + len(values)), values)
         with unheard():
-            mdf.save(part)
+            mdf.save(temporary)
     finally:
         mdf.close()
 
@@ -187,13 +187,13 @@ def _append(mdf: Any, index: int, group: Group, times: np.ndarray, values: np.nd
     )
 
 
-def write_tdms(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_tdms(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
     """Write the groups one after the other, each block as one segment."""
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:
         raise missing(path, "TDMS", "npTDMS") from None
-    with TdmsWriter(str(part)) as file:
+    with TdmsWriter(str(temporary)) as file:
         file.write_segment([RootObject({"description": comment} if comment else {})])
         for number, group in enumerate(groups, start=1):
             clock: dict[str, Any] = {
@@ -219,11 +219,11 @@ def write_tdms(path: Path, part: Path, groups: Sequence[Group], start: datetime 
                 )
 
 
-def write_rpc(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_rpc(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
     """Write the header, groups of samples, and the header again with the limits of every channel."""
     group = _single(path, groups, "RPC III")
     limits = np.tile([[np.inf], [-np.inf]], len(group.names))
-    with part.open("wb") as file:
+    with temporary.open("wb") as file:
         file.write(_rpc_header(path, group, limits, start, comment))
         for values in _frames(path, group):
             limits = np.array([np.fmin(limits[0], np.fmin.reduce(values)), np.fmax(limits[1], np.fmax.reduce(values))])

@@ -114,7 +114,7 @@ def _march(of: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions held to a bound, and which had to be."""
+    """Tractions limited to a bound, and flags of those that were above it."""
     size = np.abs(traction)
     beyond = size > bound
     return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond

@@ -51,7 +51,7 @@ class PlainHubs:
         self._frames = frames.get(drive.frame, np.full(len(tyres), GROUND))
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        """Everything at a time (s), coordinates and rates (n,)."""
+        """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
         row = min(max(round(2.0 * t / self.step), 0), len(self.drive.hubs) - 1)
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._weight)

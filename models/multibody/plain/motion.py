@@ -85,7 +85,7 @@ class Bodies:
         self._parent = [self.row[body.parent] if body.parent else GROUND for body in vehicle.bodies]
         self._arms = [self._arm(vehicle, body.name) for body in vehicle.bodies]
         coordinates = [[i for i, (name, _) in enumerate(self.places) if name == body.name] for body in vehicle.bodies]
-        self._own = coordinates
+        self._coordinates = coordinates
         self._generators = np.array([generator(freedom) for _, freedom in self.places])
         self._squares = self._generators @ self._generators
         self._turns = np.array([freedom.startswith("r") for _, freedom in self.places])
@@ -98,7 +98,7 @@ class Bodies:
         return arm
 
     def index(self, body: str, freedom: str) -> int:
-        """Which coordinate it is; -1 if the body does not have it."""
+        """Index of a body's coordinate; -1 if the body does not have it."""
         place = (body, freedom)
         return self.places.index(place) if place in self.places else -1
 
@@ -114,7 +114,7 @@ class Bodies:
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
         first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)
         steps = np.eye(4) + first[:, None, None] * self._generators + second[:, None, None] * self._squares
-        for i, (parent, arm, coordinates) in enumerate(zip(self._parent, self._arms, self._own, strict=True)):
+        for i, (parent, arm, coordinates) in enumerate(zip(self._parent, self._arms, self._coordinates, strict=True)):
             rows = (matrices[parent].reshape(-1, 4) @ arm).reshape(-1, 3, 4)
             for j in coordinates:
                 rows = self._joint(rows, j, steps[j], float(v[j]))

@@ -13,9 +13,9 @@ from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion, Po
 from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
 
 
-def frame_of(part: SpringDamper | AntiRollBar, default: str | None) -> str | None:
+def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | None:
     """Body in whose axes a part's axis is fixed, None for the space: its own frame, or the system's default."""
-    return getattr(part, "frame", None) or default
+    return getattr(element, "frame", None) or default
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,12 @@ class Parts:
         self.stiffness, self.damping = (np.array([getattr(p, k) for p in both]) for k in ("stiffness", "damping"))
         self.friction = np.array([s.friction for s in springs] + [0.0] * len(bars))
         self.friction_rate = np.array([s.friction_rate for s in springs] + [1.0] * len(bars))
-        self._one = bodies.points([*((s.one, s.point_one) for s in springs), *((b.left, b.point_left) for b in bars)])
-        self._two = bodies.points([*((s.two, s.point_two) for s in springs), *((b.right, b.point_right) for b in bars)])
+        self._one = bodies.points(
+            [*((s.first_body, s.first_point) for s in springs), *((b.left, b.point_left) for b in bars)]
+        )
+        self._two = bodies.points(
+            [*((s.second_body, s.second_point) for s in springs), *((b.right, b.point_right) for b in bars)]
+        )
         axes = [s.axis for s in springs] + [(0.0, 0.0, 1.0 / bar.track) for bar in bars]
         frames = [frame_of(part, default) for part in both]
         rows = [bodies.row[frame] if frame else 0 for frame in frames]
@@ -60,14 +64,14 @@ class Parts:
         travel = 0.5 * all_ways[:, PLACE] + self._rolls @ q - self._design
         return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST:] + self._rolls)
 
-    def forces(self, travels: Travels, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (p,) that draw both ends together, N or N m: of springs with preloads ``held`` (p,), and of all
+    def forces(self, travels: Travels, preloads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (p,) that draw both ends together, N or N m: of springs with preloads ``preloads`` (p,), and of all
         else: dampers, friction and curves."""
         other = self.damping * travels.rate + self.friction * np.tanh(travels.rate / self.friction_rate)
         for i, on_travel, on_rate in self._curves:
             other[i] += on_travel(float(travels.travel[i])) if on_travel else 0.0
             other[i] += on_rate(float(travels.rate[i])) if on_rate else 0.0
-        return held + self.stiffness * travels.travel, other
+        return preloads + self.stiffness * travels.travel, other
 
 
 def _curves(i: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:

@@ -24,9 +24,9 @@ NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
 class TyreReport(NamedTuple):
-    """Of every tyre (w,): load (N), creep forces (N) and moment (N m) in its axes, slip along and across (m/s), speed
-    of the tread (m/s), turning (1/s), power (W), moment about the steering axis (N m), steer angle (rad), torque on the
-    wheel by brake and drive (N m)."""
+    """Report of every tyre (w,): load (N), creep forces (N) and moment (N m) in its axes, slip along and across (m/s),
+    speed of the tread (m/s), turning (1/s), power (W), moment about the steering axis (N m), steer angle (rad), torque
+    on the wheel by brake and drive (N m)."""
 
     press: np.ndarray
     fx: np.ndarray
@@ -116,7 +116,7 @@ class PlainRolling:
         self._driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        """Everything at a time (s), positions and rates (n,)."""
+        """State, forces and accelerations at a time (s), positions and rates (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
         travels = self.parts.travels(motion, q, v)
@@ -172,7 +172,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> Contact:
-        """How tyres press, and where they touch; steer (w,), rad."""
+        """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
@@ -237,11 +237,11 @@ class PlainRolling:
         """Generalised forces (n,) of a moment that the chassis takes over from the body of wheel i."""
         return motion.by_moment(self._chassis, moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
-    def _torques(self, t: float, beside: np.ndarray) -> np.ndarray:
-        """Torques (w,) of brake and drive on wheels (N m) that spin ``beside`` the chassis (rad/s)."""
+    def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
+        """Torques (w,) of brake and drive on wheels (N m) that spin ``relative_spin`` the chassis (rad/s)."""
         controls, of = self.handling.controls, self.handling.tyres
         braking, driving = driven(controls.brake, t)[0], driven(controls.drive, t)[0]
-        torque = self._driven * driving - self._braked * braking * np.tanh(beside / of.brake_rate)
+        torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
     def _turn_wheels(self, motion: Motion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:

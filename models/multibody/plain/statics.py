@@ -1,4 +1,4 @@
-"""What holds the design position against gravity: preloads of springs and bars, and static loads of tyres.
+"""Forces that hold the design position against gravity: preloads of springs and bars, and static loads of tyres.
 
 Each part bears what it would carry had the unloaded vehicle sunk under its weights: K s = w with the stiffness K of
 all parts and tyres at rest, from the derivatives of their travels (the definition of ``spatial_linear.preloads``, by

@@ -69,7 +69,8 @@ class Utilised:
 
     @property
     def epsilon(self) -> float:
-        """At least 0.75 of a category 1 system; above 1 calls for k to be measured again."""
+        """Adhesion utilisation by the anti-lock system: at least 0.75 of a category 1 system; above 1 calls for k to be
+        measured again."""
         return self.z / self.k_vehicle
 
 

@@ -1,4 +1,4 @@
-"""What a braked vehicle on its road takes for granted.
+"""Assumptions of a braked vehicle on its road.
 
 Limits without a source are chosen: where what is left out would change a stopping distance by some per cent.
 """
@@ -48,13 +48,13 @@ CORNERING = 1e-3
 
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
-    """What a procedure takes for granted, of the vehicle that is ready for it."""
+    """Assumptions of a braking procedure, with the vehicle that drives it."""
     parts = (_of_loads(scene), _of_bodies(scene, vehicle), _of_tyres(scene, vehicle), _of_brakes(scene, procedure))
     return [*chain.from_iterable(parts), *_of_drive(scene, vehicle)]
 
 
 def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
-    """Of a plane vehicle; springs carry their loads as they are."""
+    """Assumptions on the loads of a plane vehicle; springs carry their loads as they are."""
     if scene.vehicle.file is not None:
         return
     if scene.load_transfer is None:
@@ -104,7 +104,7 @@ def _of_body(body: Truck, ahead: np.ndarray, aside: np.ndarray) -> np.ndarray:
 
 
 def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
-    """Of the truck's course, its train and its springs."""
+    """Assumptions on the truck's course, its train and its springs."""
     yield Assumption(
         "forwards",
         "the vehicle moves forwards",
@@ -174,7 +174,7 @@ def _lean(run: Result) -> Watched:
 
 
 def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
-    """Of the tables of friction and of the slip angles by which they are read."""
+    """Assumptions on the tables of friction and of the slip angles by which they are read."""
     tables = tables_of(scene).values()
     largest = min(table.loads[-1] * (TIMES if table.loads.size == 1 else 1.0) for table in tables)
     yield Assumption(
@@ -215,7 +215,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
 
 
 def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
-    """Of pressures, torques and what brings them about."""
+    """Assumptions on pressures, torques and the valves behind them."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
@@ -278,7 +278,7 @@ def _heat(run: Result) -> Watched:
 
 
 def _of_drive(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
-    """Of the driver, the air and the end."""
+    """Assumptions on the driver, the drag of the air and the end of the stop."""
     yield Assumption(
         "parallel steering",
         "both front wheels are steered alike",

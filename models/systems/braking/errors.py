@@ -1,4 +1,4 @@
-"""How far its steps leave a stop from that of steps without length, where that can be told.
+"""Errors that the step length leaves in a stop's results, where they can be told.
 
 The sample of the controller belongs to the scene: only the steps within it become fewer. While two runs switch alike,
 the error falls with the step (Richardson). A controller of valves may switch at other samples in other steps; from
@@ -58,7 +58,7 @@ class OtherRuns(NamedTuple):
 Channels = dict[str, np.ndarray]
 
 
-def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
+def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
     """The stop with the errors of its motion and of its distance, or with the reason why there is no number.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
@@ -70,7 +70,7 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     if not repeatable(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
     try:
-        paths = _others(path, steps, other.again)
+        paths = _others(path, steps, repeats.again)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
@@ -78,7 +78,7 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
         return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
     if loop and not alike(path, paths[0]):
         return not_estimated(run, LONGER)
-    if loop and near(path, paths[0], other):
+    if loop and near(path, paths[0], repeats):
         return not_estimated(run, SHORTER)
     told = _by_fewer(path, steps, paths, step)
     if rocks(scene):
@@ -110,14 +110,14 @@ def alike(path: Path, other: Path) -> bool:
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
-def near(path: Path, longer: Path, other: OtherRuns) -> bool:
+def near(path: Path, longer: Path, repeats: OtherRuns) -> bool:
     """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps:
     of valves another state of any, of pressures what is not alike."""
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
-    said, beside = (other.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
+    said, beside = (repeats.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
     if said.dtype.kind == "i":
         return not np.array_equal(said, beside)
     return _rms(said - beside) > ALIKE * size_of(said)
@@ -146,15 +146,16 @@ def _others(path: Path, steps: int, again: Callable[[int, float], Path]) -> list
     return [first, again(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
 
 
-def _by_fewer(path: Path, steps: int, others: list[Path], step: float) -> dict[str, Estimate]:
-    """By half and a quarter of the steps; the stopping distance errs by no less than the motion along the road."""
-    fine, coarse, counts = whole(path, path.times), whole(others[0], path.times), [steps, steps // 2, steps // 4]
-    part = path.times[path.times <= others[-1].times[-1]]
-    seen = [channels(run, part) for run in (path, *others)]
+def _by_fewer(path: Path, steps: int, finer_runs: list[Path], step: float) -> dict[str, Estimate]:
+    """Error estimates by runs in half and a quarter of the steps; the stopping distance errs by no less than the motion
+    along the road."""
+    fine, coarse, counts = whole(path, path.times), whole(finer_runs[0], path.times), [steps, steps // 2, steps // 4]
+    part = path.times[path.times <= finer_runs[-1].times[-1]]
+    seen = [channels(run, part) for run in (path, *finer_runs)]
     told = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL
-        if len(others) > 1 and name != DISTANCE:
+        if len(finer_runs) > 1 and name != DISTANCE:
             gaps = [_rms(first[name] - two[name]) for first, two in itertools.pairwise(seen)]
             order = observed(gaps[0], gaps[1], counts)
         least = 0.0
@@ -176,7 +177,8 @@ def observed(fine: float, coarse: float, counts: list[int]) -> float:
 
 
 def _by_twice(path: Path, other: Path, step: float) -> dict[str, Estimate]:
-    """By twice as many steps over the first part, whose share of error is taken for that of the whole."""
+    """Error estimates by a run in twice as many steps over the first part, whose share of error is taken for that of
+    the whole."""
     part = path.times <= other.times[-1]
     fine, finer, told = channels(path, path.times), channels(other, path.times[part]), {}
     for name, values in fine.items():
@@ -191,9 +193,9 @@ def _at(times: np.ndarray, path: Path, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 
 
-def _size(name: str, values: np.ndarray, part: float = 1.0) -> float:
-    """What errors are shares of; what a part of a run moves by is small in proportion."""
-    return max(size_of(values), part * LEAST.get(name, 0.0))
+def _size(name: str, values: np.ndarray, share: float = 1.0) -> float:
+    """Size of a channel that its error is stated as a share of; over a part of a run in proportion to that part."""
+    return max(size_of(values), share * LEAST.get(name, 0.0))
 
 
 def _estimate(name: str, values: np.ndarray, error: float, order: float, step: float) -> Estimate:

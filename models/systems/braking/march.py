@@ -15,7 +15,7 @@ from models.brake.plane_vehicle import Plane
 from models.brake.port.ask import STATES, WITH_SLOW, ask
 from models.brake.port.sensors import Sensed
 from models.brake.pressure import Chambers, still
-from models.brake.samples import Braking, Kept, Row, Told, by_steps, parts, row
+from models.brake.samples import Braking, Commands, Record, Row, by_steps, parts, row
 from models.brake.surfaces import EVEN, OnRoad, Road, check_way
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked
@@ -26,7 +26,7 @@ MOST = 1024
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """What a run recorded at every sample, the start included.
+    """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
     reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest;
@@ -46,7 +46,8 @@ class Path:
 
 
 class Start(NamedTuple):
-    """What a run goes on from: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in rad/s."""
+    """State from which a run continues: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in
+    rad/s."""
 
     state: np.ndarray
     turning: np.ndarray
@@ -92,7 +93,8 @@ class Braked:
         return Start(state, speed / self.plane.radius)
 
     def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
-        """From a start, or steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
+        """March the vehicle from a start, or from steady rolling along x at a speed (m/s); the brake switch closes at
+        ``switch``.
 
         Until then no valve lets anything through, whatever the controller commands.
 
@@ -102,46 +104,50 @@ class Braked:
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
         now = row(given.state.shape[1], wheels)
         now.state[:], now.turning[:] = given.state, given.turning
-        told = Told(np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
+        commands = Commands(
+            np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
+        )
         steady = self.steering is None and is_steady(controller)
         most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
-        kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
+        record = Record(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
         states = WITH_SLOW if self.chambers.slow.size else STATES
         beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
         motion = now.motion(np.zeros(2 + self.plane.masses.size))
         rows, status = [now.whole[None].copy()], FINE
         try:
-            for number, (status, time, speed, supply) in enumerate(self._moving(told, kept, now, motion)):
+            for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, now, motion)):
                 if status in ENDS:
                     raise RunFailed("braking", ending(status, self.plane, motion), time)
-                _take(rows, kept)
-                if status == AT_REST or time >= kept.until:
+                _take(rows, record)
+                if status == AT_REST or time >= record.until:
                     break
                 braked = time >= self.switch - 1e-9
-                told.samples[0] = most if braked else 1
+                commands.samples[0] = most if braked else 1
                 known = speed if self.speed_given else math.nan
                 rims = np.abs(now.turning) * self.plane.radius
                 asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
-                _tell(told, ask(controller, asked, states, max(beyond, supply)), braked)
+                _tell(commands, ask(controller, asked, states, max(beyond, supply)), braked)
                 if self.steering is not None:
-                    told.steer[:] = self.steering(time + 0.5 * self.sample)
+                    commands.steer[:] = self.steering(time + 0.5 * self.sample)
         except RunFailed as error:
-            _take(rows, kept)
+            _take(rows, record)
             error.partial = _path(rows, now, False, self.coordinates)
             raise
         return _path(rows, now, status == AT_REST, self.coordinates)
 
     @property
     def on_road(self) -> OnRoad:
-        """The vehicle as compiled functions take it."""
+        """The vehicle on its road as compiled functions take them."""
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
-    def _moving(self, told: Told, kept: Kept, now: Row, motion: Motion) -> Iterator[tuple[int, float, float, float]]:
+    def _moving(
+        self, commands: Commands, record: Record, now: Row, motion: Motion
+    ) -> Iterator[tuple[int, float, float, float]]:
         """The vehicle as it is ``now`` and in ``motion``, moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
-        go, given = by_steps, [told, kept, self.sample, braking, motion, self.on_road]
+        go, given = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
         if self.relaxation is not None:
             from models.brake.relaxation import Lag, by_lagging_steps
 
@@ -166,19 +172,19 @@ def on_tyres(
     return Braked(plane=plane, road=road, brakes=brakes, chambers=chambers, **given)
 
 
-def _tell(told: Told, command: Command, braked: bool) -> None:
-    """What a command means for the next sample."""
+def _tell(commands: Commands, command: Command, braked: bool) -> None:
+    """Write a command into the arrays for the next sample."""
     if command.pressures is not None:
-        told.pressures[:] = command.pressures
+        commands.pressures[:] = command.pressures
     else:
-        told.valves[:] = command.valves if braked else RELEASE
-        told.pressures[0] = math.nan
+        commands.valves[:] = command.valves if braked else RELEASE
+        commands.pressures[0] = math.nan
 
 
-def _take(rows: list[np.ndarray], kept: Kept) -> None:
+def _take(rows: list[np.ndarray], record: Record) -> None:
     """Put what was recorded to the rows."""
-    rows.append(kept.rows[: kept.left[0]].copy())
-    kept.left[0] = 0
+    rows.append(record.rows[: record.left[0]].copy())
+    record.left[0] = 0
 
 
 def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:

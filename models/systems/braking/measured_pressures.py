@@ -38,9 +38,9 @@ class MeasuredPressures:
     speeds: np.ndarray | None = None
     period: float = SAMPLE
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """Pressures (W,) whose impulse over the sample is the measured one."""
-        start, end = given.time * 1e-9, given.time * 1e-9 + self.period
+        start, end = sample.time * 1e-9, sample.time * 1e-9 + self.period
         inside = self.times[(self.times > start) & (self.times < end)]
         at = np.concatenate(([start], inside, [end]))
         rows = np.column_stack([np.interp(at, self.times, column) for column in self.pressures.T])
@@ -74,7 +74,8 @@ def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> Mea
 
 
 def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, rims: np.ndarray) -> None:
-    """What ``read_pressures`` reads, of a run: times (n,) in s, pressures and speeds of rims (n, W) in bar, m/s."""
+    """Write a run's pressures to a file for ``read_pressures``: times (n,) in s, pressures and speeds of rims (n, W) in
+    bar, m/s."""
     names, later = wheel_names(pressures.shape[1]), np.diff(times, prepend=-1.0) > 0.0
     columns = {"time": ("s", times[later])}
     for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", rims)):

@@ -226,7 +226,7 @@ def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPre
 
 
 def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
-    """What sets the pressures of a procedure, fresh for one run: measured ones, or the controller of the scene."""
+    """The controller of one run of a procedure: measured pressures, or a new controller of the scene."""
     measured = measured_of(scene, procedure, wheels)
     if measured is not None:
         return measured

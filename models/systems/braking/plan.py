@@ -1,4 +1,4 @@
-"""What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of braking: printed by ``twinrig show``, checked before any run."""
 
 from collections.abc import Iterator
 
@@ -46,7 +46,7 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
-    """Each drive writes a log of its own."""
+    """Refuse several drives that would write into one log."""
     drives = {"procedure": len(scene.procedures), "engine": engines}
     for key, several in drives.items():
         if several > 1 and f"{{{key}}}" not in log:
@@ -77,7 +77,7 @@ RADIUS = 0.1, 1.5
 
 
 def _queries(truck: Truck) -> Iterator[Finding]:
-    """What no usual vehicle that brakes in the plane has, each at the name of its parameter."""
+    """Queries on implausible parameters of a vehicle that brakes in the plane."""
     gyration, span = (truck.yaw_inertia / truck.mass) ** 0.5, tuple(g * truck.wheelbase for g in GYRATION["rz"])
     looks = [
         ("mass", "mass", truck.mass, MASS),
@@ -124,7 +124,8 @@ def describe(scene: BrakingScene) -> str:
 
 
 def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
-    """What engines have as their own of a vehicle on its suspension, what they share, and what shares nothing."""
+    """Which forces of a suspended vehicle engines compute by native elements, which all engines share, and which are
+    independent."""
     from models.engines.free_vehicle import joints_alone
 
     return [
@@ -145,7 +146,7 @@ def user_code(scene: BrakingScene) -> str:
 
 
 def behind(scene: BrakingScene) -> str:
-    """What answers at the port, or sets the pressures without being asked."""
+    """Text that names the controller at the port, or the source of the measured pressures."""
     if scene.measured is not None:
         return f"measured pressures {scene.measured.file}"
     named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]

@@ -53,28 +53,32 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
 
 
 def steering_of(procedure: Procedure, vehicle: Braked) -> Steering:
-    """What the driver does at the wheel from time 0 on; one angle is there at once."""
+    """The driver's steering from time 0 on; a single angle is there at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     times, angles = np.array(knots, float).T
     return Steering(times, angles, steered(vehicle, 1.0))
 
 
 def step_steer(scene: BrakingScene, name: str) -> Response | None:
-    """How fast the vehicle of a J-turn answers to its steering without brakes; None where no yaw rate is steady."""
+    """Step response of a J-turn's yaw rate without brakes; None where no yaw rate is steady."""
     vehicle, start = ready(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
     path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED)
     return response(path.times, path.states[:, 1, 2], steering.half)
 
 
-def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
+def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
     """Engines that were asked for; where none were, the usual one.
 
     On a suspension the reference, which takes minutes for a stop, is used only where nothing else was asked for.
     """
     if scene.vehicle.file is None:
-        return asked or ("reference",)
-    return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
+        return requested or ("reference",)
+    return (
+        tuple(name for name in requested if name != "reference")
+        if len(requested) > 1
+        else requested or (SPRUNG_ENGINE,)
+    )
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:
@@ -91,7 +95,7 @@ def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine
 def answers(
     scene: BrakingScene, name: str, vehicle: Braked, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
 ) -> np.ndarray:
-    """What the controller of a run, or what stands behind its port, says to speeds of rims (n, W) and of the vehicle
+    """Commands of a run's controller to given speeds of rims (n, W) and of the vehicle
     (n,), in m/s at times (n,) in s, though nothing moves: valves or pressures (n, W)."""
     usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
     with ExitStack() as stack:
@@ -106,7 +110,7 @@ def answers(
 
 
 def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run:
-    """What the port needs to know; a log is that of a vehicle and its drive, whatever answered."""
+    """Facts of a run for the port; a log is that of a vehicle and its drive, whatever answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
     return Run(
@@ -164,18 +168,18 @@ class Circle:
         return motion
 
     def left(self, unknown: np.ndarray) -> np.ndarray:
-        """What accelerations (n - 1,) of a steady circle must not have: across the way, then of the others."""
+        """Residual accelerations (n - 1,), zero on a steady circle: across the path, then of the other coordinates."""
         rates, _ = self.motion(unknown)
         across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
     def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
-        """What is unknown, and whether that is steady."""
+        """The unknowns of a steady circle from a guess, and whether they are steady."""
         unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
 
     def turn(self, unknown: np.ndarray) -> SteadyTurn:
-        """As a procedure begins with it."""
+        """The steady turn with which a procedure begins."""
         return SteadyTurn(steered(self.vehicle, unknown[0]), Start(self.state(unknown), self.motion(unknown)[1]))
 
 

@@ -38,12 +38,12 @@ class Stop:
 
     @property
     def times(self) -> np.ndarray:
-        """Of the samples (n,) in s."""
+        """Times of the samples (n,) in s."""
         return self.path.times
 
     @property
     def lengths(self) -> np.ndarray:
-        """Of the samples (n - 1,) in s."""
+        """Lengths of the samples (n - 1,) in s."""
         return np.diff(self.path.times)
 
     @property
@@ -73,7 +73,7 @@ class Stop:
         return (before[:, 0] * change[:, 1] - before[:, 1] * change[:, 0]) / size
 
     def of_vehicle(self) -> dict[str, float]:
-        """What the whole vehicle did, by name and unit."""
+        """Results of the whole vehicle over a stop, by name and unit."""
         path, speed, way = self.path, self.speed, self.way
         slip, lateral = _peak(self.side_slip), _peak(self.across)
         time, distance = float(path.times[-1]), float(way[-1])
@@ -100,7 +100,7 @@ class Stop:
         return self.path.states[:, 0, places] if places else None
 
     def of_body(self) -> dict[str, float]:
-        """What the body on its suspension did, by name and unit; nothing of a plane one."""
+        """Results of the sprung body over a stop, by name and unit; none of a plane vehicle."""
         if self.lean is None:
             return {}
         roll, pitch = np.degrees(self.lean).T
@@ -116,7 +116,7 @@ class Stop:
         return self.path.states[:, 0, 3] - self.path.states[:, 0, 2]
 
     def of_hitch(self) -> dict[str, float]:
-        """What the hitch of a train did, by name and unit."""
+        """Results of a train's hitch over a stop, by name and unit."""
         largest = _peak(self.hitch)
         return {
             "largest hitch angle [deg]": float(np.degrees(self.hitch[largest])),
@@ -125,7 +125,8 @@ class Stop:
         }
 
     def of_wheels(self) -> dict[str, np.ndarray]:
-        """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""
+        """Results of each wheel (W,) at speeds above SLOWEST, or above half of a lower initial speed, by name and
+        unit."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports.slip[fast]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
@@ -140,7 +141,7 @@ class Stop:
         }
 
     def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
-        """What it did ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
+        """Results ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """

@@ -86,7 +86,7 @@ class Scatter:
 
 
 def scatter(values: np.ndarray) -> Scatter:
-    """Of values (n,), n at least 2."""
+    """Count, mean and standard deviation of values (n,), n at least 2."""
     return Scatter(values.size, float(values.mean()), float(values.std(ddof=1)))
 
 

@@ -1,4 +1,4 @@
-"""What the theories of one rolling contact take for granted."""
+"""Assumptions of the theories of one rolling contact."""
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
@@ -20,7 +20,7 @@ ALIKE = 0.02
 
 
 def assumptions(scene: ContactScene, body: Contact) -> list[Assumption]:
-    """What the scene's theory takes for granted of its contact."""
+    """Assumptions that the scene's theory makes of its contact."""
     listed = [*of_pressing(scene, body), *_creepages(body)]
     if isinstance(body, Linear):
         listed.append(_no_slip(lambda run: {"contact": _used(run, body)}))
@@ -32,7 +32,7 @@ def assumptions(scene: ContactScene, body: Contact) -> list[Assumption]:
 
 
 def of_pressing(scene: ContactScene, body: Contact) -> list[Assumption]:
-    """What is taken for granted of bodies that are pressed together, whether they roll or not."""
+    """Assumptions about bodies that are pressed together, whether they roll or not."""
     listed = [_half_space(_by_radii(scene, body))]
     if yields(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
@@ -40,7 +40,7 @@ def of_pressing(scene: ContactScene, body: Contact) -> list[Assumption]:
 
 
 def of_rows(file: Path) -> list[Assumption]:
-    """The same of a table of cases, judged by the rows that a result keeps: its first block."""
+    """Assumptions of the contacts in a table of cases, judged by the rows that a result keeps: its first block."""
     rows = next(iter(blocks(file, (BY_AXES, BY_CURVATURES))), None)
     values = {} if rows is None else {name: np.asarray(column, float) for name, column in rows.values.items()}
     listed = []
@@ -94,7 +94,7 @@ def _elastic(watched: Callable[[Result], Watched]) -> Assumption:
 
 
 def _creepages(body: Contact) -> list[Assumption]:
-    """That creepages are small and, where friction is constant, that slip is slow."""
+    """Assumptions that creepages are small and, where friction is constant, that slip is slow."""
     longer = body.lever
 
     def creepages(run: Result) -> Mapping[str, np.ndarray]:
@@ -168,7 +168,7 @@ def _alike(body: Contact) -> Assumption:
 
 
 def _on_profiles(body: OnPatches) -> list[Assumption]:
-    """That patches lie within what is known of the profiles, and beside one another."""
+    """Assumptions that patches lie within the given profiles, and beside one another."""
     parts = sorted(body.pressed.patches, key=lambda part: part.patch.place)
     inside = {}
     for k, part in enumerate(parts, 1):

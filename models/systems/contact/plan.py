@@ -1,4 +1,4 @@
-"""What a contact scene will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a contact scene: printed by ``twinrig show``, checked before any run."""
 
 from contextlib import suppress
 
@@ -67,7 +67,7 @@ def describe(scene: ContactScene) -> str:
 
 
 def _assumed(scene: ContactScene) -> list[Assumption]:
-    """What the scene's contact takes for granted, nothing where it cannot be pressed."""
+    """Assumptions of the scene's contact; none where the contact cannot be pressed."""
     from models.systems.contact.assumptions import assumptions, of_rows
 
     with suppress(InputError, RunFailed):

@@ -66,7 +66,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Built:
-    """What touches and how, before it is pressed: what effects of contact extend.
+    """The contact before it is pressed, as effects extend it: bodies, friction, load or approach.
 
     pair : elastic constants; friction : its coefficient; load (N) or approach (m): the other one is None.
     falling : friction that falls with the speed of slip, of FASTSIM alone; profiles : cross-sections of "wheel" and
@@ -193,12 +193,12 @@ def _count(progress: Progress, rows: int) -> None:
 
 
 def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
-    """What touches in rows of a table of cases."""
+    """The contacts in the rows of a table of cases."""
     return extended(Built(scene.pair, friction, load), scene)
 
 
 def built_of(scene: ContactScene) -> Built:
-    """What touches and how, with the scene's effects."""
+    """The contact of a scene, with the scene's effects."""
     table = scene.contact
     assert table is not None
     kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()

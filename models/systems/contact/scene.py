@@ -175,7 +175,7 @@ class ContactScene(SceneFile):
 
     @property
     def pair(self) -> Pair:
-        """Both materials."""
+        """The materials of both bodies."""
         return Pair(self.bodies.wheel, self.bodies.rail)
 
 

@@ -1,4 +1,4 @@
-"""What the results of a contact say of their error: what the cells leave, and what the theory does."""
+"""Stated errors of a contact's results: errors of the cells and of the theory."""
 
 from collections.abc import Sequence
 
@@ -35,7 +35,8 @@ def with_error(run: Result, scene: ContactScene, body: Contact, errors: Sequence
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
-    """The same of the rows of a table of cases that it keeps, with what at least 95 % of them keep to."""
+    """The result of a table of cases with the errors of the rows that it keeps, with what at least 95 % of them keep
+    to."""
     force = rms(np.hypot(table["fx"], table["fy"]))
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
     stated(table, {"force": by_cells(rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)}, HALF)

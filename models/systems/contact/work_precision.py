@@ -171,7 +171,7 @@ WAYS = (
 
 @dataclass(frozen=True)
 class Point:
-    """One way on one number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
+    """A theory on a number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
     range : the least and the most of them."""
 
     name: str
@@ -191,14 +191,14 @@ class Point:
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure(way: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
+def measure(theory: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
     """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
     errors, seconds = [], []
     for case in cases:
-        answer, taken = _timed(way.rolled(case, cells), case.motion, repeats)
+        answer, taken = _timed(theory.rolled(case, cells), case.motion, repeats)
         errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
         seconds.append(taken)
-    return Point(way.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
+    return Point(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
 
 
 def force_of(answer: Any) -> Array:
@@ -276,7 +276,8 @@ TARGETS = (0.05, 0.02, 0.01, 0.005)
 
 
 def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
-    """For every target: the cheapest that meets it in the mean, and the one that does in 95 of 100 cases."""
+    """For every target error: the cheapest theory that meets it in the mean, and the cheapest that does in 95 of 100
+    cases."""
     errors = attrgetter("mean"), attrgetter("most")
     return [
         (f"{100 * target:g} %", *(_told(cheapest(points, target, error), error) for error in errors))

@@ -1,4 +1,4 @@
-"""What the equations of a steered car take for granted."""
+"""Assumptions of the equations of a steered car."""
 
 from functools import partial
 
@@ -27,7 +27,7 @@ LARGEST_STEER = 0.7
 
 
 def assumptions(handling: Handling) -> list[Assumption]:
-    """What the equations of a manoeuvre take for granted."""
+    """Assumptions of the equations of a manoeuvre."""
     return [
         Assumption(
             "wheel loads",
@@ -85,14 +85,15 @@ def assumptions(handling: Handling) -> list[Assumption]:
 
 
 def _travels(handling: Handling) -> list[Assumption]:
-    """Of springs that carry a wheel alone: within their curves, or where they have none, before the stops of a car."""
+    """Assumptions on springs that carry a wheel alone: within their curves, or where they have none, before the stops
+    of a car."""
     chassis, bodies = chassis_of(handling.given).name, {tyre.body for tyre in handling.given.tyres}
     listed = []
     for spring in handling.given.springs:
-        upright = spring.axis[2] > 0.9 and spring.one == chassis and spring.two in bodies
-        if not upright or (spring.two, "z") not in handling.vehicle.coordinates():
+        upright = spring.axis[2] > 0.9 and spring.first_body == chassis and spring.second_body in bodies
+        if not upright or (spring.second_body, "z") not in handling.vehicle.coordinates():
             continue
-        column = handling.vehicle.coordinates().index((str(spring.two), "z"))
+        column = handling.vehicle.coordinates().index((str(spring.second_body), "z"))
         low, high = -TRAVEL, TRAVEL
         remedy = "drive more slowly, or give the spring a travel_force with its stops in the vehicle file"
         if curve := spring.travel_force:

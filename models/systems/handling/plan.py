@@ -1,4 +1,4 @@
-"""What a scene of handling will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of handling: printed by ``twinrig show``, checked before any run."""
 
 from models.core.assumptions import assumption_lines
 from models.core.finding import Finding

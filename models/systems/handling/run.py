@@ -180,7 +180,7 @@ class Again:
 
     @cached_property
     def twice(self) -> Series:
-        """In twice the step; raises RunFailed."""
+        """The manoeuvre in twice the step; raises RunFailed."""
         return self._with_net(self.drive.handling.tyres.cells, 2.0)
 
     def _with_net(self, cells: int, factor: float) -> Series:
@@ -190,7 +190,8 @@ class Again:
         return principal(driven(self.engine, changed, self.speed, steps * step, step))
 
     def __call__(self, factor: float, share: float) -> Series:
-        """As ``models.core.discretisation.Again``: in twice the step, or a part from the middle on in half of it."""
+        """Run the manoeuvre again in twice the step, or its second half in half the step (see
+        ``models.core.discretisation.Again``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:
@@ -243,7 +244,7 @@ def principal(drive: Drive, since: float = 0.0) -> Series:
 
 
 def _later(handling: Handling, since: float) -> Handling:
-    """The same from a time (s) on."""
+    """A copy of the manoeuvre that starts at a time (s)."""
 
     def moved(control: Control) -> Control:
         return tuple((time - since, value) for time, value in control)
@@ -274,7 +275,7 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """What an engine builds: the bodies, and the compiled forces with their table."""
+    """The car as engines build it: the bodies, and the compiled forces with their table."""
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
 
 

@@ -85,7 +85,7 @@ class Manoeuvre(Strict):
     rough: bool = Field(default=False, description="on the rough road of [road], else on a flat one")
 
     def controls(self) -> Controls:
-        """What the driver does."""
+        """Steering and drive of the driver over time."""
         steer, brake, drive = (
             tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
         )

@@ -1,4 +1,4 @@
-"""What a vehicle on hub forces, and the virtual measurement of these, take for granted."""
+"""Assumptions of a vehicle on hub forces, and of the virtual measurement of these."""
 
 from collections.abc import Callable
 
@@ -33,7 +33,7 @@ vertical speed (m/s) that a rough road may leave between the ends of a run."""
 
 
 def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
-    """What a run takes for granted that is held by a method, or goes over the road (ON_TYRES).
+    """Assumptions of a run that is held by a method, or goes over the road (ON_TYRES).
 
     angles : as measured, beside which a run is judged; None to list only.
     """
@@ -42,7 +42,8 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
 
 
 def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
-    """Of springs, mounts and bars without stops, whose travels (m, rad) are told by name: a travel_force is one."""
+    """Assumptions on springs, mounts and bars without stops, whose travels (m, rad) are told by name: a travel_force is
+    one."""
     kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
     listed = []
     for kind, of, unit, most in kinds:
@@ -57,7 +58,7 @@ def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str
 
 
 def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
-    """Of linear tyres on two tracks."""
+    """Assumptions on linear tyres on two tracks."""
     return [
         *_pressing(vehicle, PUSHES),
         Assumption(
@@ -84,7 +85,7 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
 
 
 def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
-    """Of tyres that may pull by so much (N) at their edge; nothing of those that only push."""
+    """Assumptions on tyres that may pull by so much (N) at their edge; nothing of those that only push."""
     lifting = Assumption(
         "tyres press",
         "the linear tyres of the measurement stay on the road",
@@ -97,7 +98,7 @@ def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
 
 
 def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:
-    """Of a cut vehicle."""
+    """Assumptions on a cut vehicle."""
     listed = [
         Assumption(
             "upright",
@@ -140,7 +141,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
 
 
 def _balanced(vehicle: CutVehicle) -> Assumption:
-    """Of measured forces."""
+    """Assumption that measured forces carry the vehicle."""
     return Assumption(
         "balance",
         "over the run the vertical forces carry the weight",
@@ -159,7 +160,7 @@ def carried(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndar
 
 
 def _sampled(scene: HubScene, road: Road) -> Assumption:
-    """Of a virtual measurement."""
+    """Assumption on the sampling of a virtual measurement."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
     other = ' or use forces.interpolation = "smooth",' if rule == "linear" else ""
@@ -174,7 +175,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
 
 
 def _beside(run: Result, angles: Angles | None) -> Watched:
-    """Roll and pitch beside the measured ones."""
+    """Differences of roll and pitch from the measured angles."""
     assert angles is not None
     times = angles.period * np.arange(len(angles.samples))
     return {

@@ -33,7 +33,7 @@ class Comparison:
 
     @property
     def beside(self) -> str:
-        """What errors and damages are taken against."""
+        """Text that names the run against which errors and damages are taken."""
         return "the true run" if self.truth is not None else "the run with the filter; the true one is not known"
 
     @property

@@ -26,12 +26,12 @@ class HubForces:
     frame: str
 
     def drive(self, step: float, steps: int, interpolation: Interpolation = "linear") -> Drive:
-        """What drives the cut vehicle at half steps."""
+        """The arrays that drive the cut vehicle at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
         return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
-        """With white noise of standard deviations (6 h,), N and N m, on every sample."""
+        """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
         noise = normal(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
 
@@ -44,7 +44,7 @@ class Angles:
     period: float
 
     def noisy(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
-        """With white noise of these standard deviations of angle (rad) and rate (rad/s)."""
+        """The angles with white noise of these standard deviations of angle (rad) and rate (rad/s)."""
         noise = normal(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
@@ -77,7 +77,7 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
 
 
 def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
-    """What is recorded of a run at every so many of its steps, without noise."""
+    """Hub forces and angles of a run at every so many of its steps, without noise."""
     n, period = run.states.shape[1] // 2, float(run.times[1]) * every
     angles = run.states[::every, [ROLL, PITCH, n + ROLL, n + PITCH]]
     wrenches = run.wrenches[::every]

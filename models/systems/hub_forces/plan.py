@@ -1,4 +1,4 @@
-"""What a scene of hub forces will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of hub forces: printed by ``twinrig show``, checked before any run."""
 
 import json
 from dataclasses import replace
@@ -91,7 +91,7 @@ def describe(scene: HubScene) -> str:
 
 
 def doubts(scene: HubScene) -> tuple[str, ...]:
-    """What the Kalman filter says against files that it would follow; a virtual measurement is not made for it."""
+    """Objections of the Kalman filter to the measured files; a virtual measurement is not made for it."""
     if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING):
         return ()
     from models.systems.hub_forces.run import Measurement
@@ -101,13 +101,14 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
 
 
 def _frames(vehicle: CutVehicle) -> str:
-    """In whose axes those of elements are fixed."""
+    """Text on the bodies in whose axes the elements' axes are fixed."""
     others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
     return "; ".join(["in the chassis' axes", *others])
 
 
 def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
-    """What each engine has as its own and what it shares, counted in the models as they are built."""
+    """Lines on the forces that each engine computes by native elements and those that all engines share, counted in
+    built models."""
     shared = "hub forces" if scene.road is None else "hub forces, tyres on the road"
     if scene.forces_with(scene.stabilise.method) == "compiled":
         return [_line("native", "bodies and joints"), _line("shared", f"springs, mounts and bars, {shared}")]
@@ -121,7 +122,7 @@ def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
 
 
 def _noise(scene: HubScene) -> str:
-    """What every sample has, as is stated of files, or was added to a virtual measurement."""
+    """Text on the noise of every sample, stated of files or added to a virtual measurement."""
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
@@ -155,7 +156,7 @@ def judged(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
 
 
 def _of_file(text: str) -> str:
-    """What a finding says, without the remedy of a channel map that is not there."""
+    """Text of a finding without its advice on a channel map, which plain files do not have."""
     before, colon, _ = text.partition("; give sign")
     return before + "." if colon else text.replace(" in the channel map", "")
 

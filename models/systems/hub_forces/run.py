@@ -45,7 +45,8 @@ MOTION = {name: (column, "rad") for name, column in ANGLES.items()} | {"x": (X, 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What drives the runs of a scene: hub forces and angles, and the true run (None) where both are virtual.
+    """Measurement that drives the runs of a scene: hub forces and angles, and the true run (None) where both are
+    virtual.
 
     errors : of the steps of the true run, where they were asked for.
     """
@@ -78,7 +79,7 @@ class Measurement:
         return free
 
     def start(self, drive: Drive) -> np.ndarray:
-        """At rest in the design position (2 n,); an enforced tilt begins where its file does."""
+        """Initial state (2 n,): at rest in the design position; an enforced tilt begins where its file does."""
         n = self.vehicle.size
         start = np.zeros(2 * n)
         if drive.guide is not None and drive.pull is None:
@@ -99,7 +100,7 @@ def with_angles(drive: Drive, angles: np.ndarray, period: float, step: float) ->
 
 
 def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
-    """What transducers say: of the files, or of a run on the road, with its noise.
+    """The transducers' measurement: from files, or from a run on the road with noise added.
 
     error : whether the error of the steps of that run is estimated, by further runs.
     """
@@ -178,7 +179,7 @@ def principal(vehicle: CutVehicle, run: HubRun, since: float = 0.0) -> Series:
 
 
 def _moving(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Those that carry more than a small share of what the largest of the same unit does."""
+    """Channels whose values are more than a small share of the largest channel's in the same unit."""
     change = {name: float(np.std(values)) for name, values in channels.items()}
     most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
     largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)

@@ -124,7 +124,7 @@ class HubScene(SceneFile):
         return np.tile(np.repeat([self.forces.force_deviation, self.forces.moment_deviation], 3), len(vehicle.hubs))
 
     def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:
-        """Both files; raises InputError."""
+        """Hub forces and angles of the scene's files; raises InputError."""
         assert self.forces.file is not None and self.angles.file is not None
         columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COMPONENTS.items()}
         path = self.path(self.forces.file, "forces.file")
@@ -171,7 +171,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
 
 
 def _check_file_only(file: str, scene: HubScene) -> None:
-    """What a virtual measurement can choose, and files have as they are."""
+    """Refuse a file together with keys that only a virtual measurement can choose."""
     for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
         entries = getattr(scene, table)
         if name in entries.model_fields_set:

@@ -51,7 +51,7 @@ class Tilt:
 
 @dataclass
 class FilterState:
-    """What a filter knows after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
+    """State of the tilt filter after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
     squared and their count, the squares (2, 2) of unexplained and of whole rates of roll and pitch, and the sums (5, 4)
     of innovations that ``tilt_march.march`` keeps."""
 
@@ -130,8 +130,8 @@ class TiltFilter:
         return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
 
     def doubts(self) -> tuple[str, ...]:
-        """What the innovations say against the measurement: too large, or with a mean; an angle that is wrong by a
-        constant leaves no trace in them."""
+        """Objections to the measurement by the filter's innovations: too large, or with a mean; an angle that is wrong
+        by a constant leaves no trace in them."""
         large = (
             f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
             f"to {SURPRISED:g} is not said): {REMEDY}"

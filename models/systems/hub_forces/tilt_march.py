@@ -8,7 +8,7 @@ from models.machine.compiled import njit
 
 
 class Noise(NamedTuple):
-    """What the filter is told of errors: dt (s), a step; process (4, 4), what the covariance gains in it; variances
+    """Noise settings of the tilt filter: dt (s), a step; process (4, 4), what the covariance gains in it; variances
     (4,) of measured values."""
 
     dt: float

@@ -1,4 +1,4 @@
-"""What a recording, and a vehicle in space on its forces, take for granted."""
+"""Assumptions of a recording, and of a vehicle in space on its forces."""
 
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ PULL = 0.2
 def assumptions(
     scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None
 ) -> list[Assumption]:
-    """What the run that is handed on takes for granted; exam : of it, None to list only.
+    """Assumptions of the run whose forces are handed on; exam : of it, None to list only.
 
     Of the pitch plane (vehicle None) its own system says the rest.
     """
@@ -29,7 +29,7 @@ def assumptions(
 
 
 def _in_range(exam: "Examination | None") -> Assumption:
-    """Of the transducers."""
+    """Assumption that transducers stay within their ranges."""
 
     def clipped() -> Watched:
         """Share of samples at an extreme where they pile up, of every channel that is put in."""
@@ -48,7 +48,7 @@ def _in_range(exam: "Examination | None") -> Assumption:
 
 
 def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
-    """Of a cut vehicle, by the answers of its run."""
+    """Assumptions on a cut vehicle, by the answers of its run."""
 
     def read(name: str) -> np.ndarray:
         assert exam is not None and exam.outcome is not None
@@ -103,7 +103,7 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | No
 
 
 def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
-    """Of a free run on forces that keep their directions, where roll or pitch were measured."""
+    """Assumptions on a free run on forces that keep their directions, where roll or pitch were measured."""
     if scene.stabilise.method != "none" or exam is None:
         return []
     frames = {s.frame for s in exam.recording.signals if s.at in vehicle.hubs and exam.put_in(s)}

@@ -69,7 +69,7 @@ class Grid:
 
     @property
     def times(self) -> np.ndarray:
-        """All of them (n,)."""
+        """Times (s) of all samples (n,)."""
         return self.start + self.period * np.arange(self.count)
 
     def places(self, times: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns)
 
 
 def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
-    """What was done to bring all onto one clock."""
+    """A finding on how all channels were brought onto one clock."""
     ways: dict[str, list[str]] = {}
     for group in groups:
         faster = group.timing.period < grid.period * (1 - SAME)
@@ -143,7 +143,7 @@ def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
 
 
 def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
-    """What is added to each file's times (s), when the common time was 0, and what to say of it."""
+    """Shift of each file's times (s), the date at which the common time is 0, and findings on both."""
     offsets = [file.offset for file in scene.files]
     known = [source.start for source in sources if source.start is not None]
     if len(known) == len(sources):
@@ -171,7 +171,7 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
 
 
 def _of_group(group: Group) -> Iterator[Finding]:
-    """What was found in the times of a group, and whether they seem to be of another unit."""
+    """Findings on the times of a group, and on whether they seem to be in another unit."""
     yield from group.timing.findings
     clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
     slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)

@@ -1,4 +1,5 @@
-"""What the findings of a recording do to the section forces: run once as recorded and once with each finding put right.
+"""Changes of the section forces by the faults found in a recording: run once as recorded and once with each finding put
+right.
 
 A finding that names its size says how to put it right: a late channel is shifted, a wrong factor taken out, a spike
 left out. Of a gap nobody knows what was lost: there the deviation that its bridge is known to is planted instead. The
@@ -60,7 +61,7 @@ class Consequence:
         )
 
     def __str__(self) -> str:
-        """With figures, for an engineer."""
+        """The consequence with its figures, as a sentence for an engineer."""
         where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
         if not self.section:
             return f"{where}: what it does to the section forces is not known"
@@ -203,7 +204,7 @@ def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, pe
 
 
 def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Without spikes of one or two samples."""
+    """Samples without spikes of one or two samples."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
         at, values = spikes(samples[s])[0], samples[s].copy()

@@ -1,4 +1,4 @@
-"""How far the steps of a recording's run leave its section forces from those of steps without length.
+"""Errors that the step length of a recording's run leaves in its section forces.
 
 A step is as long as a sampling period as a rule: longer ones would take the samples' noise for motion. So a stretch of
 the recording is run in its steps and in half of them.

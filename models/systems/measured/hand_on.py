@@ -1,4 +1,5 @@
-"""What is handed on of a run: section forces in files for whoever goes on with them, and the labelled result."""
+"""Results of a recording's run for later users: section forces in files for whoever goes on with them, and the labelled
+result."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -54,7 +55,7 @@ def hand_on(
 
 
 def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
-    """Those answers that are section forces and moments."""
+    """The answers that are section forces and moments."""
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 

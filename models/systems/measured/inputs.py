@@ -1,4 +1,4 @@
-"""What a recording puts into a cut vehicle: hub forces and angles sample by sample, and as rows at half steps.
+"""Inputs of a cut vehicle from a recording: hub forces and angles sample by sample, and as rows at half steps.
 
 Every number depends on the samples about it alone, never on where a block begins: a run in blocks reads the same bits
 as a run in one piece. Between samples hub forces follow the cubic through the four about it: a straight line takes 1 to
@@ -108,7 +108,7 @@ class Inputs:
 
     @property
     def frame(self) -> str:
-        """Of the hub forces."""
+        """Frame of the hub forces."""
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property

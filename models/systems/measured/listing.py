@@ -1,4 +1,4 @@
-"""What is in a measurement file: its channels, and a scene to begin with, for an engineer to correct.
+"""Listing of a measurement file: its channels, and a draft scene for an engineer to correct.
 
 What a channel probably measures is read from its name and unit, in English and German, as FL_Fx, WFT_RR_MZ, Radkraft
 vorne links, ax_dash or Nickrate are written.
@@ -70,7 +70,8 @@ TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"
 
 @dataclass(frozen=True)
 class Guess:
-    """Of one channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is not sure.
+    """Guess at the meaning of a channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is
+    not sure.
 
     ``at`` is empty where no place can be named. ``left_out`` says why the guess is not to be used as it stands.
     """
@@ -85,7 +86,7 @@ class Guess:
 
 
 def guess(channel: Channel) -> Guess | None:
-    """None where nothing can be made of a channel; what is missing in a guess is empty."""
+    """A guess at the meaning of a channel; None where there is no clue; what is missing in a guess is empty."""
     words, family = _words(channel.name), _words(channel.family)
     kinds = quantities(channel.unit) or tuple(WORDS)
     what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)

@@ -81,7 +81,7 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     limited = trusted(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS, "pitch"):
         limited = replace(limited, unchecked="")  # the run is compared with it
-    figures = score.own_figures(result, scene.vehicle_parameters())
+    figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
@@ -113,7 +113,7 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
 
 
 def _frames(job: PlaneJob) -> set[str]:
-    """Of the forces at both axles."""
+    """Frames of the forces at both axles."""
     return {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
 
 
@@ -146,8 +146,8 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
 
 
 def trusted(scene: Scene, deviation: float) -> Trust | None:
-    """What limits the run of a scene whose forces have noise of this standard deviation (N) already; None where it is
-    held to a measured pitch."""
+    """How long a scene's run can be trusted when its forces have noise of this standard deviation (N); None where the
+    pitch is held to a measured pitch."""
     assembly = assemble(scene)
     bounds = drift_trust.trust(assembly)
     if bounds is None or deviation <= 0:
@@ -156,14 +156,14 @@ def trusted(scene: Scene, deviation: float) -> Trust | None:
     return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 
-def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:
+def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
     """Vertical force (n,) of an axle, short gaps bridged; InputError for a long one, or a wheel that is missing."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
         whole, left, right = map(repr, AXLES[axle])
         text = f"the vertical force is needed at {whole}, or at both {left} and {right}"
         raise InputError(job.file, "files.channels", None, text)
-    return np.asarray(sum(_whole(job, signal, said) for signal in signals))
+    return np.asarray(sum(_whole(job, signal, findings) for signal in signals))
 
 
 def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
@@ -172,7 +172,7 @@ def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
     return values
 
 
-def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
+def _held(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
     """The effect's table, and its file of pitch and rate, nose up."""
     hold, filtered = job.hold, job.hold.method == "kalman"
     columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
@@ -182,7 +182,7 @@ def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
         for signal in [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check][:1]:
-            values = job.recording.samples(signal) if filtered else _whole(job, signal, said)
+            values = job.recording.samples(signal) if filtered else _whole(job, signal, findings)
             columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:
         raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS!r}")
@@ -193,7 +193,7 @@ def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome:
+def _outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> Outcome:
     """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
     channels = dict[Answer, np.ndarray]()
@@ -212,4 +212,4 @@ def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome
     columns.write(0, np.column_stack(list(channels.values())))
     surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
     period, count = float(result.times[1]), len(result.times)
-    return Outcome(columns, tuple(channels), period, count, float(surprise), said, counts=result.counts())
+    return Outcome(columns, tuple(channels), period, count, float(surprise), findings, counts=result.counts())

@@ -1,4 +1,4 @@
-"""What a scene of a recording will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a recording's scene: printed by ``twinrig show``, checked before any run."""
 
 from collections.abc import Sequence
 

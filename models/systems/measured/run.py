@@ -59,7 +59,7 @@ NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "an
 
 @dataclass
 class Examination:
-    """What there is of a recording, in the order in which it is made; what was not reached is empty.
+    """Everything made of a recording, in the order of its making; what was not reached is empty.
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
     seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
@@ -88,7 +88,7 @@ class Examination:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What the checks look at."""
+        """The evidence that the checks look at."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in NOISE.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
@@ -105,7 +105,7 @@ class Examination:
 
     @property
     def outcome(self) -> Outcome | None:
-        """The same; None where none was made."""
+        """The outcome of the run that is handed on; None where no run was made."""
         return self.runs.get(self.chosen)
 
     def put_in(self, signal: Signal) -> bool:
@@ -129,12 +129,12 @@ class Examination:
         return SectionRun(vehicle, recording, sections, *settings)
 
     def march(
-        self, name: str, folder: Path, told: Callable[[float, float], None] = silent, error: bool = False
+        self, name: str, folder: Path, progress: Callable[[float, float], None] = silent, error: bool = False
     ) -> Outcome:
         """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
         job = self.job(name)
         if isinstance(job, SectionRun):
-            return march(job, folder, told)
+            return march(job, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
         run = run_plane(job, folder, self.scene.limits, error and name == self.chosen)
         self.verdicts[name], self.plane = run.verdict, run.result
@@ -153,12 +153,12 @@ def run(
     engine: str = "",
     folder: Path | None = None,
     progress: Progress = silent,
-    whole: bool = False,
+    whole_run: bool = False,
     error: bool = False,
 ) -> Result:
     """Run a recording held as its scene says; the result's detail is the Examination.
 
-    folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole : whether
+    folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole_run : whether
     the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
     is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in
     the detail, another one raises RunFailed.
@@ -167,7 +167,7 @@ def run(
     folder = folder or Path(temporary.name if temporary else "")
     exam = _begun(scene, engine or scene.run.engine, folder, progress, error)
     exam.temporary = temporary
-    if whole:
+    if whole_run:
         _examined(exam, folder, progress, error)
     else:
         begun = time.process_time()
@@ -177,7 +177,7 @@ def run(
     try:
         return _with_error(labelled, exam, folder / WORK / "error") if error else labelled
     except RunFailed as failure:
-        if not whole:
+        if not whole_run:
             raise
         exam.failed[exam.chosen] = str(failure)
         exam.verdicts[exam.chosen] = Verdict("rejected", failure.reason)
@@ -236,7 +236,7 @@ def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Rec
 
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
-    """How each run is held: free, and by the stabiliser that the scene names."""
+    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
     stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
     held = {
         stabilised.method: Hold(
@@ -309,9 +309,9 @@ def _predicted(exam: Examination, vehicle: CutVehicle) -> None:
     )
 
 
-def _began(recording: Recording, what: str, axis: str, chassis: str) -> float:
+def _began(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
     """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
-    for signal in recording.find(what, chassis, axis)[:1]:
+    for signal in recording.find(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
     return 0.0
@@ -341,11 +341,11 @@ def _left(name: str, progress: Progress, begin: float, share: float) -> Callable
     """Progress of a run with the time that it will still take."""
     started, first = time.monotonic(), [-1.0]
 
-    def told(done: float, whole: float) -> None:
-        first[0] = done if first[0] < 0 else first[0]
+    def told(completed: float, total: float) -> None:
+        first[0] = completed if first[0] < 0 else first[0]
         spent = time.monotonic() - started
-        left = f", {spent * (whole - done) / (done - first[0]):.0f} s left" if done > first[0] else ""
-        progress(f"{name}: {done:.0f} of {whole:.0f} s{left}", begin + share * done / max(whole, 1e-9))
+        left = f", {spent * (total - completed) / (completed - first[0]):.0f} s left" if completed > first[0] else ""
+        progress(f"{name}: {completed:.0f} of {total:.0f} s{left}", begin + share * completed / max(total, 1e-9))
 
     return told
 
@@ -371,7 +371,7 @@ def _judged(exam: Examination) -> None:
 
 
 def _weighed(exam: Examination, work: Path) -> None:
-    """What the findings do to the section forces that are handed on, and the verdicts that follow from it: by the run
+    """Compute the changes of the section forces by each finding, and the verdicts that follow: by the run
     with the stabiliser, or by the free one where that failed."""
     name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
     if name in exam.runs:

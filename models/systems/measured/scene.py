@@ -28,7 +28,7 @@ Engine = Literal["reference", "exudyn", "mujoco"]
 
 @dataclass(frozen=True)
 class Rig:
-    """What a recording drives.
+    """The vehicle that a recording drives, and where its sensors and sections are.
 
     name : of the vehicle or the parameter set; chassis : whose angles hold it; sections that can be asked for; angles :
     the components that hold it; vehicle : cut at its wheels, None of the pitch plane.

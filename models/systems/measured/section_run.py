@@ -77,7 +77,7 @@ class SectionRun:
 
     @property
     def count(self) -> int:
-        """Answers of the whole run."""
+        """Number of answers in the whole run."""
         return (self.recording.count - 1) // self.grid.skip + 1
 
 
@@ -108,7 +108,8 @@ class Checkpoint:
     of: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> dict[str, np.ndarray] | None:
-        """What was saved, None if nothing; InputError, which names the input that differs, if it is of others."""
+        """The saved arrays, None without a checkpoint; InputError, which names the input that differs, for other
+        inputs' checkpoint."""
         if not self.path.is_file():
             return None
         try:
@@ -124,7 +125,7 @@ class Checkpoint:
         return arrays
 
     def save(self, **arrays: np.ndarray) -> None:
-        """Replace what was saved by these arrays."""
+        """Save these arrays in place of the earlier ones."""
         buffer = BytesIO()
         np.savez(buffer, of=np.array(json.dumps(self.of)), **arrays)  # type: ignore[arg-type]
         write_whole(self.path, buffer.getvalue())
@@ -196,7 +197,7 @@ class _March:
         self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
     def outcome(self) -> Outcome:
-        """What there is until now."""
+        """The outcome of the march up to now."""
         steps = (self.done - 1) * self.grid.every
         return Outcome(
             self.columns,
@@ -259,7 +260,7 @@ class _March:
         return states
 
     def _drive(self, first: int, steps: int) -> Drive:
-        """What drives the vehicle from a sample on."""
+        """The arrays that drive the vehicle from a sample on."""
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
         wrenches = self.inputs.around(first, used + 1)
@@ -275,7 +276,8 @@ class _March:
         return replace(free, guide=guide, pull=pull)
 
     def _start(self) -> np.ndarray:
-        """At rest in the design position; where roll and pitch are held, these and their rates as measured."""
+        """Initial state: at rest in the design position; where roll and pitch are held, these and their rates as
+        measured."""
         n = self.job.vehicle.size
         state, held = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
         if self.prescribed is not None:
@@ -298,7 +300,7 @@ class _March:
 
 
 def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
-    """What decides the bits of a run, by names that a user understands."""
+    """Checksums of all inputs that decide a run's values, by names that a user understands."""
     library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = Drive(np.zeros((1, 6 * len(inputs.hubs))))

@@ -66,7 +66,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Sections:
-    """What is read of a run of a vehicle; answers in the order of their columns, ``columns`` those of the kernel's row.
+    """Section forces and other answers that are read of a vehicle's run; answers in the order of their columns,
+    ``columns`` those of the kernel's row.
 
     frame : axes of guides and hubs, "body" for the chassis', "hub" for those of what they carry.
     """
@@ -164,7 +165,7 @@ def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
 def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
     """Last joint (g,) of every guided body and what acts behind it (g, b + h + 3 e), as the kernel reads it."""
     heavy = [body.name for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
-    ends = [end for element in vehicle.elements for end in (element.one, element.two, element.frame)]
+    ends = [end for element in vehicle.elements for end in (element.first_body, element.second_body, element.frame)]
     owners = [*heavy, *(tyre.body for tyre in vehicle.whole.tyres), *ends]
     parents = {body.name: body.parent for body in vehicle.whole.bodies}
 

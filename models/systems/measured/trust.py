@@ -32,7 +32,7 @@ POINTS = 2000
 
 @dataclass(frozen=True)
 class Level:
-    """How wrong a measurement is.
+    """Error level of a measurement: deviations of forces and moments, bias, initial tilt and rate.
 
     force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
     hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
@@ -51,7 +51,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Drift:
-    """What the errors of a measurement make of a free run.
+    """Drift of a free run by the errors of its measurement.
 
     means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
     deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
@@ -134,14 +134,14 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 class _Law:
     """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
 
-    own: Rigid
+    rigid: Rigid
     frame: str
     times: np.ndarray
     _modes: tuple[np.ndarray, np.ndarray] = field(init=False)
 
     def __post_init__(self) -> None:
-        carried = -self.own.arms[:, 2].mean() * self.own.mass * GRAVITY if self.frame == "inertial" else 0.0
-        values, shapes = np.linalg.eig(np.linalg.solve(self.own.inertia, np.diag([carried, carried, 0.0])))
+        carried = -self.rigid.arms[:, 2].mean() * self.rigid.mass * GRAVITY if self.frame == "inertial" else 0.0
+        values, shapes = np.linalg.eig(np.linalg.solve(self.rigid.inertia, np.diag([carried, carried, 0.0])))
         object.__setattr__(self, "_modes", (np.sqrt(values.astype(complex)), shapes))
 
     @property

@@ -1,4 +1,4 @@
-"""What a run of a recording is worth: accepted, rejected, or to be stabilised first, with the threshold that says so.
+"""Verdict on a recording's run: accepted, rejected, or to be stabilised first, with the threshold that says so.
 
 A measured channel that was not put in is held beside what the run says of it: error by frequency, damage, trust.
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.drift import score
-from models.drift.score import SURPRISED, Errors, Limits, Own, Verdict, low_pass, rms
+from models.drift.score import SURPRISED, Errors, Limits, RunFigures, Verdict, low_pass, rms
 from models.fatigue.damage import SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
 from models.measured.signal import Signal
@@ -180,7 +180,7 @@ def judge(
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
         return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
     verdict = score.blind_verdict(
-        own_figures(run, job.vehicle),
+        figures_of_run(run, job.vehicle),
         EFFECTS[job.hold.method],
         run.period * (run.done - 1),
         limits,
@@ -206,7 +206,7 @@ def judge_beside_truth(
     run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS, slope: float = SLOPE
 ) -> Verdict:
     """The verdict on a run of a virtual measurement, beside the true one."""
-    figures = own_figures(run, true.vehicle), errors(run, true, slope)
+    figures = figures_of_run(run, true.vehicle), errors(run, true, slope)
     return _in_space(score.verdict(*figures, EFFECTS[hold.method], limits))
 
 
@@ -218,21 +218,21 @@ def _in_space(verdict: Verdict) -> Verdict:
     return Verdict(verdict.word, reason)
 
 
-def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:
+def figures_of_run(run: Outcome, vehicle: CutVehicle) -> RunFigures:
     """Figures of a run by itself, of roll or pitch, whichever is worse; cost is not among them (0)."""
     inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
     tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
-    figures = list[Own]()
+    figures = list[RunFigures]()
     for i, name in enumerate(("roll", "pitch")):
         moment, rate = run.samples(f"stabiliser {name}"), run.samples(f"{chassis} {name} rate")
         moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
         shares = _share(moment, turning), _share(low_pass(moment, run.period), low_pass(turning, run.period))
-        figures.append(Own(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
+        figures.append(RunFigures(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
     return max(figures, key=lambda each: each.moment_share_band)
 
 
-def _share(part: np.ndarray, whole: np.ndarray) -> float:
-    return rms(part) / rms(whole) if rms(whole) > 0 else float(rms(part) > 0)
+def _share(values: np.ndarray, total: np.ndarray) -> float:
+    return rms(values) / rms(total) if rms(total) > 0 else float(rms(values) > 0)
 
 
 def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
@@ -258,7 +258,8 @@ def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
 
 
 def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
-    """What a run is beside the true one, at the answers' times: section forces of springs, mounts and bars, angles."""
+    """Errors of a run against the true run, at the answers' times: section forces of springs, mounts and bars,
+    angles."""
     every, chassis = round(run.period / true.step), true.vehicle.chassis
     loads, states = true.run.elements[::every][: run.done], true.run.states[::every][: run.done]
     damage, force = dict[str, float](), dict[str, float]()

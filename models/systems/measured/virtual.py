@@ -68,7 +68,7 @@ class VirtualTable(Strict):
 
 @dataclass(frozen=True)
 class VirtualMeasurement:
-    """What would be recorded if nothing were wrong with any transducer.
+    """Signals that faultless transducers would record.
 
     signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
     every : steps of a sampling period. errors : of the steps of the true run, where they were asked for.
@@ -135,7 +135,7 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
 
 
 def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
-    """Of hubs, motion and check channels, in the order of their columns."""
+    """Signals of hubs, motion and check channels, in the order of their columns."""
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
         (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB

@@ -1,4 +1,4 @@
-"""What the equations of the pitch-plane vehicle take for granted; an effect says in its own file what it adds."""
+"""Assumptions of the pitch-plane vehicle's equations; an effect says in its own file what it adds."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -28,7 +28,7 @@ takes part in the damage: the limit that models/drift/score.py judges stabiliser
 
 
 def assumptions(assembly: Assembly) -> list[Assumption]:
-    """What the equations of this scene take for granted."""
+    """Assumptions of the equations of this scene."""
     lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
     listed = _of_tyres(assembly, lifts) if assembly.mode in ("free", "road") else []
     listed.append(_springs(assembly, lifts))
@@ -51,7 +51,7 @@ def principal(assembly: Assembly) -> tuple[str, ...]:
 
 
 def watching(**channels: str) -> partial[Watched]:
-    """What an assumption watches: channels of a run by the names of the parts that they are of."""
+    """Watch function of an assumption: channels of a run by the names of the parts that they are of."""
     return partial(_channels, channels)
 
 
@@ -116,7 +116,7 @@ def upright(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
 
 
 def _remedy(assembly: Assembly) -> str:
-    """What keeps the pitch small."""
+    """Advice on what keeps the pitch small."""
     if assembly.guided:
         return "no effect lifts it: check the file of the prescribed pitch, and its unit"
     if assembly.mode in ("free", "road"):
@@ -125,7 +125,7 @@ def _remedy(assembly: Assembly) -> str:
 
 
 def _artificial(assembly: Assembly) -> Assumption:
-    """What holds the pitch, or the heave, does little beside the vehicle's own forces."""
+    """Assumption that the forces which hold pitch or heave are small beside the vehicle's own forces."""
     moved = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
     return Assumption(
@@ -141,10 +141,10 @@ def _artificial(assembly: Assembly) -> Assumption:
 def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
     """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
     are too few or too far apart."""
-    from models.drift.score import own_figures
+    from models.drift.score import figures_of_run
 
     with suppress(InputError):
-        figures = own_figures(run, p)
+        figures = figures_of_run(run, p)
         force = {"force": np.array([figures.force_share_band])} if heave else {}
         return {"moment": np.array([figures.moment_share_band]), **force}
     return {}

@@ -56,7 +56,7 @@ class NoisePaths:
     threshold: float = DRIFT
 
     def assembly(self, path: int) -> Assembly:
-        """What the scene computes with this number as its path."""
+        """The assembly of the scene with the noise path of this number."""
         assembly = self.base
         for name, p in self.rest:
             with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
@@ -68,7 +68,7 @@ class NoisePaths:
         return build(self.engine, self.assembly(path), self.settings).run()
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, or why it failed; raises PathFailed for what is no failure of physics."""
+        """Every path's run, or its RunFailed; raises PathFailed for failures that are not of the simulated physics."""
         for path in paths:
             try:
                 yield self.trajectory(path)
@@ -211,7 +211,7 @@ class MujocoThreads(NoisePaths):
         return states, any(warnings(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
-        """As of all noise paths."""
+        """Facts by which the job's saved blocks are known, as of all noise paths."""
         return {**super().facts(), "way": "threads"}
 
 

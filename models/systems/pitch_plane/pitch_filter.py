@@ -66,7 +66,7 @@ class PitchStep:
         self._respond = responding(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Over one step from x (7,): x after it, and its derivatives.
+        """Advance the state x (7,) by a step: the new state, and its derivatives.
 
         x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's
         They are those to x, (7, 7), and to the two force samples at the step's start and at its end, (7, 2) per N.
@@ -134,7 +134,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the filter, or the smoother, found at times i ``period`` (s), n of them.
+    """Estimates of the pitch filter or smoother at times i ``period`` (s), n of them.
 
     states : (n, 7), see above
     covariances : (n, 7, 7), without what the force sample of that very instant has done already
@@ -161,7 +161,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Of the step that ends at each time: its prediction (n, 7), transition and noise (n, 7, 7)."""
+    """Filter steps that end at each time: prediction (n, 7), transition and noise (n, 7, 7)."""
 
     predictions: np.ndarray
     transitions: np.ndarray
@@ -268,7 +268,7 @@ def _march(filtered: PitchFilter) -> tuple[Estimate, _Steps]:
 
 
 def _smoothed(filtered: Estimate, steps: _Steps) -> Estimate:
-    """The same by filterpy's Rauch-Tung-Striebel smoother.
+    """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
     It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
     """

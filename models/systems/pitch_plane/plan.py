@@ -1,4 +1,4 @@
-"""What a scene will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a pitch-plane scene: printed by ``twinrig show``, checked before any run."""
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import Refused
@@ -102,7 +102,7 @@ def trust_line(assembly: Assembly) -> list[str]:
 
 
 def doubt_lines(assembly: Assembly) -> list[str]:
-    """What contradicts the scene, a line each."""
+    """Sentences on what contradicts the scene, a line each."""
     return [_line("doubt", text) for text in assembly.doubts]
 
 

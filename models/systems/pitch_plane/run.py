@@ -100,7 +100,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
 
 def _looser(again: Callable[[Settings], Series], settings: Settings) -> Series:
-    """With the longest step of the engine's own, too, twice as long, where its input allows that: it may be what bounds
+    """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
     the error."""
     try:
         return again(replace(settings, step=2.0 * settings.step))
@@ -113,7 +113,8 @@ def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Se
 
 
 def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """What errors of enforced moment and force are held against: the chassis' inertia, as these may be nothing."""
+    """Sizes to which errors of enforced moment and force are related: from the chassis' inertia, as both may be
+    zero."""
     sizes = {}
     if "enforced_moment" in channels:
         sizes["enforced_moment"] = size_of(channels["inertia_term"][2])
@@ -143,7 +144,7 @@ def _other(settings: Settings, times: float, share: float) -> Settings:
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:
-    """How many steps lie between two saved rows."""
+    """Number of steps between two saved rows."""
     wanted = scene.run.output_step
     if wanted is None:
         return 1

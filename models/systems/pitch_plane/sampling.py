@@ -54,7 +54,7 @@ def numbers(times: np.ndarray, rate: float) -> np.ndarray:
 
 
 def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
-    """What is read at the sensor's instant at or last before each row, shape (n,).
+    """Sampled values at the sensor's last instant at or before each row, shape (n,).
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
     """
@@ -73,7 +73,7 @@ def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Sce
 
 
 def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
-    """That a sensor reads no more than it can; channels by the names of what reads them."""
+    """Assumption that a sensor stays within its range; channels by the names of their sensors."""
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
     return Assumption(f"{effect} in range", says, remedy, watching(**channels), unit, -limit, limit)
 

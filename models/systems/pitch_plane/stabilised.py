@@ -28,7 +28,7 @@ from models.drift.score import (
     blind_verdict,
     consistent,
     errors,
-    own_figures,
+    figures_of_run,
     uncertainty,
     verdict,
 )
@@ -122,8 +122,8 @@ def compare(
     benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
     for i, bench in enumerate(benches):
 
-        def told(text: str, part: float, done: int = i) -> None:
-            progress(text, (done + part) / (len(benches) + 1))
+        def told(text: str, share: float, completed: int = i) -> None:
+            progress(text, (completed + share) / (len(benches) + 1))
 
         rows += bench.score(engines[0], () if i else engines[1:], failed, told)
     return benches, rows, failed
@@ -231,7 +231,7 @@ class Bench:
     def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
         """Figures and verdicts; a tumbled run has no damage that could mislead."""
         limits = self.options.limits
-        figures, wrong = own_figures(result, self.parameters), errors(result, self.truth, self.options.slope)
+        figures, wrong = figures_of_run(result, self.parameters), errors(result, self.truth, self.options.slope)
         with_truth = verdict(figures, wrong, effects, limits)
         alone = blind_verdict(
             figures, effects, float(result.times[-1]), limits, self.trusted, consistent(result), uncertainty(result)

@@ -36,7 +36,7 @@ or a stiffness that is wrong together with the inertia would leave a moment that
 
 
 class StageForces(NamedTuple):
-    """What pushes the path and its error columns at the start, the middle and the end of each step.
+    """Forces on the path and on its error columns at the start, the middle and the end of each step.
 
     step : s. forces : (rows, 2) in N, of the wheels. errors : (rows, m, 2) in N, their errors by column. to_middle,
     to_end, to_next : rows of ``forces`` from a step's start to its middle, its end and the next step.
@@ -173,15 +173,14 @@ class Path:
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
     def carry(
-        self, columns: np.ndarray, errors: np.ndarray | None = None, other: Parameters | None = None
+        self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
 
-        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
-        the parameters of a wrong model, whose error forces every column.
-        """
+        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step;
+        wrong_parameters : the parameters of a wrong model, whose error forces every column."""
         count, p = self.steps, self.assembly.parameters.array()
-        wrong = p if other is None else p + SMALL * (other.array() - p)
+        wrong = p if wrong_parameters is None else p + SMALL * (wrong_parameters.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         self.march(compile_carry)(
@@ -217,7 +216,7 @@ def tilted(assembly: Assembly) -> np.ndarray:
 
 
 def tilt_map(path: Path) -> np.ndarray:
-    """How the tilt and its rate at the end of a path follow from those at its start, shape (2, 2).
+    """Matrix that maps tilt and tilt rate at the start of a path to those at its end, shape (2, 2).
 
     The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
     fast motion is in the four numbers.
@@ -245,7 +244,8 @@ def swing(path: Path) -> float:
 
 @dataclass(frozen=True)
 class Covariance:
-    """times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the state, products of two."""
+    """Covariance of the state over time. times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the
+    state, products of two."""
 
     times: np.ndarray
     matrices: np.ndarray

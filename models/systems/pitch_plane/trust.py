@@ -35,7 +35,7 @@ SMALL = 0.2
 
 
 def small_errors(angle: float) -> Assumption:
-    """That the error up to which a run is trusted is one for which the laws hold."""
+    """Assumption that the pitch error up to which a run is trusted is small enough for the growth laws."""
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
     return Assumption("small errors", says, remedy, partial(_allowed, angle), "rad", most=SMALL)
 
@@ -46,7 +46,7 @@ def _allowed(angle: float, run: Result) -> Watched:
 
 @dataclass(frozen=True)
 class Growth:
-    """What the wheel forces alone say, before any run.
+    """Growth of a pitch error by the wheel forces alone, before any run.
 
     times (n,) in s, those of the samples; rate : mean growth rate, 1/s; until (n,) : the rate in the sinh law at each
     time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
@@ -116,22 +116,22 @@ def interpolation(assembly: Assembly, longest: float = STEP) -> Curve:
     return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
-def model(assembly: Assembly, other: Parameters, longest: float = STEP) -> Curve:
-    """Error of a run with the parameters ``other`` instead of the assembly's.
+def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> Curve:
+    """Error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
     The difference is carried along a run with the mean of both models, which leaves no error of second order.
     """
     parameters = assembly.parameters.model_dump()
-    change = {name: getattr(other, name) - value for name, value in parameters.items()}
+    change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _carried(path_of(replace(assembly, parameters=mean), longest), other=shifted)
+    return _carried(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
 
 
-def _carried(path: Path, errors: np.ndarray | None = None, other: Parameters | None = None) -> Curve:
+def _carried(path: Path, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None) -> Curve:
     pushes = None if errors is None else errors[:, None, :]
-    _, columns = path.carry(np.zeros((1, 8)), pushes, other)
+    _, columns = path.carry(np.zeros((1, 8)), pushes, wrong_parameters)
     return Curve(path.times, np.abs(columns[:, 0, 3]))
 
 
@@ -171,7 +171,8 @@ class Trust:
 
 
 def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
-    """What limits a scene's run; None for a run that is guided, held, or on a road, where no error grows."""
+    """How long a scene's run can be trusted, and why; None for a run that is guided, held, or on a road, where no error
+    grows."""
     forces = assembly.input
     try:
         path_of(assembly)
@@ -216,7 +217,7 @@ def _axles(assembly: Assembly) -> "AxleForces":
 
 
 def _unchecked(assembly: Assembly) -> str:
-    """What was not looked at of wheel forces from a file."""
+    """Sentence on the properties of wheel forces from a file that were not checked."""
     from models.measured.axle_forces import unchecked
 
     return unchecked(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

@@ -1,4 +1,4 @@
-"""What a ride takes for granted. Where no values over time are known they are Gaussian, and judged by three deviations.
+"""Assumptions of a ride. Where no values over time are known they are Gaussian, and judged by three deviations.
 
 Linear vehicles have tyres that would pull, springs without stops, angles without an end; spectra of roads are known for
 waves of some lengths; curves are known as far as their tables go.
@@ -37,7 +37,7 @@ UPRIGHT = 0.7
 def assumptions(
     scene: RideScene, vehicle: SpatialVehicle, motion: Motion | None = None, replaced: bool = False
 ) -> list[Assumption]:
-    """What is taken for granted of a vehicle in a scene; ``motion`` of a run, which is judged by it.
+    """Assumptions of a vehicle in a scene of ride; ``motion`` of a run, which is judged by it.
 
     replaced : whether gains stand for bent springs.
     """
@@ -101,9 +101,9 @@ def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
 
 
 def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
-    """Of a straight spring between a wheel and what it carries."""
+    """Assumption on the travel of a linear spring between a wheel and what it carries."""
     wheels = {tyre.body for tyre in vehicle.tyres}
-    ends = {spring.one, spring.two}
+    ends = {spring.first_body, spring.second_body}
     if abs(spring.axis[2]) < UPRIGHT or None in ends or not ends & wheels:
         return
     free = float(scene.options.get("free_travel") or TRAVEL)
@@ -119,7 +119,7 @@ def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of
 
 
 def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
-    """Of a bent spring: by its slopes at rest within a piece of its curves, else within its tables."""
+    """Assumption on a nonlinear spring: by its slopes at rest within a piece of its curves, else within its tables."""
     for kind, curve, unit in (("travel", spring.travel_force, "m"), ("rate", spring.rate_force, "m/s")):
         friction = spring.friction and kind == "rate" and scene.vehicle.small_motion
         if curve is None and not friction:
@@ -201,7 +201,7 @@ def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
 
 
 def _seats(scene: RideScene) -> Iterator[Assumption]:
-    """Of outputs that are weighted for people along the vertical."""
+    """Assumptions on outputs that are weighted for people along the vertical."""
     people = [name for name, by in scene.weighting.items() if by == "Wk"]
     if not people:
         return

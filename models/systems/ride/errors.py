@@ -1,4 +1,4 @@
-"""How far the deviations of linear rides at constant speeds are from those of exact arithmetic.
+"""Rounding errors of the standard deviations of linear rides at constant speeds.
 
 A covariance has no steps. Its error is what rounding makes of it, told by a second solution at some points: by the
 Lyapunov equation itself, refined in extended precision, of a vehicle whose matrices differ by their last digits.

@@ -1,4 +1,4 @@
-"""How far rides in time are from steps without length and from endless copies: drives, copies, gains beside them."""
+"""Errors of rides in time by their step length and their finite number of copies: drives, copies, gains."""
 
 from collections.abc import Callable, Mapping, Sequence
 

@@ -39,7 +39,7 @@ Progress = Callable[[str, float], None]
 
 
 class Sampling(Strict):
-    """What is run in time, and at which speeds."""
+    """Settings of the runs in time: copies, lengths, steps and speeds."""
 
     beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
     copies: int = Field(default=200, ge=2, le=100_000, description="of the vehicle, each on a road of its own")
@@ -57,7 +57,8 @@ class Sampling(Strict):
 
 @dataclass(frozen=True)
 class Nonlinear:
-    """By speed: the vehicle of small motion (N, p), the replaced one, and Monte Carlo where it was asked for.
+    """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
+    Monte Carlo where it was asked for.
 
     shown : the replaced vehicle at the speed of the engines' runs; lifts : whether tyres may, in Monte Carlo alone.
     """
@@ -69,9 +70,9 @@ class Nonlinear:
     shown: StatisticallyLinear
     lifts: bool = False
 
-    def of(self, part: str) -> np.ndarray:
+    def of(self, name: str) -> np.ndarray:
         """One part (N, p) of what was found of the replaced vehicles."""
-        return np.array([getattr(each, part) for each in self.replaced])
+        return np.array([getattr(each, name) for each in self.replaced])
 
     @property
     def deviation(self) -> np.ndarray:
@@ -144,7 +145,7 @@ def _replaced_at(
 def _moved(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, replaced: list[StatisticallyLinear]
 ) -> Spectral:
-    """How the parts of replaced vehicles move, springs about means of their own."""
+    """Motions of the parts of statistically linearised vehicles, springs about their own means."""
     known = dict(zip(speeds.tolist(), replaced, strict=True))
     chosen = few(speeds)
     means = {

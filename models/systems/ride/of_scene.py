@@ -33,7 +33,7 @@ BESIDE = 1.0
 
 @dataclass(frozen=True)
 class Built:
-    """What effects extend: the vehicle, and what becomes of the road under its wheels, one change after another.
+    """Vehicle and road that effects extend: the road under the wheels is changed by one effect after another.
 
     A change keeps the noise; states that it adds to those of the road's own filters come last.
     """
@@ -160,7 +160,7 @@ def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, 
 
 @contextmanager
 def told_by(scene: RideScene) -> Iterator[None]:
-    """What a computation finds wrong names no file: it is told by the scene's key that is to blame."""
+    """Turn a computation's error, which names no file, into an error of the scene's key that caused it."""
     try:
         yield
     except InputError as error:

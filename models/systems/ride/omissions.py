@@ -28,7 +28,7 @@ def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
     effects = {name: find(scene) for name, find in SORTS.items()}
     effects |= {
-        name: [Effect(name, partial(_without_table, name=name), table.COST, singular=True, own=True)]
+        name: [Effect(name, partial(_without_table, name=name), table.COST, singular=True, has_table=True)]
         for name, table in tables.items()
     }
     return tuple(
@@ -49,7 +49,7 @@ def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
 
 def has(scene: RideScene, sort: str) -> bool:
     """Whether a scene's vehicle and road hold any effects of a sort."""
-    return bool(SORTS[sort](ReducedScene.whole(scene)))
+    return bool(SORTS[sort](ReducedScene.complete(scene)))
 
 
 def anti_roll_bars(scene: ReducedScene) -> list[Effect]:
@@ -97,8 +97,8 @@ def bushings(scene: ReducedScene) -> list[Effect]:
     """One effect per sort, of springs that are stiffer than the softest between the same two bodies."""
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:
-        if {spring.one, spring.two} & wheels:
-            pairs[spring.one, spring.two].append(spring)
+        if {spring.first_body, spring.second_body} & wheels:
+            pairs[spring.first_body, spring.second_body].append(spring)
     stiff = [
         spring
         for springs in pairs.values()
@@ -121,7 +121,7 @@ def _stiffness(spring: SpringDamper) -> float:
 def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
     names = [spring.name for spring in springs]
     told = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-    bodies = {body for spring in springs for body in (spring.one, spring.two)}
+    bodies = {body for spring in springs for body in (spring.first_body, spring.second_body)}
     return Effect(
         f"bushings: {told}",
         partial(less, rigid=names),
@@ -166,8 +166,8 @@ def mounts(scene: ReducedScene) -> list[Effect]:
     """One effect per pair of bodies that springs join and of which none carries a tyre."""
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str], list[str]](list)
     for spring in scene.vehicle.springs:
-        if spring.two is not None and not {spring.one, spring.two} & wheels:
-            pairs[spring.one, spring.two].append(spring.name)
+        if spring.second_body is not None and not {spring.first_body, spring.second_body} & wheels:
+            pairs[spring.first_body, spring.second_body].append(spring.name)
     return [
         Effect(
             f"springs of {body} on {two}",

@@ -1,4 +1,4 @@
-"""What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of ride: printed by ``twinrig show``, checked before any run."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -70,7 +70,7 @@ FRONT_REAR = {
 
 
 def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
-    """What the wheels of an axle meet, and what the axles do, in words."""
+    """How the wheels of an axle, and the axles, share the road's noise, in words."""
     road, placed = scene.road, placed_wheels(scene, wheels)
     place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:

@@ -1,4 +1,4 @@
-"""What is read of the results of a ride: loads beside deviations, errors of simpler roads, vehicles and methods."""
+"""Figures derived from a ride's results: loads beside deviations, errors of simpler roads, vehicles and methods."""
 
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,8 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
 
 
 def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
-    """What an isotropic road with the same track spectrum makes of every output, relative, both up to SHORTEST.
+    """Relative change of every output's deviation by an isotropic road with the same track spectrum, both up to
+    SHORTEST.
 
     Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
     """

@@ -1,4 +1,4 @@
-"""What a linear stationary scene holds, and effects that may be left out of it."""
+"""A linear stationary scene without some of its effects, and the effects that may be left out."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -24,26 +24,26 @@ class ReducedScene:
     straight: frozenset[str] = frozenset()
 
     @classmethod
-    def whole(cls, ride: RideScene) -> "ReducedScene":
-        """Less nothing."""
+    def complete(cls, ride: RideScene) -> "ReducedScene":
+        """The ride with its whole vehicle, nothing left out."""
         return cls(ride, vehicle_of(ride))
 
     @property
     def limits(self) -> Limits:
-        """What the vehicle has not any more."""
+        """The limits that the reduced vehicle is of: massless, rigid and locked parts."""
         return Limits(self.massless, self.rigid, self.locked)
 
     def less(self, **names: Iterable[object]) -> "ReducedScene":
-        """With more names in these of its sets, as massless = ["wheel"]."""
+        """The reduced scene with more names in its sets, as massless = ["wheel"]."""
         return replace(self, **{key: getattr(self, key) | set(more) for key, more in names.items()})
 
     def on_road(self, **changes: object) -> "ReducedScene":
-        """With other values in [road]."""
+        """The reduced scene with other values in [road]."""
         road = self.ride.road.model_copy(update=changes)
         return replace(self, ride=self.ride.model_copy(update={"road": road}))
 
     def without_tables(self, *names: str) -> "ReducedScene":
-        """Less some of the scene's own tables [effects.NAME]."""
+        """The reduced scene without some of its tables [effects.NAME]."""
         ride = without_own(self.ride, *names)
         return replace(self, ride=ride, vehicle=vehicle_of(ride))
 
@@ -61,7 +61,7 @@ class Effect:
 
     needs : effects that must be left out, too, and go with it; excludes : effects that may not be left out beside it;
     ``why``, a phrase for both. singular : no small change in any respect, so that it is solved and not screened.
-    own : a table [effects.NAME], which goes before all others, for without it the vehicle is another one.
+    has_table : it is a table [effects.NAME], which goes before all others, for without it the vehicle is another one.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Effect:
     excludes: tuple[str, ...] = ()
     why: str = ""
     singular: bool = False
-    own: bool = False
+    has_table: bool = False
 
 
 def illegal(chosen: Iterable[Effect]) -> str:
@@ -89,10 +89,10 @@ def illegal(chosen: Iterable[Effect]) -> str:
 
 
 def without(scene: ReducedScene, chosen: Iterable[Effect]) -> ReducedScene:
-    """The scene less these effects; its own tables go first and together."""
+    """The scene without these effects; its tables [effects.NAME] go first and together."""
     chosen = tuple(chosen)
-    if tables := [effect.name for effect in chosen if effect.own]:
+    if tables := [effect.name for effect in chosen if effect.has_table]:
         scene = scene.without_tables(*tables)
     for effect in chosen:
-        scene = scene if effect.own else effect.without(scene)
+        scene = scene if effect.has_table else effect.without(scene)
     return scene

@@ -33,7 +33,7 @@ QUASI_STATIONARY = 90
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """What a linear vehicle is asked for at constant speeds, in place of what the scene says.
+    """Speeds and correlations at which a linear vehicle is solved, in place of the scene's.
 
     speeds : m/s, those of the scene if None. correlations : of the road, left to right and front to rear, by name; None
     is the scene's own.

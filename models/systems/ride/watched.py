@@ -1,4 +1,5 @@
-"""How the parts of a riding vehicle move, for those who judge a run: wheel loads, travels, angles and slip angles."""
+"""Motions of a riding vehicle's parts by which its assumptions are judged: wheel loads, travels, angles and slip
+angles."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -84,7 +85,7 @@ class Spectral:
     means: Mapping[str, np.ndarray]
 
     def of(self, name: str) -> Gaussian:
-        """What is known at every speed."""
+        """Gaussian statistics of a part's motion at every speed."""
         mean = self.means.get(name, np.zeros(len(self.speeds)))
         return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
 
@@ -112,7 +113,7 @@ class Along:
     apart: Spectral
 
     def of(self, name: str) -> Gaussian:
-        """What is known at every instant, or at some speeds."""
+        """Gaussian statistics of a part's motion at every instant, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)

@@ -1,4 +1,4 @@
-"""What the contact of a held wheelset takes for granted, by every patch at every position."""
+"""Assumptions of the contact of a wheelset at given lateral shifts, by every patch at every position."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ WHEELS = ("right", "left")
 
 
 def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
-    """What a case with this coefficient of friction takes for granted; judged by ``Contacts``, a result's detail."""
+    """Assumptions of a case with this coefficient of friction; judged by ``Contacts``, a result's detail."""
     listed = [_half_space(), _within_profiles(scene)]
     if yields(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic())

@@ -1,4 +1,4 @@
-"""What a scene of a held wheelset will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of a wheelset at given lateral shifts: printed by ``twinrig show``, checked before any run."""
 
 from models.core.assumptions import assumption_lines
 from models.systems.wheel_rail.assumptions import assumptions

@@ -67,21 +67,21 @@ def run(
     scene: WheelRailScene,
     engine: str = "",
     case: str = "",
-    told: Callable[[float, float], Any] = lambda shift, share: None,
+    progress: Callable[[float, float], Any] = lambda shift, share: None,
     *,
     error: bool = False,
 ) -> Result:
     """A case, the first of the scene's if none is named, at every position; the detail is its ``Contacts``.
 
     Channels of positions lie over the shift, those of patches over shift, wheel and patch, the one that carries most
-    first; not a number where there is no further patch. Positions that fail are doubts. told : called before each
+    first; not a number where there is no further patch. Positions that fail are doubts. progress : called before each
     shift with it (mm) and the share that is done; error : whether every other position is computed on half the cells,
     too, which tells the error of cells. Raises InputError for profiles that are none.
     """
     name = case or next(iter(scene.cases))
     held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
     for i, shift in enumerate(scene.positions.values().tolist()):
-        told(1e3 * shift, i / scene.positions.count)
+        progress(1e3 * shift, i / scene.positions.count)
         begun = time.process_time()
         try:
             contacts.placed.append(held.at(shift, yaw * shift))
@@ -97,7 +97,7 @@ def run(
     return _with_error(labelled, scene, held) if error and contacts.placed else labelled
 
 
-def _with_error(run: Result, scene: WheelRailScene, held: Contact) -> Result:
+def _with_error(run: Result, scene: WheelRailScene, contact: Contact) -> Result:
     """The result with what the cells leave, as the root mean square over both wheels and every other position.
 
     Half the cells are of first order: what they change is what the cells leave. Shares are of the root mean square.
@@ -105,7 +105,7 @@ def _with_error(run: Result, scene: WheelRailScene, held: Contact) -> Result:
     fine, coarse = list[Placed](), list[Placed]()
     for placed in run.detail.placed[::EVERY]:
         with suppress(InputError, RunFailed):
-            coarse.append(replace(held, coarser=2.0 * held.coarser).at(placed.shift, placed.yaw))
+            coarse.append(replace(contact, coarser=2.0 * contact.coarser).at(placed.shift, placed.yaw))
             fine.append(placed)
     if not coarse:
         return not_estimated(run, "no position is found on half the cells")

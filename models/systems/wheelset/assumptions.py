@@ -1,4 +1,4 @@
-"""What the equations of a wheelset on straight track take for granted."""
+"""Assumptions of the equations of a wheelset on straight track."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ FRICTION = 0.02
 
 
 def assumptions(equations: Equations) -> list[Assumption]:
-    """What a path of the wheelset at its speed takes for granted; judged by the path, a result's detail."""
+    """Assumptions of a path of the wheelset at its speed; judged by the path, a result's detail."""
     wheelset = equations.wheelset
     listed = [_presses(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
     listed += [_elastic()] if yields(wheelset.material) else []
@@ -40,7 +40,7 @@ def assumptions(equations: Equations) -> list[Assumption]:
 
 
 def of_linear(wheelset: Wheelset) -> list[Assumption]:
-    """What the eigenvalues take for granted beside small motions: that creep forces act at all."""
+    """Assumption of the eigenvalues beside small motions: that creep forces act at all."""
     return [
         Assumption(
             "friction",
@@ -54,7 +54,7 @@ def of_linear(wheelset: Wheelset) -> list[Assumption]:
 
 
 def of_branch(wheelset: Wheelset) -> list[Assumption]:
-    """What a branch of cycles takes for granted of their amplitudes; a cone's flange is a spring."""
+    """Assumptions of a branch of limit cycles about their amplitudes; a cone's flange is a spring."""
     return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
 
 
@@ -65,7 +65,7 @@ def by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
 
 
 def _of_path(watched: Callable[[Path], Watched]) -> Callable[[Result], Watched]:
-    """What is watched of a result whose detail is its path, or a periodic motion that has one."""
+    """Watch function for a result whose detail is its path, or a periodic motion that has one."""
 
     def of_result(run: Result) -> Watched:
         return watched(run.detail if isinstance(run.detail, Path) else run.detail.path())
@@ -119,7 +119,8 @@ def _rolls(equations: Equations) -> Assumption:
 
 
 def _half_space() -> Assumption:
-    """Of a Hertzian contact the penetration by its shorter semi-axis is about that semi-axis by its radius."""
+    """Assumption that bodies are half-spaces: in a Hertzian contact the penetration by its shorter semi-axis is about
+    that semi-axis by its radius."""
 
     def watched(contacts: Array) -> Array:
         short = np.minimum(contacts["a"], contacts["b"])

@@ -50,7 +50,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
 
 
 def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:
-    """The wheelset of these values; a fault is told by file and table."""
+    """The wheelset of these values; errors name the file and the table."""
     try:
         return Wheelset(**values)
     except InputError as error:

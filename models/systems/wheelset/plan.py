@@ -1,4 +1,4 @@
-"""What a scene of a wheelset will compute: printed by ``twinrig show``, checked before any run."""
+"""The plan of a wheelset's scene: printed by ``twinrig show``, checked before any run."""
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
@@ -52,7 +52,7 @@ def describe(scene: WheelsetScene) -> str:
 
 
 def _assumed(scene: WheelsetScene) -> list[str]:
-    """What paths and eigenvalues take for granted."""
+    """Lines on the assumptions of paths and eigenvalues."""
     equations = equations_of(scene, "reference", path_speeds(scene)[0])
     return assumption_lines([*assumptions(equations), *of_linear(equations.wheelset)])
 

@@ -1,4 +1,4 @@
-"""What is computed of a scene of a wheelset: paths, its linearisation over the speeds, the branch of limit cycles."""
+"""Runs of a wheelset's scene: paths, its linearisation over the speeds, the branch of limit cycles."""
 
 import math
 import time
@@ -134,11 +134,11 @@ def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Res
     return labelled
 
 
-def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None, *, error: bool = False) -> Result:
+def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False) -> Result:
     """Limit cycles by rising amplitude within the scene's speeds, by the written equations; the detail are its orbits.
 
     Where no branch begins because nothing is stable, cycles that motions reach at these speeds. Why it ends or never
-    begins is a doubt. told : called with the number of cycles after each; error : whether one is solved on half the
+    begins is a doubt. progress : called with the number of cycles after each; error : whether one is solved on half the
     cells, too, which tells the error of cells.
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
@@ -146,7 +146,7 @@ def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None
     try:
         for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step):
             orbits.append(orbit)
-            told(len(orbits))
+            progress(len(orbits))
     except NoCriticalSpeed as none:
         why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
         reached = (_attained(scene, float(speed)) for speed in speeds) if none.unstable else ()
@@ -167,7 +167,7 @@ def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None
 
 
 def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> Orbit | None:
-    """The same cycle on half the cells, in twice the step; None where none is found."""
+    """The limit cycle on half the cells, in twice the step; None where none is found."""
     if scene.contact.cells < FEWEST:
         return None
     coarse = replace(orbit, steps=orbit.steps // 2)

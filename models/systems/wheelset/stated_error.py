@@ -1,4 +1,4 @@
-"""What the results of a wheelset say of their error: what steps leave, and what cells of FASTSIM do.
+"""Stated errors of a wheelset's results: errors of time steps, and of FASTSIM's cells.
 
 Cells leave a hundred times as much as steps. One more path on half the cells, in twice the step where that can be,
 tells what cells leave; a few steps of twice the length on all cells tell how much of that is of steps, which grows
@@ -85,7 +85,7 @@ def _coarse(scene: WheelsetScene, march: March, cells: int) -> Series:
 
 
 def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
-    """What steps leave over the whole path: what they leave at its beginning, as much larger as that of cells grows."""
+    """Step errors over the whole path: those of its beginning, enlarged by the growth of the cells' errors."""
     power = 2.0**KINKED
     try:
         part, share, remains = series(march(changed(scene, 2.0, FINE_WINDOW))), FINE_WINDOW, 1.0 / (power - 1.0)

@@ -35,7 +35,7 @@ def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "u
 
 
 def changed(index: int, row: str) -> list[str]:
-    """Rows with one of them another."""
+    """The rows with one of them changed."""
     return [*rows()[:index], row + "\n", *rows()[index + 1 :]]
 
 

@@ -19,7 +19,7 @@ HOLE = range(10, 20)
 
 @dataclass(frozen=True)
 class Form:
-    """How the usual file is written.
+    """How a CSV file is written; the defaults are the usual file.
 
     above, between : lines above the headings, and beneath them. decimal : sign. quoted : whether every cell is.
     trailing : what ends every row. gap : what stands for a force in the rows of the hole; None for the force itself.
@@ -41,7 +41,7 @@ class Form:
     beside: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """The whole file."""
+        """Text of the whole file."""
         rows = [self.row(i) for i in range(len(self.times))]
         lines = (*self.above, self.line(self.headings), *self.between, *rows, *self.below)
         return "".join(line + self.end for line in lines)

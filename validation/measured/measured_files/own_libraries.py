@@ -1,4 +1,4 @@
-"""What each format's own library, or numpy, reads of a file: channel -> values and unit, in the file's own words."""
+"""Contents of a file by its format's own library, or numpy: channel -> values and unit, in the file's own words."""
 
 import csv
 from collections.abc import Callable

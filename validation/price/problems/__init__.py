@@ -15,7 +15,7 @@ Curves = dict[tuple[str, str], tuple[float, ...]]
 
 
 def curves(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
-    """The same values for several methods of an engine."""
+    """Curves of several methods of an engine over the same setting values."""
     return {(engine, method): values for method in methods}
 
 

@@ -51,14 +51,14 @@ SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12
 
 @dataclass
 class Tape:
-    """A controller whose valves are kept."""
+    """A controller whose valve commands are recorded."""
 
     inner: Controller
     valves: list[int]
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """The inner one's answer."""
-        command = self.inner.sample(given)
+        command = self.inner.sample(sample)
         self.valves.append(int(np.asarray(command.valves)[0]))
         return Command(valves=np.array(self.valves[-1:]))
 
@@ -69,14 +69,14 @@ class Played:
 
     valves: np.ndarray
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """The valve of the sample."""
-        return Command(valves=self.valves[min(given.number, self.valves.size - 1), None])
+        return Command(valves=self.valves[min(sample.number, self.valves.size - 1), None])
 
 
 @dataclass(frozen=True)
 class Result:
-    """Stopping distance (m), and what it took."""
+    """Stopping distance (m), and counts of steps and calls."""
 
     distance: float
     counts: dict[str, int]
@@ -138,7 +138,7 @@ class BrakingStop:
         return Solver(partial(run, substeps))
 
     def errors(self, solution: Result) -> dict[str, float]:
-        """That of the stopping distance."""
+        """Errors of a solution's stopping distance."""
         return {"stopping distance": abs(solution.distance - self.true)}
 
     def _taped(self) -> np.ndarray:

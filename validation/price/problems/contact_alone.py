@@ -96,9 +96,9 @@ class ContactAlone:
         off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
         return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
 
-    def _run(self, way: Way, cells: int) -> Result:
-        forces = np.array([force_of(way.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
-        linear, number = way.name == "linear theory", len(self._cases)
+    def _run(self, theory: Way, cells: int) -> Result:
+        forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
+        linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
         return Result(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
 

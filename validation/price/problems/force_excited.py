@@ -96,7 +96,7 @@ class ForceExcited:
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
 
     def driven(self) -> Assembly:
-        """What is solved."""
+        """The assembly that is solved."""
         return driven()
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
@@ -127,8 +127,8 @@ class ForceExcited:
 
 
 class NoisyForces(ForceExcited):
-    """The same with a fixed noise file for all, so that no sampling error enters. An engineer reads the forces of the
-    suspension, which the measured wheel forces do not tell."""
+    """The force-excited problem with a fixed noise file for all solvers, so that no sampling error enters. An engineer
+    reads the forces of the suspension, which the measured wheel forces do not tell."""
 
     key = "noise"
     note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
@@ -150,7 +150,7 @@ class NoisyForces(ForceExcited):
 
 
 class PrescribedPitch(ForceExcited):
-    """The same with its pitch prescribed, as measured on the road, and the moment that this takes.
+    """The force-excited problem with its pitch prescribed, as measured on the road, and the moment that this takes.
 
     The pitch at 100 Hz is a quintic spline: twice differentiable, and the same for all. A constraint is solved by
     Exudyn's generalised-alpha alone, whose multiplier needs a radius below one; MuJoCo and the reference have the
@@ -187,11 +187,11 @@ def problem(quick: bool) -> ForceExcited:
 
 @cache
 def noisy(quick: bool) -> NoisyForces:
-    """The same with noise on the forces."""
+    """The force-excited problem with noise on the forces."""
     return NoisyForces(quick)
 
 
 @cache
 def guided(quick: bool) -> PrescribedPitch:
-    """The same with a pitch that is prescribed."""
+    """The force-excited problem with a prescribed pitch."""
     return PrescribedPitch(quick)

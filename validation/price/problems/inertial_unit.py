@@ -32,10 +32,10 @@ FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 """Methods of first order; all others are of second, because rates are linear between samples."""
 ADAPTIVE = ("DOPRI5", "ODE23")
 """Methods that are there to be refused."""
-_OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
+_RATES, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
 FULL: Curves = {
-    **curves("reference", _OWN, *RULES),
+    **curves("reference", _RATES, *RULES),
     **curves("exudyn", _FEW, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
     **curves("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
     ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),

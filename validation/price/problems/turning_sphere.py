@@ -60,7 +60,7 @@ def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndar
 
 
 def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
-    """The same in Exudyn; Refused for methods that do not end their steps on samples."""
+    """Attitudes of the turning sphere by Exudyn; Refused for methods that do not end their steps on samples."""
     name = method.split()[0]
     known = CATALOGUE["exudyn"][name]
     if known.adaptive:

@@ -18,7 +18,7 @@ class Value(NamedTuple):
     uncertainty: float
 
     def cells(self) -> tuple[str, ...]:
-        """As a line of ``reference_values.csv`` has it, to all digits."""
+        """Cells of a line of ``reference_values.csv``, to all digits."""
         return (*self[:3], f"{self.time:.17g}", f"{self.value:.16e}", f"{self.uncertainty:.1e}")
 
 

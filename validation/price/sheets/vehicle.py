@@ -106,9 +106,9 @@ def _tables(vehicle: SpatialVehicle) -> str:
         ("spring", "one", "two", "p1", "p2", "a", "k [N/m]", "c [N s/m]", "F0 [N]"): [
             (
                 s.name,
-                s.one,
-                s.two or "ground",
-                *map(vector, (s.point_one, s.point_two, s.axis)),
+                s.first_body,
+                s.second_body or "ground",
+                *map(vector, (s.first_point, s.second_point, s.axis)),
                 s.stiffness,
                 s.damping,
                 held.parts[s.name],

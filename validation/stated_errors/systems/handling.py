@@ -69,7 +69,7 @@ def _sample(scene: HandlingScene, engine: str) -> Sample:
 
 
 def _true(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
-    """Errors of every channel that is told."""
+    """True errors of every channel whose error is stated."""
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
     truth = principal(

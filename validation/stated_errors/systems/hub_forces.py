@@ -81,7 +81,7 @@ def _told(scene: HubScene, engine: str) -> Result:
 
 
 def _true(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[str, float]:
-    """Errors of every channel that is told."""
+    """True errors of every channel whose error is stated."""
     fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
     vehicle = scene.cut_vehicle()
     truth, stated = principal(vehicle, run(fine, engine).detail).channels, principal(vehicle, told.detail).channels

@@ -75,7 +75,7 @@ def _sample(table: dict[str, Any], engine: str) -> Sample:
 
 
 def _true(told: Result, truth: Result) -> dict[str, float]:
-    """Errors of every channel that is told."""
+    """True errors of every channel whose error is stated."""
     mine, fine = (each.detail.outcome for each in (told, truth))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))

@@ -63,7 +63,7 @@ def _run(scene: Scene, engine: str) -> Result:
 
 
 def _truth(scene: Scene, engine: str) -> Result:
-    """The run in steps of a whole part of its own."""
+    """The reference run, in steps that are an integer part of the scene's."""
     settings = settings_of(scene, engine)
     step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
     finer = max(1, round(step / FINEST if adaptive else min(FINER, step / FINEST)))
@@ -186,7 +186,7 @@ def _forces(drawn: np.random.Generator, folder: Path, table: dict[str, Any]) -> 
 
 
 def _step(drawn: np.random.Generator, duration: float, period: float | None) -> float:
-    """From 20 microseconds to 8 ms, a whole part of what it must divide."""
+    """A random step from 20 microseconds to 8 ms that divides the duration and the period."""
     wanted = float(np.exp(drawn.uniform(np.log(2e-5), np.log(8e-3))))
     whole = duration if period is None else period
     step = whole / max(1, round(whole / wanted))

@@ -43,7 +43,7 @@ def answer(scene: BrakingScene, engine: str, error: bool = False) -> Answer:
 
 
 def steps(scene: BrakingScene) -> int:
-    """Of a procedure, if it lasts as long as it may."""
+    """Number of steps of a procedure of the longest allowed duration."""
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 

@@ -26,13 +26,13 @@ def steps(scene: ContactScene) -> int:
 
 
 def parts(scene: ContactScene) -> int:
-    """One: there is no step."""
+    """Number of parts into which a step can be cut: 1, as a contact has no time steps."""
     return 1
 
 
 def shorten(table: dict[str, Any], scene: ContactScene, steps: int) -> None:
-    """Nothing."""
+    """Do nothing: a contact has no time steps to shorten."""
 
 
 def coarsen(table: dict[str, Any], scene: ContactScene, times: int) -> None:
-    """Nothing."""
+    """Do nothing: a contact has no time steps to coarsen."""

@@ -43,7 +43,7 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
-    """At most so many steps of the scene's own in every manoeuvre."""
+    """Shorten the scene to at most so many steps of the scene's own in every manoeuvre."""
     for name, manoeuvre in table["manoeuvres"].items():
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 

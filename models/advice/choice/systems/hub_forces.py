@@ -30,7 +30,7 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
-    """So many steps of the scene's own."""
+    """Shorten the scene to so many steps of the scene's own."""
     table.setdefault("run", {})["duration"] = steps * scene.run.step
 
 

@@ -55,7 +55,8 @@ def _clock(scene: MeasuredScene) -> tuple[float, float]:
 
 
 def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
-    """So many steps of the recording, or as many as a recording must have; a virtual measurement ends there, too."""
+    """Shorten the scene to so many steps of the recording, or as many as a recording must have; a virtual measurement
+    ends there, too."""
     period, whole = _clock(scene)
     least = FINE * math.ceil(LEAST * period / (_step(scene) * FINE))
     duration = min(max(few, least) * _step(scene), whole)

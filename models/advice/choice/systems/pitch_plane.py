@@ -36,7 +36,7 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:
-    """So many steps of the scene's own."""
+    """Shorten the scene to so many steps of the scene's own."""
     table["run"] |= {"duration": steps * scene.run.step}
     table["run"].pop("output_step", None)
 

@@ -21,7 +21,7 @@ def opened(scene: RideScene | InTime) -> InTime:
     if isinstance(scene, InTime):
         return scene
     with told_by(scene):
-        return in_time(ReducedScene.whole(scene))
+        return in_time(ReducedScene.complete(scene))
 
 
 def answer(scene: InTime, engine: str, error: bool = False) -> Answer:
@@ -48,7 +48,7 @@ def answer(scene: InTime, engine: str, error: bool = False) -> Answer:
 
 
 def steps(scene: InTime) -> int:
-    """Of all copies at all speeds."""
+    """Number of steps of all copies at all speeds."""
     return scene.steps
 
 

@@ -40,7 +40,7 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
-    """So many steps of the scene's own, at the speeds of the whole scene."""
+    """Shorten the scene to so many steps of the scene's own, at the speeds of the whole scene."""
     table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
 
 

@@ -43,12 +43,12 @@ class OwnBraking:
 
     @property
     def title(self) -> str:
-        """Of the scene."""
+        """Title of the scene."""
         return self.scene.title
 
     @property
     def unit(self) -> str:
-        """Of the quantity."""
+        """Unit of the quantity."""
         return str(QUANTITIES[self.quantity][1])
 
     @property
@@ -75,7 +75,7 @@ class OwnBraking:
         return Ladder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
 
     def second(self, last: Setting) -> Setting | None:
-        """None: a stop with valves in the loop has one method."""
+        """None, as there is no second method: a stop with valves in the loop has one method."""
         return None
 
     def solve(self, setting: Setting, duration: float) -> tuple[int, Path]:
@@ -102,7 +102,7 @@ class OwnBraking:
         ]
 
 
-def own(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnBraking:
+def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnBraking:
     """The scene with a quantity, PROCEDURE.QUANTITY; the first procedure where none is named."""
     if scene.port is not None:
         raise InputError(

@@ -48,9 +48,9 @@ class OwnHandling(Meshed):
         return driven(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
-        """The same by DOP853 about the engine's accelerations."""
+        """The drive by DOP853 with the engine's accelerations, an accurate reference."""
         handling = _with_cells(self.handling, cells)
-        model, start = build(self.own, handling), np.concatenate(handling.straight(self.speed))
+        model, start = build(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
         done = solve_ivp(
             lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))),
@@ -62,12 +62,12 @@ class OwnHandling(Meshed):
             atol=TIGHT,
         )
         if not done.success:
-            raise RunFailed(self.own, done.message)
-        return read(handling, Trajectory(times, done.y.T), self.own)
+            raise RunFailed(self.reference_engine, done.message)
+        return read(handling, Trajectory(times, done.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over time; the drive is judged."""
-        judged_drive(self.scene, self.own, self.name, run)
+        judged_drive(self.scene, self.reference_engine, self.name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
@@ -82,7 +82,7 @@ class OwnHandling(Meshed):
         ]
 
 
-def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnHandling:
+def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnHandling:
     """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
     name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)

@@ -60,7 +60,7 @@ class OwnPitchPlane:
 
     @property
     def title(self) -> str:
-        """Of the scene."""
+        """Title of the scene."""
         return self.assembly.scene.title
 
     @property
@@ -86,7 +86,7 @@ class OwnPitchPlane:
 
     @property
     def note(self) -> str:
-        """What is left out."""
+        """Text on what the price leaves out."""
         return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
 
     @property
@@ -116,7 +116,7 @@ class OwnPitchPlane:
         return Ladder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
     def second(self, last: Setting) -> Setting | None:
-        """LSODA, unless it would restart at every sample."""
+        """The second method, LSODA, unless it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 
     def solve(self, setting: Setting, duration: float) -> Result:
@@ -124,7 +124,7 @@ class OwnPitchPlane:
         return self.run(setting.engine, self._settings(setting, duration))
 
     def run(self, engine: str, settings: Settings) -> Result:
-        """The same with any settings."""
+        """The result of the scene with any settings."""
         scene: Scene = self.assembly.scene
         every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
         return run(every_step, engine, settings, self.assembly)
@@ -169,7 +169,7 @@ def _outside(setting: Setting) -> list[str]:
     )
 
 
-def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
+def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
     """The scene with a quantity: channels of its result, with commas between them, of one unit."""
     assembly = assemble(scene)
     channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))

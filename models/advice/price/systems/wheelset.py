@@ -38,14 +38,14 @@ class OwnWheelset(Meshed):
         return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[Path]:
-        """The same by DOP853."""
+        """The paths of the wheelset by DOP853, an accurate reference."""
         scene = self._scene(cells, step, duration)
         return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[Path]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity of all paths side by side; each is judged."""
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
-            judged_path(self.scene, self.own, speed, wheelset_run)
+            judged_path(self.scene, self.reference_engine, speed, wheelset_run)
         name, times = self.quantity, run[0].times
         if name in STATES:
             columns = [wheelset_run.states[:, [STATES[name][0]]] for wheelset_run in run]
@@ -79,7 +79,7 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     return Path(times, states, contacts=equations.at(states)[1])
 
 
-def own(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> OwnWheelset:
+def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> OwnWheelset:
     """The scene with a quantity: a state or a force of the contacts, of its paths at all speeds."""
     asked, wheelset, contact = chosen(quantity or USUAL, QUANTITIES), wheelset_of(scene), scene.contact
     speeds, run = tuple(path_speeds(scene)), scene.run

@@ -107,7 +107,7 @@ def _on_another_surface(table: Table, scene: Any) -> None:
 
 
 def _in_the_plane(table: Table, scene: Any) -> None:
-    """The same masses, axles and wheels in the plane."""
+    """Edit the scene's table to a vehicle in the plane with the same masses, axles and wheels."""
     from models.systems.braking.of_scene import vehicle_of
 
     table["vehicle"] = {"override": vehicle_of(scene).model_dump()}

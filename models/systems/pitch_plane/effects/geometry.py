@@ -8,7 +8,7 @@ COUNTS = {"exudyn": {"native items": 10}}
 
 
 def named(scene: Any) -> bool:
-    """Whether a scene has it."""
+    """Whether a scene names the effect."""
     return bool(scene.vehicle.geometry == "exact")
 
 
@@ -18,5 +18,5 @@ def leave_out(table: dict[str, Any], scene: Any) -> None:
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
-    """As it is where a scene says nothing."""
+    """Write the default geometry, "exact", into the scene's table."""
     table.setdefault("vehicle", {})["geometry"] = "exact"

@@ -110,7 +110,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 @dataclass(frozen=True)
 class Guide:
-    """What the run follows, at times i ``period`` (s).
+    """Pitch that a guided run follows, at times i ``period`` (s).
 
     states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
@@ -137,7 +137,7 @@ _LATEST: dict[bytes, Guide] = {}
 
 
 def guide_of(assembly: Assembly, p: Parameters) -> Guide:
-    """What a force-excited assembly would follow; raises InputError for a file that is none, RunFailed."""
+    """The guide pitch for a force-excited assembly; raises InputError for a file that is none, RunFailed."""
     from models.systems.pitch_plane.pitch_filter import estimate
 
     measured, forces, p_vehicle = _measurement(assembly, p), assembly.input, assembly.parameters
@@ -227,7 +227,7 @@ def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
 
 
 def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
-    """What the filter's own innovations say against it."""
+    """Objections to the filter by its own innovations."""
     if guide.consistency.consistent:
         return ()
     square = guide.consistency.figures[0]
@@ -241,7 +241,7 @@ def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
 
 
 def _assumption(guide: Guide) -> Assumption:
-    """That all figures of the innovations are as a right filter's."""
+    """Assumption that the innovations' statistics are those of a correctly tuned filter."""
     return Assumption(
         "innovations",
         "the filter's innovations are as its model and deviations make them",

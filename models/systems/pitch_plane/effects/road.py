@@ -19,7 +19,7 @@ COST = "height and slope under each wheel, read from a table of half steps"
 EXAMPLE = {"source": "study", "speed": 20.0}
 COUNTS = {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}
 
-OWN = {
+KEYS_OF_SOURCE = {
     "study": ("gd", "grade"),
     "hills": ("grade",),
     "iso8608": ("road_class", "seed", "level", "grade"),
@@ -78,8 +78,8 @@ def _slopes(speed: float, run: Result) -> Watched:
 def _check_keys(file: str, p: Parameters) -> None:
     keys = {name: value for name, value in p if name not in ("source", "speed") and value is not None}
     for name, value in keys.items():
-        if name not in OWN[p.source]:
-            taken = ", ".join(("speed", *OWN[p.source]))
+        if name not in KEYS_OF_SOURCE[p.source]:
+            taken = ", ".join(("speed", *KEYS_OF_SOURCE[p.source]))
             allowed = f"has no meaning for source = {p.source!r}, which takes {taken}"
             raise InputError(file, f"effects.road.{name}", value, allowed)
     for name in NEEDED.get(p.source, ()):

@@ -92,7 +92,7 @@ def _judged(
 
 
 def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
-    """That the means of the forces carry the weight, and that of each axle, as far as the record can tell."""
+    """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
     from models.measured.axle_balance import steady
 
     means = steady(axles)
