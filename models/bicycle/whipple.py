@@ -83,6 +83,7 @@ class Control(Strict):
     until: float = quantity("m/s", "speed from which on there is no feedback", default=6.5, zero=True)
     friction: float = quantity("N m s/rad", "viscous, of the steering", default=0.0, zero=True)
     dry_friction: float = quantity("N m", "of the steering, at any rate", default=0.0, zero=True)
+    dry_rate: float = quantity("rad/s", "steer rate at which dry friction is whole, within 24 %", default=0.05)
     torque_gain: float = quantity("-", "torque of the motor by its command", default=1.0, zero=True)
     encoder_gain: float = quantity("-", "steer angle of the encoder by the true one", default=1.0, zero=True)
     speed_gain: float = quantity("-", "slope of the measured over the true speed", default=1.0, zero=True)
