@@ -30,13 +30,17 @@ DOWN_TO_UP = np.diag([1.0, -1.0, -1.0])
 
 
 class Motion(NamedTuple):
-    """times (n,) s, positions and rates (n, 9), energy (n,) J, heights (n, 2) m of the contacts above the ground."""
+    """times (n,) s, positions and rates (n, 9), energy (n,) J, heights (n, 2) m of the contacts above the ground.
+
+    steps : calls of the rates, as the method picks its own steps.
+    """
 
     times: np.ndarray
     positions: np.ndarray
     rates: np.ndarray
     energy: np.ndarray
     heights: np.ndarray
+    steps: int
 
 
 def turn(axis: np.ndarray, angle: complex) -> np.ndarray:
@@ -183,7 +187,7 @@ class IdealBicycle:
         q = solution.y[:9].T
         v = np.array([self.free_motion(self.jacobians(row)[3]) @ u for row, u in zip(q, solution.y[9:].T, strict=True)])
         energy = np.array([self.energy(*row) for row in zip(q, v, strict=True)])
-        return Motion(times, q, v, energy, np.array([self.heights(row) for row in q]))
+        return Motion(times, q, v, energy, np.array([self.heights(row) for row in q]), solution.nfev)
 
 
 def _jacobian(chain: list[tuple[int, np.ndarray, np.ndarray]], point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
