@@ -75,6 +75,9 @@ def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[
         calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
         why = "no measured number depends on it" if name in choice.blind else calls
         told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
+    for name, (ratio, chance) in choice.calls.items():
+        if name not in NEUTRAL:
+            told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
     for one, other, correlation in apart(choice):
         told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
     told += ["", "predicted without their own speed, in standard deviations:"]

@@ -30,6 +30,7 @@ NEUTRAL = {
 """Value of each suspect where it is absent."""
 SCALE = {"friction": 0.1, "dry_friction": 0.1}
 """Steps of the fit; 0.1 for all."""
+FRICTIONS = ("friction", "dry_friction")
 UNITS = {"friction": "N m s/rad", "dry_friction": "N m", "speed_bias": "m/s"}
 NO_WEAVE = -20.0 + 0.0j
 """Stands for a weave (1/s) that does not swing at all."""
@@ -154,13 +155,16 @@ def chosen(
 
 
 def _calls(fits: list[Fit], fullest: Fit, inflation: float) -> dict[str, tuple[float, float]]:
-    """F and p of leaving each suspect out of the fullest subset."""
+    """F and p of leaving each suspect out of the fullest subset, and both kinds of friction together."""
     by_names = {fit.names: fit for fit in fits}
+    leaving = {name: (name,) for name in fullest.names}
+    if {*FRICTIONS} <= {*fullest.names}:
+        leaving["friction of either kind"] = FRICTIONS
     calls = {}
-    for name in fullest.names:
-        less = by_names[tuple(other for other in fullest.names if other != name)]
-        ratio = max(less.chi2 - fullest.chi2, 0.0) / inflation
-        calls[name] = (ratio, float(f_distribution.sf(ratio, 1, fullest.freedoms)))
+    for said, gone in leaving.items():
+        less = by_names[tuple(name for name in fullest.names if name not in gone)]
+        ratio = max(less.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
+        calls[said] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
     return calls
 
 

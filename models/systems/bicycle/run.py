@@ -25,8 +25,8 @@ COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
 TO_IDEAL = [rt.X, rt.Y, rt.YAW, rt.HEIGHT, rt.LEAN, rt.PITCH, rt.STEER, rt.REAR, rt.FRONT]
 """Coordinates of engines in the order of ``models.bicycle.ideal_rolling``, which is the way back, too."""
 LATERAL = [rt.Y, rt.YAW, rt.LEAN, rt.STEER]
-MOVED = 1e-5
-"""m, rad and per s by which states are moved to linearise."""
+MOVED = 1e-7
+"""m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
 SHOWN = ("lean", "steer", "yaw")
 """Channels whose error is told."""
 ROWS_APART = 0.01
