@@ -18,9 +18,9 @@ System = Literal[
     "cost",
     "effects",
 ]
-Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "none"]
+Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "measured", "none"]
 """How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
-exact answer, a published figure, or no second side."""
+exact answer, a published figure, a measured vehicle, or no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
 """In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is a
 stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""

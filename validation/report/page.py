@@ -33,6 +33,7 @@ KINDS = {
     "shared kernel": "both sides call the same force code: nothing is learned about that code",
     "closed form": "the other side is an exact answer",
     "published": "the other side is a figure from the literature",
+    "measured": "a vehicle was measured: model and measurement share no number but its parameters",
     "none": "there is no second side: a behaviour, or a count",
 }
 assert set(KINDS) == set(get_args(Independence))

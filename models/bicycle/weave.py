@@ -1,0 +1,123 @@
+"""Weave eigenvalues measured: decaying sinusoids fitted to the lean rate in windows of free decay.
+
+A folder holds ``windows.csv`` (file, speed of the treadmill in m/s, first and last sample of a window) and for each
+``file`` a recording whose name ends in ``_{file}kph.csv`` or ``.csv.gz``, sampled at 100 Hz, with columns ``lean_rate``
+and ``fork_rate`` (rad/s) and ``speed`` (m/s).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from models.core.errors import InputError
+
+RATE = 100.0
+"""Samples per second."""
+SHORTEST = 20
+"""Samples of a window."""
+STARTS = [(decay, frequency) for decay in (-1.0, -3.0, -6.0) for frequency in (4.0, 7.0, 10.0)]
+"""Where fits begin (1/s, rad/s)."""
+HEADINGS = ("lean_rate", "fork_rate", "speed")
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Windows (n,) at one speed (m/s) of the treadmill.
+
+    weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); slowness : mean of |steer rate| by mean
+    of its square (s/rad), by which dry friction is worth a viscous one.
+    """
+
+    speed: float
+    weave: np.ndarray
+    measured_speed: np.ndarray
+    slowness: np.ndarray
+
+    @property
+    def parts(self) -> np.ndarray:
+        """(n, 3): real and imaginary part of the weave (1/s), measured speed (m/s)."""
+        return np.column_stack([self.weave.real, self.weave.imag, self.measured_speed])
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(3,) of ``parts``."""
+        return self.parts.mean(axis=0)
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """(3,) standard deviation of ``parts`` among the windows."""
+        return self.parts.std(axis=0, ddof=1)
+
+
+def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
+    """Eigenvalue (1/s) of e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least squares; w is above 0."""
+    times = np.arange(len(values)) / rate
+
+    def left(shape: np.ndarray) -> np.ndarray:
+        swing = np.exp(shape[0] * times)
+        basis = np.column_stack(
+            [swing * np.cos(shape[1] * times), swing * np.sin(shape[1] * times), np.ones_like(times)]
+        )
+        return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0])
+
+    best = min((least_squares(left, start, x_scale=(1.0, 3.0)) for start in STARTS), key=lambda fit: float(fit.cost))
+    return complex(best.x[0], abs(best.x[1]))
+
+
+def observations(folder: str | Path) -> list[Observation]:
+    """All speeds of a folder, rising; InputError that names file, place and value where it cannot be read."""
+    folder, rows = Path(folder), _windows(Path(folder) / "windows.csv")
+    recordings = {label: _recording(folder, label) for label in {row[0] for row in rows}}
+    by_speed = dict[float, list[tuple[complex, float, float]]]()
+    for line, (label, speed, first, last) in enumerate(rows, 2):
+        recording = recordings[label]
+        if last >= len(recording["speed"]):
+            allowed = f"the recording has {len(recording['speed'])} samples"
+            raise InputError(folder / "windows.csv", f"line {line}, last sample", last, allowed)
+        lean, steer, sensor = (recording[name][first : last + 1] for name in HEADINGS)
+        if not np.isfinite([lean, steer, sensor]).all() or not np.any(steer) or np.ptp(lean) == 0.0:
+            raise InputError(folder / "windows.csv", f"line {line}", first, "gaps, or no motion, in this window")
+        slowness = np.abs(steer).mean() / np.mean(steer**2)
+        by_speed.setdefault(speed, []).append((decaying_sinusoid(lean), float(sensor.mean()), float(slowness)))
+    for speed, of_speed in by_speed.items():
+        if len(of_speed) < 3:
+            allowed = f"has {len(of_speed)} window(s); a scatter needs 3 or more"
+            raise InputError(folder / "windows.csv", "speed [m/s]", speed, allowed)
+    return [Observation(speed, *map(np.array, zip(*by_speed[speed], strict=True))) for speed in sorted(by_speed)]
+
+
+def _windows(path: Path) -> list[tuple[str, float, int, int]]:
+    """Rows of windows.csv."""
+    if not path.is_file():
+        raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
+    rows = []
+    for line, text in enumerate(path.read_text().splitlines()[1:], 2):
+        cells = [cell.strip() for cell in text.split(",")]
+        try:
+            row = cells[0], float(cells[1]), int(cells[2]), int(cells[3])
+        except (ValueError, IndexError):
+            raise InputError(path, f"line {line}", text, "must be: file, speed (m/s), first and last sample") from None
+        if not 0.0 < row[1] < np.inf or not 0 <= row[2] <= row[3] - SHORTEST:
+            allowed = f"needs a speed above 0 and at least {SHORTEST} samples from first to last"
+            raise InputError(path, f"line {line}", text, allowed)
+        rows.append(row)
+    if not rows:
+        raise InputError(path, "", None, "lists no window")
+    return rows
+
+
+def _recording(folder: Path, label: str) -> dict[str, np.ndarray]:
+    """Columns of the recording of a label."""
+    paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
+    if len(paths) != 1:
+        allowed = f"{len(paths)} recordings end in _{label}kph.csv or .csv.gz, one is needed"
+        raise InputError(folder / "windows.csv", "file [km/h]", label, allowed)
+    table = np.genfromtxt(paths[0], delimiter=",", names=True, invalid_raise=False)
+    names: Iterable[str] = table.dtype.names or ()
+    for name in HEADINGS:
+        if name not in names:
+            raise InputError(paths[0], "header", None, f"has no column {name!r}", tuple(names))
+    return {name: np.atleast_1d(table[name]) for name in HEADINGS}

@@ -1,0 +1,40 @@
+"""What a scene of a bicycle will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.core.assumptions import assumption_lines
+from models.core.errors import InputError
+from models.core.scene_effects import lines as effect_lines
+from models.systems.bicycle.run import REFERENCE, assumptions
+from models.systems.bicycle.scene import BicycleScene
+
+
+def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
+    """Refuse, before any file is written, parameters that are no bicycle."""
+    if set(engines) != {REFERENCE}:
+        try:
+            scene.rolling()
+        except InputError as error:
+            raise InputError(error.file or scene.bicycle.parameters, error.place, error.value, error.allowed) from None
+    scene.whipple.eigenvalues(scene.run.speed, scene.control)
+
+
+def describe(scene: BicycleScene) -> str:
+    """The scene's plan as text."""
+    bicycle, run, speeds, tyres = scene.whipple, scene.run, scene.speeds, scene.tyres
+    rear, front = scene.rolling().loads()
+    critical = {"weave": bicycle.weave_speed, "capsize": bicycle.capsize_speed}
+    told = ", ".join(f"{name} {'none' if v is None else f'{v:.6g} m/s'}" for name, v in critical.items())
+    rows = {
+        "scene": f"{scene.file}, study {scene.study}",
+        "bicycle": f"{scene.bicycle.parameters}: wheelbase {bicycle.wheelbase:g} m, trail {bicycle.trail:g} m, "
+        f"steering axis {bicycle.tilt:.4g} rad",
+        "loads": f"{rear:.4g} N rear, {front:.4g} N front",
+        "stable": f"without control from the weave speed to the capsize speed: {told}",
+        "speeds": f"{speeds.count} from {speeds.start:g} to {speeds.stop:g} m/s, linear equations",
+        "run": f"from {run.speed:g} m/s upright with a lean rate of {run.lean_rate:g} rad/s, {run.duration:g} s",
+        "tyres": f"brushes of {tyres.cells} cells per strip, {tyres.stiffness:g} times as stiff as {tyres.cornering:g} "
+        f"of the load per rad and {tyres.vertical:g} N/m",
+        "engines": f"bodies and joints, tyres and control by one compiled kernel, Runge-Kutta 4, {run.step:g} s",
+        "reference": "plain equations, ideal rolling, DOP853, where --engine reference asks for it",
+    }
+    lines = [f"  {head:<10} {text}" for head, text in rows.items()]
+    return "\n".join([scene.title, *lines, *effect_lines(scene), *assumption_lines(assumptions(scene))])

@@ -1,0 +1,184 @@
+"""A bicycle in an engine or with ideal rolling: motion, tyre forces, energy ledger; and its linearised motion."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_simpson
+
+from models.bicycle import rolling_tyres as rt
+from models.bicycle.ideal_rolling import IdealBicycle
+from models.bicycle.rolling_tyres import RollingBicycle
+from models.bicycle.whipple import Whipple
+from models.core.assumptions import Assumption, judged
+from models.core.discretisation import Series, by_steps, not_estimated, stated
+from models.core.errors import RunFailed
+from models.core.result import Channel, Result, result
+from models.engines.assembly import Settings
+from models.engines.free_vehicle import FreeModel, free_model
+from models.systems.bicycle.scene import BicycleScene
+
+REFERENCE = "reference"
+COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
+COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
+"""Channels in the order of ``models.bicycle.rolling_tyres``; each with its rate, whose name ends in _rate."""
+TO_IDEAL = [rt.X, rt.Y, rt.YAW, rt.HEIGHT, rt.LEAN, rt.PITCH, rt.STEER, rt.REAR, rt.FRONT]
+"""Coordinates of engines in the order of ``models.bicycle.ideal_rolling``, which is the way back, too."""
+LATERAL = [rt.Y, rt.YAW, rt.LEAN, rt.STEER]
+MOVED = 1e-7
+"""m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
+SHOWN = ("lean", "steer", "yaw")
+"""Channels whose error is told."""
+ROWS_APART = 0.01
+"""s between rows, at most."""
+LARGEST_LEAN = 1.0
+"""rad: beyond, the frame or the pedals touch the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ride:
+    """Times (n,), positions and rates (n, 9) in the order of engines, energy (n,) and work (n,) of tyres and control
+    since the start (J), reports (n, 2, REPORTED) of the tyres; none of the tyres where wheels roll ideally.
+
+    Rows lie ROWS_APART or less apart, whatever the steps; the work is that of all steps."""
+
+    times: np.ndarray
+    positions: np.ndarray
+    rates: np.ndarray
+    energy: np.ndarray
+    work: np.ndarray
+    steps: int
+    tyres: np.ndarray | None = None
+
+    def unaccounted(self) -> float:
+        """Largest energy that neither tyres nor control account for, by the energy at the start."""
+        return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
+
+
+def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
+    """The scene's run in "exudyn", "mujoco" or "reference"; its detail is the ``Ride``. Raises RunFailed.
+
+    error : whether the error of the steps is estimated, by further runs in longer steps.
+    """
+    begun = time.process_time()
+    ride = ideal(scene) if engine == REFERENCE else ridden(scene, engine, scene.run.step)
+    seconds = time.process_time() - begun
+    channels = {name: Channel("time", ride.positions[:, i], unit) for i, (name, unit) in enumerate(COORDINATES.items())}
+    channels |= {
+        f"{name}_rate": Channel("time", ride.rates[:, i], f"{unit}/s")
+        for i, (name, unit) in enumerate(COORDINATES.items())
+    }
+    encoder = scene.control.encoder_gain * ride.positions[:, rt.STEER]
+    channels |= {"encoder": Channel("time", encoder, "rad", "steer angle as the encoder tells it")}
+    channels |= {"energy": Channel("time", ride.energy, "J"), "work": Channel("time", ride.work, "J")}
+    axes = {"time": Channel("time", ride.times, "s")}
+    if ride.tyres is not None:
+        for name, column in (("load", rt.NORMAL), ("fx", rt.FX), ("fy", rt.FY)):
+            channels[name] = Channel(("time", "wheel"), ride.tyres[:, :, column], "N")
+        axes["wheel"] = Channel("wheel", ["rear", "front"])
+    counts = {"steps": ride.steps}
+    labelled = result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=ride)
+    judged(labelled, assumptions(scene))
+    if not error:
+        return labelled
+    return (
+        not_estimated(labelled, "its steps are kept to a tolerance") if engine == REFERENCE else _told(labelled, scene)
+    )
+
+
+def assumptions(scene: BicycleScene) -> list[Assumption]:
+    """What a run takes for granted."""
+    return [
+        Assumption(
+            "upright",
+            "no part but the wheels touches the ground",
+            "start with a smaller lean rate, or nearer the speeds at which the bicycle steadies itself",
+            lambda run: {"bicycle": run["lean"]},
+            "rad",
+            -LARGEST_LEAN,
+            LARGEST_LEAN,
+        )
+    ]
+
+
+def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
+    """The run on tyres in an engine by steps (s)."""
+    rolling, run = scene.rolling(), scene.run
+    model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
+    path = model.run(*rolling.straight(run.speed, run.lean_rate))
+    fallen = np.abs(path.positions[:, rt.LEAN]) > np.pi / 2.0
+    if fallen.any():
+        raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
+    tyres, ledger = rolling.report(path.times, path.positions, path.rates)
+    work = cumulative_simpson(ledger[:, rt.DISSIPATED] + ledger[:, rt.STEER_POWER], x=path.times, initial=0.0)
+    steps, most = len(path.times) - 1, max(1, int(ROWS_APART / step * (1.0 + 1e-9)))
+    kept = slice(None, None, next(every for every in range(most, 0, -1) if steps % every == 0))
+    plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept], path.rates[kept]
+    motion = [
+        plain.energy(_to_ideal(q_row, rolling.bicycle), v_row[TO_IDEAL]) for q_row, v_row in zip(q, v, strict=True)
+    ]
+    return Ride(path.times[kept], q, v, motion + ledger[kept, rt.POTENTIAL], work[kept], steps, tyres[kept])
+
+
+def _to_ideal(q: np.ndarray, bicycle: Whipple) -> np.ndarray:
+    """Positions (9,) of an engine in the order of the reference, whose pitch and height begin elsewhere."""
+    positions = q[TO_IDEAL]
+    positions[3] += bicycle.rear_wheel.radius
+    positions[5] += bicycle.tilt
+    return positions
+
+
+def ideal(scene: BicycleScene) -> Ride:
+    """The run with ideal rolling, rows ROWS_APART apart."""
+    rolling, run = scene.rolling(), scene.run
+    bicycle = IdealBicycle(rolling.bicycle, rolling.control)
+    rows = max(3, round(run.duration / ROWS_APART) + 1)
+    motion = bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
+    back = np.argsort(TO_IDEAL)
+    positions, rates = motion.positions[:, back], motion.rates[:, back]
+    positions[:, rt.HEIGHT] -= rolling.bicycle.rear_wheel.radius
+    positions[:, rt.PITCH] -= rolling.bicycle.tilt
+    power = np.array([bicycle.applied(v) @ v for v in motion.rates])
+    work = cumulative_simpson(power, x=motion.times, initial=0.0)
+    return Ride(motion.times, positions, rates, motion.energy, work, motion.steps)
+
+
+def _told(run: Result, scene: BicycleScene) -> Result:
+    """The result with the error of its steps."""
+    ride, engine = run.detail, run.data.attrs["engine"]
+
+    def series(ride: Ride) -> Series:
+        columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in SHOWN}
+        return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
+
+    def again(factor: float, share: float) -> Series:
+        step = factor * scene.run.step
+        return series(ridden(scene, engine, step, step * max(2, round(share * scene.run.duration / step))))
+
+    told, how = by_steps(series(ride), again, 4.0, scene.run.step)
+    return stated(run, told, how)
+
+
+def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
+    """(8, 8): rates of lateral place, yaw, lean, steer and of their rates about straight rolling at a speed (m/s)."""
+    q, v = rolling.straight(speed)
+    matrix = np.eye(8, 8, 4)
+    for j in range(8):
+        ends = []
+        for moved in (MOVED, -MOVED):
+            state = np.array([q, v])
+            state[j // 4, LATERAL[j % 4]] += moved
+            ends.append(model.acceleration(0.0, *state)[LATERAL])
+        matrix[4:, j] = np.subtract(*ends) / (2.0 * MOVED)
+    return matrix
+
+
+def engine_eigenvalues(engine: str, rolling: RollingBicycle, speed: float) -> np.ndarray:
+    """(4,) 1/s: those of the bicycle on its tyres that are nearest to the ones of the linear equations, in their order.
+
+    The tyres' own two decay far faster, and place and yaw have a double zero.
+    """
+    values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling.driven), rolling, speed))
+    kept = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero
+    wanted = rolling.bicycle.eigenvalues(speed, rolling.control)
+    return np.array([values[kept][np.argmin(np.abs(values[kept] - value))] for value in wanted])

@@ -1,0 +1,98 @@
+"""Scenes of a bicycle: its parameters, tyres, control, the speeds of its eigenvalues, and one run from upright."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
+from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
+from models.core.errors import InputError
+from models.core.scene_effects import extended, with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.strict import Strict, quantity
+
+FASTEST_LEAN = 3.0
+"""rad/s: beyond, a bicycle lies on the ground before it steers."""
+
+
+class BicycleTable(Strict):
+    """[bicycle]: a parameter set or the user's own file."""
+
+    parameters: str = Field(default="benchmark", description="a parameter set, or a TOML file with every parameter")
+
+
+class TyreTable(Strict):
+    """[tyres]: both wheels; the reference rolls ideally, as tyres do in the limit of stiffness."""
+
+    cornering: float = quantity("1/rad", "side force by slip angle and load", default=20.0)
+    vertical: float = quantity("N/m", "vertical stiffness", default=2e5)
+    damping: float = quantity("N s/m", "vertical damping", default=200.0, zero=True)
+    half_width: float = quantity("m", "half the width of the patch", default=5e-3)
+    friction: float = quantity("-", "coefficient of friction", default=1.0)
+    cells: int = Field(default=9, ge=3, le=200, description="of the patch's net per strip")
+    stiffness: float = quantity("-", "how many times as stiff: s C, s^2 k, half width by s", default=1.0)
+
+
+class RunTable(Strict):
+    """[run]: straight and upright, with a lean rate."""
+
+    speed: float = quantity("m/s", "speed at the start, backwards below 0", default=4.6, signed=True)
+    lean_rate: float = quantity("rad/s", "lean rate at the start, to the right", default=0.5, signed=True)
+    duration: float = quantity("s", "length of the run", default=5.0)
+    step: float = quantity("s", "step of Runge-Kutta 4 in engines", default=2e-4)
+
+
+class SpeedsTable(Strict):
+    """[speeds]: those of the eigenvalues, from start to stop."""
+
+    start: float = quantity("m/s", "first speed", default=0.0, signed=True)
+    stop: float = quantity("m/s", "last speed", default=10.0, signed=True)
+    count: int = Field(default=101, ge=2, le=10_000, description="number of speeds")
+
+
+class BicycleScene(SceneFile):
+    """One scene of a bicycle."""
+
+    system: Literal["bicycle"] = "bicycle"
+    study: str = Field(default="bicycle", description="the study that runs the scene")
+    bicycle: BicycleTable = BicycleTable()
+    tyres: TyreTable = TyreTable()
+    control: Control = Control()
+    speeds: SpeedsTable = SpeedsTable()
+    run: RunTable = RunTable()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    @cached_property
+    def whipple(self) -> Whipple:
+        """The bicycle of the linear equations."""
+        return load_bicycle(self.bicycle.parameters, self.folder, self.file, "bicycle.parameters")
+
+    def rolling(self) -> RollingBicycle:
+        """The bicycle on its tyres with the scene's control and effects."""
+        return extended(RollingBicycle(self.whipple, BicycleTyre(**self.tyres.model_dump()), self.control), self)
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BicycleScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(BicycleScene, table, file, folder)
+    run, speeds = scene.run, scene.speeds
+    for place, value, most, unit in (
+        ("run.speed", run.speed, HIGHEST_SPEED, "m/s"),
+        ("run.lean_rate", run.lean_rate, FASTEST_LEAN, "rad/s"),
+        ("speeds.start", speeds.start, HIGHEST_SPEED, "m/s"),
+        ("speeds.stop", speeds.stop, HIGHEST_SPEED, "m/s"),
+    ):
+        if abs(value) > most:
+            raise InputError(file, place, value, f"must be from -{most:g} to {most:g} {unit}")
+    if speeds.start >= speeds.stop:
+        raise InputError(file, "speeds.stop", speeds.stop, f"must be above speeds.start = {speeds.start:g} m/s")
+    if run.duration / run.step > MOST_STEPS:
+        raise InputError(file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
+    if not divides(run.step, run.duration):
+        allowed = f"must divide run.duration = {run.duration:g} s; use for example {fitting(run.step, run.duration)}"
+        raise InputError(file, "run.step", run.step, allowed)
+    return with_own(scene)

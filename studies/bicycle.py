@@ -1,0 +1,97 @@
+"""A bicycle: eigenvalues over speed by its linear equations, and a run from upright on tyres or with ideal rolling."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.core.result import Result, joined
+from models.core.tables import write_table
+from models.drawing.figures import BLUE, COLOURS, LABELS, VERMILION, heading, panels, save
+from models.systems.bicycle.run import run as run_scene
+from models.systems.bicycle.scene import BicycleScene
+
+SYSTEM = "bicycle"
+Progress = Callable[[str, float], None]
+
+
+def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Saves ``eigenvalues.csv``, ``runs.nc`` and ``bicycle.png``."""
+    failed, runs, speeds, values = dict[str, str](), dict[str, Result](), *eigenvalues(scene)
+    write_table(
+        folder / "eigenvalues.csv",
+        {"speed": ("m/s", speeds)}
+        | {f"{part} {i + 1}": ("1/s", getattr(values[:, i], part)) for i in range(4) for part in ("real", "imag")},
+    )
+    for i, engine in enumerate(engines):
+        progress(engine, i / len(engines))
+        try:
+            runs[engine] = run_scene(scene, engine, error=scene.error)
+        except RunFailed as error:
+            failed[engine] = str(error)
+    if runs:
+        progress("figure", 1.0)
+        step = min(len(result.times) for result in runs.values())
+        alike = {e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()}
+        joined(alike, "engine").save(folder / "runs.nc")
+        figure(scene, speeds, values, runs, folder / "bicycle.png")
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "answer": _answer(scene, runs),
+        "results": runs,
+        "table": [_line(engine, result) for engine, result in runs.items()],
+    }
+
+
+def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds (n,) in m/s and eigenvalues (n, 4) in 1/s of the linear equations with the scene's control."""
+    speeds = np.linspace(scene.speeds.start, scene.speeds.stop, scene.speeds.count)
+    return speeds, np.array([scene.whipple.eigenvalues(float(speed), scene.control) for speed in speeds])
+
+
+def _answer(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
+    bicycle = scene.whipple
+    said: dict[str, Any] = {
+        "weave speed without control [m/s]": bicycle.weave_speed,
+        "capsize speed without control [m/s]": bicycle.capsize_speed,
+    }
+    for engine, result in runs.items():
+        said[f"largest lean, {engine} [rad]"] = float(np.abs(result["lean"]).max())
+        said[f"energy unaccounted for, {engine}"] = result.detail.unaccounted()
+    return said
+
+
+def _line(engine: str, result: Result) -> str:
+    lean, steer = (np.abs(result[name]).max() for name in ("lean", "steer"))
+    gap = result.detail.unaccounted()
+    return f"    {engine:<12}largest lean {lean:.5f} rad, steer {steer:.5f} rad; energy unaccounted for {gap:.1e}"
+
+
+def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: dict[str, Result], path: Path) -> Path:
+    """Eigenvalues over speed, and lean and steer angle over time."""
+    drawn, axes = panels(4, 2, 2.4)
+    for axis, part, colour in ((axes[0], values.real, BLUE), (axes[1], values.imag, VERMILION)):
+        axis.plot(speeds, part, ".", ms=2.0, color=colour)
+        axis.axhline(0.0, lw=0.6, color="k")
+        axis.set_xlabel("speed [m/s]")
+    axes[0].set(ylabel="real part [1/s]", title="Eigenvalues: what grows is above 0", ylim=(-12.0, 7.0))
+    axes[1].set(ylabel="imaginary part [1/s]", title="Weave: frequency", ylim=(0.0, None))
+    for axis, name in ((axes[2], "lean"), (axes[3], "steer")):
+        for engine, result in runs.items():
+            axis.plot(result.times, np.degrees(result[name]), color=COLOURS[engine], label=LABELS[engine])
+        axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} from upright")
+    axes[2].legend()
+    heading(drawn, scene.title, runs)
+    plt.close(drawn)
+    return save(drawn, path)
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("bicycle")

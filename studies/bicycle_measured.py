@@ -1,0 +1,121 @@
+"""A measured bicycle: weave eigenvalues of recordings, the model with nothing fitted, and which suspects they call for.
+
+``python -m studies.bicycle_measured FOLDER`` reads windows.csv and the recordings of a folder (see
+``models.bicycle.weave``), chooses among the suspects on all speeds, or on those of ``--choose``, and predicts the rest;
+without it each speed is predicted by a choice on all others, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from models.bicycle.suspects import NEUTRAL, UNITS, Choice, chosen, deviations, forecast, predicted
+from models.bicycle.weave import Observation, observations
+from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.core.errors import InputError
+
+FEEDBACK = Control(gain=2.0, until=6.5)
+"""Of the experimenters during these runs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Observations of all speeds; the choice on some of them; predictions by it of the speeds that took no part, and of
+    each speed by a choice on all others, where none was asked to stand aside: (mean (2,), deviations (2,)) by speed."""
+
+    seen: list[Observation]
+    choice: Choice
+    predictions: dict[float, tuple[np.ndarray, np.ndarray]]
+
+
+def measured(
+    folder: str | Path, choose: Sequence[float] = (), bicycle: Whipple | None = None, base: Control = FEEDBACK
+) -> Measured:
+    """Choose suspects on the speeds ``choose`` (m/s), all if there are none, and predict the others; InputError."""
+    seen, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
+    speeds = [observation.speed for observation in seen]
+    for speed in choose:
+        if speed not in speeds:
+            raise InputError(folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
+    choice = chosen(bicycle, base, [o for o in seen if not choose or o.speed in choose])
+    predictions = {}
+    for observation in seen:
+        if choose and observation.speed not in choose:
+            by = choice
+        elif choose or len(seen) < 4:
+            continue
+        else:
+            by = chosen(bicycle, base, [o for o in seen if o is not observation])
+        mean, _ = forecast(bicycle, base, by, observation)
+        predictions[observation.speed] = mean, deviations(bicycle, base, by, observation)
+    return Measured(seen, choice, predictions)
+
+
+def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
+    """The answer as text."""
+    told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
+    for seen in answer.seen:
+        mean, deviation, model = seen.mean, seen.deviation, predicted(bicycle, base, seen)
+        each = [
+            f"{sign * mean[i]:6.2f} +- {deviation[i]:4.2f}{sign * model[i]:17.2f} ({model[i] / mean[i] - 1.0:+5.0%})"
+            for i, sign in ((0, -1.0), (1, 1.0))
+        ]
+        told.append(f"{seen.speed:4.2f} m/s {len(seen.weave):5d}   {'    '.join(each)}")
+    choice, best = answer.choice, answer.choice.best
+    told += ["", f"best of {len(choice.fits)} subsets (inflation of chi^2: {choice.inflation:.2f}):"]
+    errors = np.sqrt(choice.inflation * np.diag(best.covariance))
+    for name, value, error in zip(best.names, best.values, errors, strict=True):
+        told.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNITS.get(name, '')}")
+    told += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
+    for name in NEUTRAL:
+        calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
+        why = "no measured number depends on it" if name in choice.blind else calls
+        told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
+    for name, (ratio, chance) in choice.calls.items():
+        if name not in NEUTRAL:
+            told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
+    for one, other, correlation in apart(choice):
+        told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
+    told += ["", "predicted without their own speed, in standard deviations:"]
+    for speed, (mean, gap) in answer.predictions.items():
+        verdict = "within 2" if np.abs(gap).max() <= 2.0 else "NOT within 2"
+        told.append(
+            f"  {speed:4.2f} m/s  damping {-mean[0]:.2f} 1/s ({gap[0]:+.2f}), frequency {mean[1]:.2f} rad/s "
+            f"({gap[1]:+.2f}): {verdict}"
+        )
+    return told
+
+
+def apart(choice: Choice, bound: float = 0.9) -> list[tuple[str, str, float]]:
+    """Pairs of suspects whose estimates in the fullest subset correlate by more than a bound."""
+    fullest = max(choice.fits, key=lambda fit: len(fit.names))
+    size = np.sqrt(np.diag(fullest.covariance))
+    correlation = fullest.covariance / np.outer(size, size)
+    names = fullest.names
+    return [
+        (names[i], names[j], float(correlation[i, j]))
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > bound
+    ]
+
+
+def main(
+    folder: Annotated[Path, typer.Argument(help="folder with windows.csv and recordings")],
+    choose: Annotated[list[float] | None, typer.Option(help="speeds (m/s) on which suspects are chosen")] = None,
+    bicycle: Annotated[str, typer.Option(help="parameter set, or a TOML file")] = "steer_by_wire",
+) -> None:
+    """Measure weave in recordings, and choose among the suspects."""
+    try:
+        whipple = load_bicycle(bicycle, file="--bicycle", place="")
+        print("\n".join(lines(measured(folder, choose or (), whipple), whipple)))
+    except InputError as error:
+        raise SystemExit(f"twinrig: {error}") from None
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,248 @@
+"""Whipple's bicycle: published figures, stiff tyres towards ideal rolling, energy, and a measured bicycle."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.bicycle.ideal_rolling import IdealBicycle
+from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
+from models.bicycle.suspects import Choice, chosen, deviations, predicted
+from models.bicycle.weave import Observation, observations
+from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.core.errors import RunFailed
+from models.systems.bicycle.run import engine_eigenvalues, run
+from models.systems.bicycle.scene import build
+from validation.common.bicycle_published import CAPSIZE_SPEED, MATRICES, PUBLISHED, WEAVE_SPEED
+from validation.common.rows import Observed, Row, System, Table, not_run
+
+TITLE = "A bicycle: benchmark and measured"
+SYSTEM: System = "rolling-vehicle"
+ENGINES = ("exudyn", "mujoco")
+STIFFNESS = (4.0, 16.0, 64.0, 256.0)
+SPEED = 5.0
+"""m/s of the eigenvalues on tyres."""
+FEEDBACK = Control(gain=2.0)
+"""Of the measured bicycle."""
+FROM = 2.0
+"""m/s from which on damping is judged with nothing fitted."""
+FAULT = 1.001
+"""Factor of a planted fault."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """All rows; quick: a run of half a second, no choice with a speed left out."""
+    benchmark = load_bicycle("benchmark")
+    rows = [*_published_rows(benchmark), *_fault_rows(benchmark)]
+    gaps = {engine: _gaps(benchmark, engine) for engine in ENGINES}
+    rows += [*_limit_rows(gaps), *_energy_rows(0.5 if quick else 5.0)]
+    measured_rows, data = _measured(quick)
+    return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """Eigenvalues on stiffening tyres, and the measured bicycle where its recordings were there."""
+    gaps = data["gaps"][ENGINES[0]]
+    told = [
+        Table(
+            "Tyres that stiffen tend to ideal rolling",
+            f"Largest distance (1/s) of the benchmark's eigenvalues at {SPEED:g} m/s from those of ideal rolling.",
+            ("stiffness", *ENGINES, "order"),
+            tuple(
+                (f"{s:g}", *(f"{data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
+                for i, s in enumerate(STIFFNESS)
+            ),
+        )
+    ]
+    if data["measured"]:
+        headings = ("speed", "damping", "nothing fitted", "frequency", "nothing fitted", "chosen without this speed")
+        told.append(
+            Table(
+                "Weave of a measured bicycle",
+                "Damping (1/s) and frequency (rad/s) with the windows' scatter; last, deviations in standard ones.",
+                headings,
+                tuple(map(tuple, data["measured"])),
+            )
+        )
+    return told
+
+
+def _order(gaps: list[float], i: int) -> str:
+    return f"{np.log(gaps[i - 1] / gaps[i]) / np.log(STIFFNESS[i] / STIFFNESS[i - 1]):.3f}"
+
+
+def _published_rows(bicycle: Whipple) -> list[Row]:
+    M, C1, K0, K2 = bicycle.linear
+    matrices = zip((M, C1, bicycle.gravity * K0, K2), MATRICES.values(), strict=True)
+    off = max(float(np.abs(here - there).max()) for here, there in matrices)
+    values = max(float(np.abs(bicycle.eigenvalues(v) - there).max()) for v, there in PUBLISHED.items())
+    critical = max(abs((bicycle.weave_speed or 0.0) - WEAVE_SPEED), abs((bicycle.capsize_speed or 0.0) - CAPSIZE_SPEED))
+    given = (
+        ("matrices", "M, C1, g K0, K2 of the benchmark bicycle: largest difference", off, "kg m^2 and so on"),
+        ("eigenvalues", "eigenvalues at 0 to 10 m/s: largest difference", values, "1/s"),
+        ("speeds", "weave and capsize speed: larger difference", critical, "m/s"),
+    )
+    why = "printed to 14 digits or more; rounding of the largest entries is 1e-13"
+    return [
+        Observed(f"bicycle.published.{key}", SYSTEM, said, value, unit).at_most(1e-12, why, "published")
+        for key, said, value, unit in given
+    ]
+
+
+def _fault_rows(bicycle: Whipple) -> list[Row]:
+    """A trail that is a thousandth longer must not pass as the published bicycle."""
+    wrong = bicycle.changed(trail=FAULT * bicycle.trail)
+    caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED[SPEED]).max())
+    said = "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
+    seen = Observed("bicycle.published.fault", SYSTEM, said, min(caught / 1e-12, 1e6), "")
+    return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
+
+
+def _gaps(bicycle: Whipple, engine: str) -> np.ndarray:
+    """Largest distance (1/s) of eigenvalues on tyres from those of ideal rolling, by stiffness."""
+    wanted = bicycle.eigenvalues(SPEED)
+    stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in STIFFNESS]
+    return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
+
+
+def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
+    """Order of convergence in each engine, the limit extrapolated, and both engines beside one another."""
+    rows = []
+    for engine, gap in gaps.items():
+        order = np.log(gap[-2] / gap[-1]) / np.log(STIFFNESS[-1] / STIFFNESS[-2])
+        rows.append(
+            Observed(
+                f"bicycle.tyres.order.{engine}",
+                SYSTEM,
+                f"{engine}: order by which eigenvalues on tyres of stiffness s tend to those of ideal rolling",
+                float(order),
+                "",
+            ).within(1.0, 0.02, "side slip, trail and patch fall as 1 / s; what is left is of order 2", "closed form")
+        )
+    between = float(np.abs(gaps["exudyn"] / gaps["mujoco"] - 1.0).max())
+    rows.append(
+        Observed(
+            "bicycle.tyres.engines",
+            SYSTEM,
+            "distance of eigenvalues on tyres from ideal rolling: largest relative difference of the engines",
+            between,
+            "",
+        ).at_most(1e-4, "differences over 2e-7 of accelerations that stiff tyres make large", "shared kernel")
+    )
+    return rows
+
+
+def _energy_rows(duration: float) -> list[Row]:
+    """Energy of the benchmark run with ideal rolling, and the ledger on tyres."""
+    table = {"title": "benchmark run", "system": "bicycle", "run": {"duration": duration}}
+    scene, rows = build(table), []
+    for engine in ("reference", *ENGINES):
+        try:
+            gap = run(scene, engine).detail.unaccounted()
+        except RunFailed:
+            gap = float("nan")
+        kept = "energy" if engine == "reference" else "energy less work of the tyres"
+        rows.append(
+            Observed(
+                f"bicycle.energy.{engine}",
+                SYSTEM,
+                f"{engine}, from 4.6 m/s upright with 0.5 rad/s of lean rate, {duration:g} s: largest change of {kept}",
+                gap,
+                "",
+            ).at_most(1e-8, "relative to the energy at the start; no integrator here may lose more", "none")
+        )
+    plain = IdealBicycle(load_bicycle("benchmark").changed(gravity=9.80))
+    q = IdealBicycle(load_bicycle("benchmark")).upright(4.6, 0.5)
+    moved = abs(
+        plain.energy(q[:9], np.zeros(9)) / IdealBicycle(load_bicycle("benchmark")).energy(q[:9], np.zeros(9)) - 1
+    )
+    seen = Observed("bicycle.energy.fault", SYSTEM, "gravity 0.1 % off: change of the potential energy", moved, "")
+    return [*rows, seen.within(1.019e-3, 1e-5, "the ledger sees a planted fault a hundred thousand times", "none")]
+
+
+def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
+    """The measured bicycle with nothing fitted, and every speed by a choice on the others."""
+    root = os.environ.get("TWINRIG_DATA")
+    folder = Path(root) / "bicycle" if root else None
+    if folder is None or not (folder / "windows.csv").is_file():
+        why = "TWINRIG_DATA names no folder with bicycle/windows.csv"
+        return [not_run("bicycle.measured", SYSTEM, "weave of a measured bicycle", why)], []
+    bicycle, seen = load_bicycle("steer_by_wire"), observations(folder)
+    rows, table = [], []
+    for observation in seen:
+        rows += _unfitted_rows(bicycle, observation)
+        by = None if quick else chosen(bicycle, FEEDBACK, [other for other in seen if other is not observation])
+        rows += [] if by is None else _predicted_rows(bicycle, by, observation)
+        table.append(_line(bicycle, by, observation))
+    return [*rows, *_choice_rows(chosen(bicycle, FEEDBACK, seen))], table
+
+
+def _unfitted_rows(bicycle: Whipple, seen: Observation) -> list[Row]:
+    model, mean, deviation = predicted(bicycle, FEEDBACK, seen), seen.mean, seen.deviation
+    at = f"{seen.speed:g} m/s, {len(seen.weave)} windows"
+    damping = Observed(
+        f"bicycle.measured.damping.{seen.speed:g}",
+        SYSTEM,
+        f"weave damping at {at}, nothing fitted: deviation by the measured {-mean[0]:.2f} +- {deviation[0]:.2f} 1/s",
+        float(model[0] / mean[0] - 1.0),
+        "",
+    )
+    frequency = Observed(
+        f"bicycle.measured.frequency.{seen.speed:g}",
+        SYSTEM,
+        f"weave frequency at {at}, nothing fitted: deviation by the measured {mean[1]:.2f} +- {deviation[1]:.2f} rad/s",
+        float(model[1] / mean[1] - 1.0),
+        "",
+    )
+    why = "parameters and feedback as published, no number fitted"
+    judged = damping.at_most(0.1, why, "measured") if seen.speed >= FROM else damping.beside(0.0, why, "measured")
+    return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
+
+
+def _predicted_rows(bicycle: Whipple, choice: Choice, seen: Observation) -> list[Row]:
+    gaps = deviations(bicycle, FEEDBACK, choice, seen)
+    why = "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds"
+    return [
+        Observed(
+            f"bicycle.chosen.{name}.{seen.speed:g}",
+            SYSTEM,
+            f"weave {name} at {seen.speed:g} m/s by suspects chosen on the other speeds: standard deviations off",
+            float(gap),
+            "",
+        ).at_most(2.0, why, "measured")
+        for name, gap in zip(("damping", "frequency"), gaps, strict=True)
+    ]
+
+
+def _choice_rows(choice: Choice) -> list[Row]:
+    """What the data call for, at the level of 5 %, beside what the experimenters suspected."""
+    told = ", ".join(f"{name} {value:.3g}" for name, value in zip(choice.best.names, choice.best.values, strict=True))
+    return [
+        Observed(
+            f"bicycle.suspects.{key}",
+            SYSTEM,
+            f"chance of leaving {said} out; best subset: {told}",
+            choice.calls[name][1],
+            "",
+        ).at_most(0.05, "F test against the fullest subset that can be told apart", "measured")
+        for key, said, name in (
+            ("friction", "friction of the steering", "friction of either kind"),
+            ("speed_gain", "the speed sensor's gain", "speed_gain"),
+            ("speed_bias", "the speed sensor's bias", "speed_bias"),
+        )
+        if name in choice.calls
+    ]
+
+
+def _line(bicycle: Whipple, choice: Choice | None, seen: Observation) -> list[str]:
+    model, mean, deviation = predicted(bicycle, FEEDBACK, seen), seen.mean, seen.deviation
+    gaps = np.empty(0) if choice is None else deviations(bicycle, FEEDBACK, choice, seen)
+    return [
+        f"{seen.speed:g} m/s",
+        f"{-mean[0]:.2f} +- {deviation[0]:.2f}",
+        f"{-model[0]:.2f}",
+        f"{mean[1]:.2f} +- {deviation[1]:.2f}",
+        f"{model[1]:.2f}",
+        " and ".join(f"{gap:+.2f}" for gap in gaps),
+    ]
