@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.tables import write_table
+from models.core.whole_files import write_whole
 from models.systems.handling.run import Drive
 from models.systems.handling.run import run as run_handling
 from models.systems.handling.scene import build
@@ -63,6 +63,13 @@ def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
     return {name: (unit, values[::every]) for name, (unit, values) in plain.items()} | noisy
 
 
-if __name__ == "__main__":
+def save(path: Path) -> None:
+    """Write the measurement with six digits."""
     columns = measured(driven())
-    write_table(Path(sys.argv[1]), {name: (unit, np.round(values, 6)) for name, (unit, values) in columns.items()})
+    head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
+    rows = zip(*(values.tolist() for _, values in columns.values()), strict=True)
+    write_whole(path, "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in rows), ""]))
+
+
+if __name__ == "__main__":
+    save(Path(sys.argv[1]))

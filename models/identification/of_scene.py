@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.scene_file import put
+from models.core.strict import LARGEST
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import Clock, Curve, Measured, Parameter, Problem, measured_channel
 from models.measured.curve import curve
@@ -46,13 +47,16 @@ def held_by(scene: Any, key: str) -> tuple[float, float, float]:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene", _names(owner))
     field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
-    low, high = -np.inf, np.inf
-    for limit in field.metadata if field is not None else ():
-        low = max(low, *(getattr(limit, name) for name in ("gt", "ge") if getattr(limit, name, None) is not None), low)
-        high = min(
-            high, *(getattr(limit, name) for name in ("lt", "le") if getattr(limit, name, None) is not None), high
-        )
-    return float(value), float(low), float(high)
+    limits = field.metadata if field is not None else []
+    low = max((float(each) for limit in limits for each in _ends(limit, "gt", "ge")), default=-np.inf)
+    high = min((float(each) for limit in limits for each in _ends(limit, "lt", "le")), default=np.inf)
+    return float(value), low, high
+
+
+def _ends(limit: Any, *names: str) -> list[float]:
+    """Ends that a limit of a field names; what stands for "beyond all measure" is none."""
+    ends = (getattr(limit, name, None) for name in names)
+    return [end for end in ends if end is not None and abs(end) < LARGEST]
 
 
 def _inside(owner: Any, name: str, key: str) -> Any:

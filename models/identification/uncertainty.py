@@ -2,7 +2,8 @@
 
 Residuals of a model that was fitted are no white noise: they stay for as long as a corner lasts. The covariance of
 estimates is therefore the sandwich H^-1 S H^-1 with H = J^T J and S the long-run covariance of the scores J_t^T e_t,
-summed over lags up to several times as long as residuals stay alike, with falling weights. Source: Newey and West,
+summed over lags up to several times as long as residuals stay alike, with falling weights; or that of stationary
+residuals as alike as they are, where it is larger: short records scatter. Source: Newey and West,
 Econometrica 55 (1987), 703-708; for the whole, Ljung, System Identification (1999), section 9.
 """
 
@@ -87,7 +88,8 @@ def uncertainty(solved: Fit) -> Uncertainty:
     part = np.ix_(free, free)
     if free.any():
         inverse = _inverse(inner[part])
-        covariance[part] = inverse @ _long_run(scores[:, free], lags) @ inverse
+        both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], solved.residuals, lags)
+        covariance[part] = inverse @ _larger(*both) @ inverse
         covariance[part] += _untold(inner[part])
     return Uncertainty(solved, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
@@ -128,6 +130,26 @@ def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
         total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
     count, p = scores.shape
     return total * count / max(count - p, 1)
+
+
+def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
+    """The same (p, p) for residuals of channels that are stationary, each alike to itself over the lags as it is."""
+    total = np.zeros((jacobian.shape[2],) * 2)
+    for rows, error in zip(jacobian, residuals, strict=True):
+        for lag in range(lags + 1):
+            alike = float(error[lag:] @ error[: len(error) - lag]) / len(error)
+            product = rows[lag:].T @ rows[: len(rows) - lag]
+            total += (1.0 - lag / (lags + 1.0)) * alike * (product if lag == 0 else product + product.T)
+    return total
+
+
+def _larger(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
+    values, vectors = np.linalg.eigh(two)
+    values = np.maximum(values, SINGULAR * values[-1])
+    root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
+    ratios, turned = np.linalg.eigh(back @ one @ back)
+    return root @ (turned * np.maximum(ratios, 1.0)) @ turned.T @ root
 
 
 @dataclass(frozen=True, eq=False)
