@@ -1,4 +1,4 @@
-"""The command ``twinrig``: list, show, run, price, compare, export, validate."""
+"""The command ``twinrig``: list, show, run, price, compare, identify, export, validate."""
 
 import io
 import json
@@ -289,6 +289,38 @@ def compare(
     differences(first, second)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
     _finish(lambda progress: report(first, second, folder), folder, as_json)
+
+
+@app.command()
+def identify(
+    scene: SceneName,
+    measurement: Annotated[
+        Path, typer.Option("--from", help="Measurement (.csv, .mf4, ...) with channels of the run.")
+    ],
+    parameters: Annotated[str, typer.Option(help="Keys of the scene: a,b=LOW:HIGH,c.")],
+    engine: Annotated[str | None, typer.Option(help="One of exudyn, mujoco, reference.")] = None,
+    low_pass: Annotated[float, typer.Option(help="Hz, of run and measurement alike, without phase; 0 for none.")] = 0.0,
+    profiles: Annotated[bool, typer.Option("--profiles", help="Profile likelihood of every parameter.")] = False,
+    out: Out = None,
+    resume: Resume = None,
+    changes: Changes = None,
+    as_json: AsJson = False,
+) -> None:
+    """Identify numbers of a scene from a measurement, with standard errors, and say what it does not determine."""
+    from studies.command.identify import STAGES, report
+
+    loaded, keys = load_scene(scene, changes), [key.strip() for key in parameters.split(",") if key.strip()]
+    if not keys:
+        raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
+    engines = engines_of(engine, loaded.system)
+    ready(loaded, engines)
+    if not measurement.is_file():
+        raise InputError(measurement, "--from", None, "no such file")
+    folder = _folder(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
+    more = {"engine": engines[0] if engines else "", "low_pass": low_pass, "profiles": profiles}
+    _finish(
+        lambda tell: report(loaded, measurement, keys, folder, tell, **more), folder, as_json, (), False, loaded.system
+    )
 
 
 @app.command()

@@ -1,0 +1,80 @@
+"""Bands of 95 % around a prediction: what the parameters leave open, and what the model itself gets wrong."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.identification.problem import Problem
+from models.identification.uncertainty import LEVEL, Uncertainty
+
+SHARE = 0.95
+"""Of the residuals that the bands hold where they were made."""
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``reach`` holds SHARE of residuals."""
+
+    base: float
+    share: float
+    reach: float
+
+    def half_width(self, predicted: np.ndarray) -> np.ndarray:
+        """(n,)."""
+        return self.reach * np.sqrt(self.base**2 + (self.share * predicted) ** 2)
+
+
+def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
+    """From residuals (n,) of predictions (n,), best of stretches that took no part in the fit: their squares against
+    those of the prediction, neither part below 0."""
+    from scipy.optimize import nnls
+
+    squares = np.column_stack([np.ones(len(predicted)), predicted**2])
+    sizes = np.abs(squares).mean(axis=0)
+    (base, share), _ = nnls(squares / sizes, residuals**2)
+    model = ErrorModel(float(np.sqrt(base / sizes[0])), float(np.sqrt(share / sizes[1])), 1.0)
+    size = model.half_width(predicted)
+    floor = 1e-12 * float(np.abs(residuals).max() or 1.0)
+    return ErrorModel(model.base, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), SHARE)))
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """predicted and half_width (channels, n) on the clock of ``problem``."""
+
+    problem: Problem
+    predicted: np.ndarray
+    half_width: np.ndarray
+
+    def inside(self) -> np.ndarray:
+        """(channels,): share of what was measured that lies inside."""
+        return self._mean(np.abs(self._error()) <= self.half_width)
+
+    def rms(self) -> np.ndarray:
+        """(channels,): root mean square of prediction less measurement."""
+        return np.sqrt(self._mean(self._error() ** 2))
+
+    def relative(self) -> np.ndarray:
+        """(channels,): the same by the root mean square of the measurement."""
+        return self.rms() / np.array([channel.size for channel in self.problem.channels])
+
+    def width(self) -> np.ndarray:
+        """(channels,): mean half-width by the rms error."""
+        return self._mean(self.half_width) / self.rms()
+
+    def _error(self) -> np.ndarray:
+        return self.predicted - np.array([channel.values for channel in self.problem.channels])
+
+    def _mean(self, values: np.ndarray) -> np.ndarray:
+        used = [channel.used for channel in self.problem.channels]
+        return np.array([row[part].mean() for row, part in zip(values, used, strict=True)])
+
+
+def bands(problem: Problem, known: Uncertainty, errors: list[ErrorModel]) -> Bands:
+    """Bands of a stretch: ``problem`` is that of the fit with the drive and the measurement of the stretch."""
+    values = known.fit.values
+    predicted = problem.predicted(values)
+    slopes = problem.jacobian(values, problem.predicted)
+    variance = np.einsum("cnp,pq,cnq->cn", slopes, known.covariance, slopes)
+    own = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
+    return Bands(problem, predicted, np.sqrt(own**2 + LEVEL**2 * np.clip(variance, 0.0, None)))

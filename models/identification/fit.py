@@ -1,0 +1,99 @@
+"""Least squares in stages, each of which can be kept and gone on from: the same bits with and without interruption."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.ensemble.store import Store
+from models.identification.problem import FAILED, Problem
+
+STAGE, MOST_STAGES = 4, 20
+"""Trials of a stage, and stages of a fit."""
+SETTLED = 1e-4
+"""Relative decrease of the cost in a stage at which a fit ends: with the residuals of a hundred corners, which count
+once each, estimates then move by a tenth of their standard errors at most."""
+INSIDE = 1e-6
+"""Scales by which a start lies inside its bounds."""
+Told = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages; converged."""
+
+    problem: Problem
+    values: np.ndarray
+    residuals: np.ndarray
+    cost: float
+    stages: int
+    converged: bool
+
+    @property
+    def at_bound(self) -> np.ndarray:
+        """(p,): which estimates lie at a bound."""
+        low, high = self.problem.bounds
+        near = 1e-3 * self.problem.scale
+        return (self.values - low < near) | (high - self.values < near)
+
+
+def fit(problem: Problem, kept: Store | None = None, tell: Told = lambda text, share: None, first: int = 0) -> Fit:
+    """Estimates by scipy's least squares; InputError where the model fails at the start.
+
+    kept : finished stages, the first of them block ``first``; tell : told after each stage.
+    """
+    values, cost, converged = problem.start, np.inf, False
+    for stage in range(MOST_STAGES):
+        if kept is not None and kept.has(first + stage):
+            block = kept.load(first + stage)
+        else:
+            block = _stage(problem, values)
+            if kept is not None:
+                kept.save(first + stage, block)
+        values, before, cost = block["values"], cost, float(block["cost"])
+        converged = before - cost <= SETTLED * cost
+        size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))
+        tell(f"stage {stage + 1}, error {size:.4g} of the channels", _share(stage, before, cost))
+        if converged:
+            break
+    return Fit(problem, values, problem.residuals(values), cost, stage + 1, converged)
+
+
+def _share(stage: int, before: float, cost: float) -> float:
+    """Which part of a fit may be done: stages grow few as the cost settles."""
+    settled = 0.0 if not np.isfinite(before) else min(1.0, -np.log10(max(1.0 - cost / before, SETTLED)) / 4.0)
+    return 0.9 * max(settled, stage / MOST_STAGES)
+
+
+def _stage(problem: Problem, values: np.ndarray) -> dict[str, np.ndarray]:
+    """A few trials from values on."""
+    from scipy.optimize import least_squares
+
+    scale, (low, high) = problem.scale, problem.bounds
+    begin = np.clip(values / scale, low / scale + INSIDE, high / scale - INSIDE)
+    if np.abs(problem.residuals(begin * scale)).max() >= FAILED:
+        names = ", ".join(f"{each.name} = {value:.4g}" for each, value in zip(problem.parameters, values, strict=True))
+        raise InputError("identify", "start", names, "the model fails at these values: start from others")
+    solved = least_squares(
+        lambda x: problem.residuals(x * scale).ravel(),
+        begin,
+        jac=lambda x: problem.jacobian(x * scale).reshape(-1, len(x)),
+        bounds=(low / scale, high / scale),
+        max_nfev=STAGE,
+        ftol=0.1 * SETTLED,
+        xtol=1e-8,
+        gtol=1e-12,
+    )
+    return {"values": solved.x * scale, "cost": np.array(solved.cost)}
+
+
+def held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
+    """The same with parameter ``k`` at a value, and the others from ``start`` (p,) on."""
+    others = [replace(each, start=float(at)) for each, at in zip(problem.parameters, start, strict=True)]
+    del others[k]
+
+    def model(values: np.ndarray) -> object:
+        return problem.model(np.insert(values, k, value))
+
+    return replace(problem, model=model, parameters=others)  # type: ignore[arg-type]

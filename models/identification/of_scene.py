@@ -1,0 +1,167 @@
+"""A scene, keys of it as parameters, and a measurement: a problem of identification of any system."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from models.core.errors import InputError
+from models.core.result import Result
+from models.core.scene_file import put
+from models.core.strict import LARGEST
+from models.core.systems import SYSTEMS, of_table
+from models.identification.problem import Clock, Curve, Measured, Parameter, Problem, measured_channel
+from models.measured.curve import curve
+from models.measured.formats import open_source
+
+OPTION = "--parameters"
+
+
+def parameter(scene: Any, text: str) -> Parameter:
+    """KEY or KEY=LOW:HIGH of a scene, which holds the start; where no range is named, what the scene's table allows.
+
+    Raises InputError for a key that is not there or holds no number, and for a range that does not hold the start.
+    """
+    key, equals, span = (part.strip() for part in text.partition("="))
+    start, low, high = held_by(scene, key)
+    if equals:
+        ends = span.split(":")
+        try:
+            low, high = (float(end) for end in ends)
+        except ValueError:
+            raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH, two numbers") from None
+    return Parameter(key, start, low, high)
+
+
+def held_by(scene: Any, key: str) -> tuple[float, float, float]:
+    """What a scene holds at a dotted key, and the least and the largest value that its table allows."""
+    owner: Any = scene
+    *tables, last = key.split(".")
+    for table in tables:
+        owner = _inside(owner, table, key)
+    value = _inside(owner, last, key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene", _names(owner))
+    field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
+    limits = field.metadata if field is not None else []
+    low = max((float(each) for limit in limits for each in _ends(limit, "gt", "ge")), default=-np.inf)
+    high = min((float(each) for limit in limits for each in _ends(limit, "lt", "le")), default=np.inf)
+    return float(value), low, high
+
+
+def _ends(limit: Any, *names: str) -> list[float]:
+    """Ends that a limit of a field names; what stands for "beyond all measure" is none."""
+    ends = (getattr(limit, name, None) for name in names)
+    return [end for end in ends if end is not None and abs(end) < LARGEST]
+
+
+def _inside(owner: Any, name: str, key: str) -> Any:
+    if isinstance(owner, list) and name.isdecimal() and int(name) < len(owner):
+        return owner[int(name)]
+    if isinstance(owner, Mapping) and name in owner:
+        return owner[name]
+    if isinstance(owner, BaseModel) and name in type(owner).model_fields:
+        return getattr(owner, name)
+    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", _names(owner))
+
+
+def _names(owner: Any) -> tuple[str, ...]:
+    if isinstance(owner, BaseModel):
+        return tuple(name for name, field in type(owner).model_fields.items() if not field.exclude)
+    return tuple(map(str, owner)) if isinstance(owner, Mapping) else ()
+
+
+class SceneModel:
+    """Channels over time of a scene with other values of its keys, by an engine.
+
+    table, file, folder : of the scene; ``channels_of`` gives name -> (unit, times, values) of a result.
+    """
+
+    def __init__(self, scene: Any, keys: Sequence[str], engine: str) -> None:
+        self.table, self.file, self.folder = scene.table(), scene.file, Path(scene.folder)
+        self.keys, self.engine = tuple(keys), engine
+        self.run_of = import_module(f"{SYSTEMS[scene.system].package}.run").run
+
+    def scene(self, values: np.ndarray) -> Any:
+        """The scene with these values."""
+        table = copy.deepcopy(self.table)
+        for key, value in zip(self.keys, values, strict=True):
+            put(table, key, float(value))
+        return of_table(table, self.file, self.folder)
+
+    def result(self, values: np.ndarray) -> Result:
+        """Its run."""
+        return self.run_of(self.scene(values), self.engine)
+
+    def __call__(self, values: np.ndarray) -> dict[str, Curve]:
+        """Channels over time by their names."""
+        return {name: (times, row) for name, (_, times, row) in over_time(self.result(values)).items()}
+
+
+def over_time(run: Result) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
+    """Unit, times and values of every channel over time, a row of an array by the names of its places."""
+    answer = dict[str, tuple[str, np.ndarray, np.ndarray]]()
+    for name, channel in run.data.data_vars.items():
+        if "time" not in channel.dims or channel.dtype.kind not in "fiu":
+            continue
+        others = [dim for dim in channel.dims if dim != "time"]
+        times, unit = run.times, str(channel.attrs.get("units", ""))
+        for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
+            at = dict(zip(others, place, strict=True))
+            labels = [str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}" for dim, i in at.items()]
+            answer[", ".join((str(name), *labels))] = unit, times, channel.isel(at).values.astype(float)
+    return answer
+
+
+def curves(path: str | Path, units: Mapping[str, str]) -> dict[str, Curve]:
+    """Channels of a measurement that have the name of one of ``units``, in that unit.
+
+    Raises InputError where there is none, for a unit that does not fit, and for times that go back.
+    """
+    source = open_source(path)
+    named = [channel.name for channel in source.channels if channel.name in units]
+    if not named:
+        theirs = [channel.name for channel in source.channels]
+        raise InputError(
+            path, "", theirs[0] if theirs else None, "no channel has the name of one of the run", tuple(units)
+        )
+    return {name: curve(source, name, units[name]) for name in named}
+
+
+def problem_of(
+    scene: Any, measurement: str | Path, parameters: Sequence[str], engine: str = "", low_pass: float = 0.0
+) -> Problem:
+    """The problem of a scene: ``parameters`` as KEY or KEY=LOW:HIGH, channels of the measurement by the run's names.
+
+    low_pass : Hz, of model and measurement alike, without phase; 0 for none. Times of both are the same clock.
+    """
+    asked = [parameter(scene, text) for text in parameters]
+    for i, each in enumerate(asked):
+        if each.name in [other.name for other in asked[:i]]:
+            raise InputError(OPTION, each.name, None, "is named twice")
+    model = SceneModel(scene, [each.name for each in asked], engine)
+    first = over_time(model.result(np.array([each.start for each in asked])))
+    read = curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
+    clock = _clock([first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement)
+    channels: list[Measured] = [
+        measured_channel(name, first[name][0], samples, clock, str(measurement)) for name, samples in read.items()
+    ]
+    return Problem(model, asked, channels, clock)
+
+
+def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path) -> Clock:
+    """Times that the run and every channel of the measurement share, as close as the closest of the measurement."""
+    begin = max(float(times[0]) for times in (*ours, *theirs))
+    end = min(float(times[-1]) for times in (*ours, *theirs))
+    period = min(float(np.median(np.diff(times))) for times in theirs)
+    if not end - begin >= 8.0 * period:
+        allowed = f"run and measurement share no time: the run goes from {ours[0][0]:g} to {ours[0][-1]:g} s"
+        raise InputError(measurement, "time", [float(theirs[0][0]), float(theirs[0][-1])], allowed)
+    if low_pass and not 0.0 < low_pass < 0.5 / period:
+        allowed = f"must be below {0.5 / period:g} Hz, half the sampling rate of the measurement, or 0 for none"
+        raise InputError("--low-pass", "", low_pass, allowed)
+    return Clock(begin + period * np.arange(int((end - begin) / period + 1e-6) + 1), low_pass)

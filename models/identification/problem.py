@@ -1,0 +1,197 @@
+"""A measurement beside a model with parameters: residuals on one clock, scaled, with spikes and gaps left out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from models.core.errors import InputError, RunFailed
+from models.core.smoothing import smoothed
+from models.measured.outliers import without_outliers
+
+FAILED = 1e3
+"""Residual of every sample where a model fails at trial values, so that a search turns back."""
+OVERSAMPLED = 4.0
+"""Samples that are kept for each period of the low-pass."""
+LEAST = 32
+"""Samples of a channel that a fit needs."""
+
+Curve = tuple[np.ndarray, np.ndarray]
+"""Times (n,) in s and values (n,)."""
+Model = Callable[[np.ndarray], Mapping[str, Curve]]
+"""Parameter values (p,) -> channels; raises RunFailed or InputError where it cannot be run with them."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """name; start, low, high : values; scale : a change that matters, by which steps and combinations are measured."""
+
+    name: str
+    start: float
+    low: float = -np.inf
+    high: float = np.inf
+    scale: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.low < self.start < self.high:
+            allowed = f"must start between its bounds, {self.low:g} and {self.high:g}"
+            raise InputError("--parameters", self.name, self.start, allowed)
+        if self.scale <= 0.0:
+            object.__setattr__(self, "scale", self._scale())
+
+    def _scale(self) -> float:
+        if self.start != 0.0:
+            return abs(self.start)
+        if np.isfinite(self.high - self.low):
+            return 0.25 * (self.high - self.low)
+        allowed = f"starts at 0 and so has no scale: name a range, {self.name}=LOW:HIGH"
+        raise InputError("--parameters", self.name, None, allowed)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """times (n,) : s, even; edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the samples
+    that residuals keep."""
+
+    times: np.ndarray
+    edge: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """s."""
+        return float(self.times[1] - self.times[0])
+
+    @property
+    def stride(self) -> int:
+        """Every how-many-th sample is kept: what a low-pass has left does not change in between."""
+        return max(1, int(1.0 / (OVERSAMPLED * self.edge * self.period) + 1e-9)) if self.edge > 0.0 else 1
+
+    def filtered(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) without what is faster than the low-pass."""
+        if self.edge <= 0.0:
+            return values
+        return smoothed(values[:, None], self.period, self.edge, "", "--low-pass")[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One channel on the clock: values (n,), low-passed; used (n,) : which of them count; left_out : samples of the
+    file that were spikes or not measured."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+    used: np.ndarray
+    left_out: int
+
+    @cached_property
+    def size(self) -> float:
+        """Root mean square of what counts: residuals are shares of it."""
+        return float(np.sqrt(np.mean(self.values[self.used] ** 2)))
+
+
+def measured_channel(name: str, unit: str, curve: Curve, clock: Clock, place: str = "") -> Measured:
+    """A channel of a file on the clock; InputError where next to nothing of it lies there, or it does not move."""
+    times, raw = curve
+    values = without_outliers(raw)
+    known = np.isfinite(values)
+    inside = known & (times >= clock.times[0]) & (times <= clock.times[-1])
+    if inside.sum() < LEAST:
+        allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {LEAST} are needed"
+        raise InputError(place, name, int(inside.sum()), allowed)
+    period = max(float(np.median(np.diff(times))), clock.period)
+    nearest = np.abs(times[known][_nearest(times[known], clock.times)] - clock.times)
+    used = nearest <= 1.5 * period
+    smooth = clock.filtered(np.interp(clock.times, times[known], values[known]))
+    if not np.any(smooth[used]):
+        raise InputError(place, name, 0.0, "does not move: nothing can be identified by it")
+    return Measured(name, unit, smooth, used, int(len(raw) - known.sum()))
+
+
+def _nearest(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+    return right - (wanted - times[right - 1] < times[right] - wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Model, parameters and channels. runs : of the model, counted in its only entry. taking_part (n,) : times that
+    residuals count, all of them where None."""
+
+    model: Model
+    parameters: Sequence[Parameter]
+    channels: Sequence[Measured]
+    clock: Clock
+    taking_part: np.ndarray | None = None
+    runs: list[int] = field(default_factory=lambda: [0])
+
+    @property
+    def start(self) -> np.ndarray:
+        """(p,)."""
+        return np.array([each.start for each in self.parameters])
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(p,)."""
+        return np.array([each.scale for each in self.parameters])
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest values (p,)."""
+        return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
+
+    def predicted(self, values: np.ndarray) -> np.ndarray:
+        """(channels, n): what the model says at all times of the clock, low-passed as the measurement is."""
+        self.runs[0] += 1
+        run = self.model(values)
+        rows = []
+        for channel in self.channels:
+            times, raw = run[channel.name]
+            rows.append(self.clock.filtered(np.interp(self.clock.times, times, raw)))
+        return np.array(rows)
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(channels, m): 0 where a sample does not count."""
+        every, part = slice(None, None, self.clock.stride), self.taking_part
+        rows = [channel.used & (True if part is None else part) for channel in self.channels]
+        return np.array([row[every] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
+
+    @cached_property
+    def target(self) -> np.ndarray:
+        """(channels, m): the measurement at the times that residuals have."""
+        return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
+
+    def residuals(self, values: np.ndarray) -> np.ndarray:
+        """(channels, m): prediction less measurement by the size of the channel; FAILED where the model fails."""
+        try:
+            predicted = self.predicted(values)[:, :: self.clock.stride]
+        except RunFailed:
+            return np.where(self.weights > 0.0, FAILED, 0.0)
+        return (predicted - self.target) * self.weights
+
+    def jacobian(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
+        """(channels, m, p): derivatives by parameters in their scales, forward, or backward where that fails."""
+        answer = self.residuals if of is None else of
+        base, columns = answer(values), []
+        for k, parameter in enumerate(self.parameters):
+            step = STEP * parameter.scale * (-1.0 if values[k] + STEP * parameter.scale > parameter.high else 1.0)
+            columns.append(self._column(answer, values, base, k, step))
+        return np.stack(columns, axis=-1)
+
+    def _column(
+        self, answer: Callable[[np.ndarray], np.ndarray], values: np.ndarray, base: np.ndarray, k: int, step: float
+    ) -> np.ndarray:
+        for signed in (step, -step):
+            moved = values.copy()
+            moved[k] += signed
+            if self.parameters[k].low <= moved[k] <= self.parameters[k].high:
+                there = answer(moved)
+                if np.abs(there).max() < FAILED:
+                    break
+        return (there - base) / (signed / self.parameters[k].scale)
+
+
+STEP = 1e-4
+"""Of differences, by the scale of a parameter."""

@@ -1,0 +1,193 @@
+"""How well a measurement determines parameters: covariance from the residuals themselves, combinations, profiles.
+
+Residuals of a model that was fitted are no white noise: they stay for as long as a corner lasts. The covariance of
+estimates is therefore the sandwich H^-1 S H^-1 with H = J^T J and S the long-run covariance of the scores J_t^T e_t,
+summed over lags up to several times as long as residuals stay alike, with falling weights; or that of stationary
+residuals as alike as they are, where it is larger: short records scatter. Source: Newey and West,
+Econometrica 55 (1987), 703-708; for the whole, Ljung, System Identification (1999), section 9.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.identification.fit import Fit, fit, held
+from models.identification.problem import Problem
+
+LAGS = 4.0
+"""Times that residuals stay alike, of the longest lag."""
+MOST_LAGS = 0.1
+"""Share of all samples that the longest lag may be."""
+LEVEL = 1.96
+"""Standard deviations of 95 %."""
+SINGULAR = 1e-12
+"""Of the largest eigenvalue of the information: what is lower tells nothing."""
+DETERMINED = 1.0
+"""Of its scale: the half-width of 95 % from which on a parameter counts as not determined."""
+CHI_SQUARE = 3.841
+"""95 % of one degree of freedom."""
+PROFILE = (-2.0, -1.0, 1.0, 2.0)
+"""Standard deviations at which a profile is computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What a fit says of its parameters, each in its scale: covariance (p, p), information H (p, p).
+
+    free (p,) : estimates that lie at no bound; the others have no covariance.
+    """
+
+    fit: Fit
+    covariance: np.ndarray
+    information: np.ndarray
+    free: np.ndarray
+    staying: float
+
+    @cached_property
+    def deviations(self) -> np.ndarray:
+        """Standard errors (p,) in the units of the parameters; infinite of what the data do not tell."""
+        spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
+        return np.where(self.free, spread, np.nan)
+
+    @cached_property
+    def determined(self) -> np.ndarray:
+        """(p,): whether the band of 95 % is narrower than the parameter's scale, and no bound cuts it off."""
+        with np.errstate(invalid="ignore"):
+            narrow = LEVEL * self.deviations < DETERMINED * self.fit.problem.scale
+        return self.free & narrow
+
+    @cached_property
+    def condition(self) -> float:
+        """Of the information: ratio of the largest to the least standard deviation of a combination, as it were."""
+        values = np.linalg.eigvalsh(self.information[np.ix_(self.free, self.free)])
+        return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR * values[-1] else np.inf
+
+    def combinations(self) -> list[tuple[float, np.ndarray]]:
+        """Standard error and direction (p,) of uncorrelated combinations of scaled parameters, the best known first."""
+        inner = np.ix_(self.free, self.free)
+        values, vectors = np.linalg.eigh(self.covariance[inner])
+        answer = []
+        for value, vector in zip(values, vectors.T, strict=True):
+            whole = np.zeros(len(self.free))
+            whole[self.free] = vector * np.sign(vector[np.argmax(np.abs(vector))])
+            answer.append((float(np.sqrt(max(value, 0.0))), whole))
+        return answer
+
+
+def uncertainty(solved: Fit) -> Uncertainty:
+    """Covariance of the estimates by the fit's own residuals."""
+    problem = solved.problem
+    jacobian = problem.jacobian(solved.values)
+    free = ~solved.at_bound
+    inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
+    scores = np.einsum("cmp,cm->mp", jacobian, solved.residuals)
+    lags, staying = _lags(solved.residuals)
+    covariance = np.zeros_like(inner)
+    part = np.ix_(free, free)
+    if free.any():
+        inverse = _inverse(inner[part])
+        both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], solved.residuals, lags)
+        covariance[part] = inverse @ _larger(*both) @ inverse
+        covariance[part] += _untold(inner[part])
+    return Uncertainty(solved, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(matrix)
+    known = values > SINGULAR * values[-1]
+    return (vectors[:, known] / values[known]) @ vectors[:, known].T
+
+
+def _untold(matrix: np.ndarray) -> np.ndarray:
+    """Variance (as good as infinite) of directions that the residuals do not depend on."""
+    values, vectors = np.linalg.eigh(matrix)
+    blind = vectors[:, values <= SINGULAR * values[-1]]
+    return 1e12 * blind @ blind.T
+
+
+def _lags(residuals: np.ndarray) -> tuple[int, float]:
+    """The longest lag, and for how many samples residuals stay alike (their integral scale), of the slowest channel."""
+    staying = 1.0
+    for row in residuals:
+        count, centred = len(row), row - row.mean()
+        spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
+        alike = np.fft.irfft(spectrum)[:count]
+        if alike[0] > 0.0:
+            alike /= alike[0]
+            negative = np.flatnonzero(alike <= 0.0)
+            staying = max(staying, float(1.0 + 2.0 * alike[1 : negative[0] if len(negative) else count].sum()))
+    most = max(1, int(MOST_LAGS * residuals.shape[1]))
+    return min(most, int(np.ceil(LAGS * staying))), staying
+
+
+def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
+    """Long-run covariance (p, p) of scores (m, p), summed: lags weigh linearly less (Bartlett)."""
+    total = scores.T @ scores
+    for lag in range(1, lags + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
+    count, p = scores.shape
+    return total * count / max(count - p, 1)
+
+
+def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
+    """The same (p, p) for residuals of channels that are stationary, each alike to itself over the lags as it is."""
+    total = np.zeros((jacobian.shape[2],) * 2)
+    for rows, error in zip(jacobian, residuals, strict=True):
+        for lag in range(lags + 1):
+            alike = float(error[lag:] @ error[: len(error) - lag]) / len(error)
+            product = rows[lag:].T @ rows[: len(rows) - lag]
+            total += (1.0 - lag / (lags + 1.0)) * alike * (product if lag == 0 else product + product.T)
+    return total
+
+
+def _larger(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
+    values, vectors = np.linalg.eigh(two)
+    values = np.maximum(values, SINGULAR * values[-1])
+    root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
+    ratios, turned = np.linalg.eigh(back @ one @ back)
+    return root @ (turned * np.maximum(ratios, 1.0)) @ turned.T @ root
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """values (k,) of one parameter, and by how much the misfit rises there, the others fitted anew: (k,) in units of
+    which 3.84 is the limit of 95 %; ``parabola`` (k,) : what the standard error says."""
+
+    name: str
+    values: np.ndarray
+    rise: np.ndarray
+    parabola: np.ndarray
+
+    @property
+    def quadratic(self) -> bool:
+        """Whether both agree within a half: then the standard error tells all."""
+        return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
+
+
+def profile(known: Uncertainty, k: int, tell: Callable[[str, float], None] = lambda text, share: None) -> Profile:
+    """Profile likelihood of parameter ``k``; the misfit is weighted as its covariance is, so that residuals that stay
+    alike do not count as many."""
+    solved, problem = known.fit, known.fit.problem
+    scale, parameter = problem.scale[k], problem.parameters[k]
+    spread = known.deviations[k] if np.isfinite(known.deviations[k]) else scale
+    spread = min(spread, 0.5 * scale)
+    naive = _inverse(known.information)[k, k] * scale**2
+    weight = naive / known.deviations[k] ** 2 if np.isfinite(known.deviations[k]) and naive > 0.0 else 1.0
+    values = [v for v in solved.values[k] + spread * np.array(PROFILE) if parameter.low < v < parameter.high]
+    rises = []
+    for i, value in enumerate(values):
+        there = fit(_held_inside(problem, k, value, solved.values))
+        rises.append(2.0 * (there.cost - solved.cost) * weight)
+        tell(f"profile of {parameter.name}", (i + 1) / len(values))
+    parabola = ((np.array(values) - solved.values[k]) / known.deviations[k]) ** 2
+    return Profile(parameter.name, np.array(values), np.array(rises), parabola)
+
+
+def _held_inside(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
+    low, high = problem.bounds
+    inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
+    return held(problem, k, value, inside)

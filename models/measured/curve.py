@@ -1,0 +1,27 @@
+"""One channel of a measurement as a curve: times and values, in the unit that is wanted."""
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.measured.channel import Source
+from models.measured.timing import timing
+from models.measured.units import factor_between
+
+
+def curve(source: Source, name: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) in s, strictly rising, and values (n,) of a channel in ``unit``, NaN where nothing was measured.
+
+    Raises InputError where the file has no such channel, for a unit that is missing or does not fit, and for times
+    that go back.
+    """
+    names = tuple(channel.name for channel in source.channels)
+    if name not in names:
+        raise InputError(source.path, name, None, "no such channel in the file", names)
+    channel = source.channels[names.index(name)]
+    if not channel.unit and unit not in ("", "-"):
+        raise InputError(source.path, name, None, f"has no unit: write {name} [{unit}] in the header, or its unit")
+    factor = factor_between(channel.unit, unit, source.path, name)
+    blocks = list(source.blocks([name]))
+    times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
+    clock = timing(times, str(source.path), (name,))
+    return clock.times, factor * (values if clock.order is None else values[clock.order])

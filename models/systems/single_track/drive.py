@@ -1,0 +1,67 @@
+"""A measured drive: steer angle and speed on an even clock, without spikes, low-passed without phase."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.measured.curve import curve
+from models.measured.formats import open_source
+from models.measured.outliers import without_outliers
+
+CHANNELS = {"steer": "rad", "speed": "m/s"}
+LEAST_SPEED = 2.0
+"""m/s: slip angles are ratios to the speed."""
+LEAST = 16
+"""Samples of a drive: a filter without phase needs some."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : samples of each channel that were spikes or
+    not measured, and are bridged by a straight line."""
+
+    times: np.ndarray
+    steer: np.ndarray
+    speed: np.ndarray
+    left_out: dict[str, int]
+
+
+def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> Measured:
+    """The drive of a file, or of a stretch (s, s) of its time; InputError for what is no drive."""
+    return _read(path, stretch, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> Measured:
+    source = open_source(path)
+    read = {name: curve(source, name, unit) for name, unit in CHANNELS.items()}
+    first = max(times[0] for times, _ in read.values())
+    last = min(times[-1] for times, _ in read.values())
+    begin, end = stretch or (first, last)
+    period = float(np.median(np.diff(read["steer"][0])))
+    if not (first - period <= begin < end <= last + period):
+        allowed = f"must rise and lie within the file's time, from {first:g} to {last:g} s"
+        raise InputError(path, "drive.stretch", [begin, end], allowed)
+    grid = begin + period * np.arange(int((min(end, last) - begin) / period + 1e-6) + 1)
+    if len(grid) < LEAST:
+        raise InputError(path, "rows", len(grid), f"a drive needs at least {LEAST} samples")
+    values, left_out = dict[str, np.ndarray](), dict[str, int]()
+    for name, (times, raw) in read.items():
+        values[name], left_out[name] = bridged(times, raw, grid, f"{path}, {name}")
+    slow = int(values["speed"].argmin())
+    if values["speed"][slow] < LEAST_SPEED:
+        allowed = f"at {grid[slow]:g} s: a drive needs at least {LEAST_SPEED:g} m/s, forward, throughout"
+        raise InputError(path, "speed", float(values["speed"][slow]), allowed)
+    return Measured(grid, values["steer"], values["speed"], left_out)
+
+
+def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
+    """Values (n,) on an even grid, straight across spikes and gaps, and how many samples were left out for that."""
+    kept = without_outliers(values)
+    known = np.isfinite(kept)
+    if known.sum() < LEAST:
+        raise InputError(place, "", int(known.sum()), f"at least {LEAST} samples must be measured")
+    return np.interp(grid, times[known], kept[known]), int(len(kept) - known.sum())

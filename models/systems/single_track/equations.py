@@ -1,0 +1,118 @@
+"""The single-track vehicle with saturating tyres, in the plane, at a prescribed speed.
+
+Each axle has a load N = its static share + transfer by the forward acceleration - lift v^2, a largest side force
+D = mu N sqrt(1 - (X / (mu N))^2) beside its forward force X, and the side force
+
+    Y = -D x / (1 + |x|^n)^(1/n),    x = c N alpha / D,
+
+of its slip angle alpha: c N alpha at small slip, D at large slip, with a bend as sharp as n. The forward force of
+all tyres is what the measured speed asks for, m a_x + drag v^2, shared by the axles as the scene says. With v the
+speed, w the lateral velocity and r the yaw rate at the centre of mass, alpha = (w + a r) / v - delta in front and
+(w - b r) / v behind, m (w' + v r) = Y_f + X_f delta + Y_r, J r' = a (Y_f + X_f delta) - b Y_r.
+Source: ISO 8855 for axes; Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge, for the model.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+GRAVITY = 9.81
+LEAST_LOAD, LEAST_SHARE = 0.05, 0.1
+"""Shares: of its static load that an axle keeps, and of its squared friction that is left to the side."""
+TURNED = 0.02
+"""rad of slip angle over which friction goes from that of right turns to that of left ones."""
+
+
+class Axle(NamedTuple):
+    """stiffness : cornering stiffness by load (1/rad); friction; sharpness : n; side : friction in left turns is
+    larger by this share, in right turns smaller; lift : N s^2/m^2."""
+
+    stiffness: float
+    friction: float
+    sharpness: float
+    side: float
+    lift: float
+
+
+class Car(NamedTuple):
+    """SI. mass; front, rear : from the centre of mass to the axles; inertia : about the upright; height : of the centre
+    of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces below and above 0."""
+
+    mass: float
+    front: float
+    rear: float
+    inertia: float
+    height: float
+    drag: float
+    brake: float
+    drive: float
+
+
+@njit(cache=True)
+def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
+    """Side force (N, left positive) of an axle at a load and a forward force (N) and a slip angle (rad)."""
+    grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
+    across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
+    x = axle.stiffness * load * slip_angle / across
+    return -across * x / (1.0 + abs(x) ** axle.sharpness) ** (1.0 / axle.sharpness)
+
+
+@njit(cache=True)
+def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
+    """Side force of all tyres (N), yaw moment (N m), and load, side force and slip angle of the front and rear axle.
+
+    motion : lateral velocity (m/s) and yaw rate (rad/s); drive : steer angle (rad), speed (m/s), its rate (m/s^2).
+    """
+    steer, speed, rate = drive
+    base = car.front + car.rear
+    weight, moved, pressure = car.mass * GRAVITY, car.mass * rate * car.height / base, speed * speed
+    load_f, load_r = weight * car.rear / base, weight * car.front / base
+    load_f = max(load_f - moved - front.lift * pressure, LEAST_LOAD * load_f)
+    load_r = max(load_r + moved - rear.lift * pressure, LEAST_LOAD * load_r)
+    forward = car.mass * rate + car.drag * pressure
+    ahead = (car.drive if forward > 0.0 else car.brake) * forward
+    angle_f = (motion[0] + car.front * motion[1]) / speed - steer
+    angle_r = (motion[0] - car.rear * motion[1]) / speed
+    side_f = axle_force(front, load_f, ahead, angle_f)
+    side_r = axle_force(rear, load_r, forward - ahead, angle_r)
+    turned = side_f + ahead * steer
+    return turned + side_r, car.front * turned - car.rear * side_r, load_f, load_r, side_f, side_r, angle_f, angle_r
+
+
+@njit(cache=True)
+def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
+    """Rates of lateral velocity (m/s^2) and of yaw rate (rad/s^2)."""
+    answer = forces(car, front, rear, motion, drive)
+    return answer[0] / car.mass - drive[1] * motion[1], answer[1] / car.inertia
+
+
+@njit(cache=True)
+def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
+    """(n, 2): lateral velocity (m/s) and yaw rate (rad/s) at every sample, by Heun's method from sample to sample.
+
+    given (n, 3) : steer angle, speed, its rate at samples ``step`` (s) apart; first : motion at the first of them.
+    """
+    motion = np.empty((len(given), 2))
+    w, r = first
+    motion[0] = w, r
+    for i in range(len(given) - 1):
+        here = given[i, 0], given[i, 1], given[i, 2]
+        there = given[i + 1, 0], given[i + 1, 1], given[i + 1, 2]
+        w1, r1 = rates(car, front, rear, (w, r), here)
+        w2, r2 = rates(car, front, rear, (w + step * w1, r + step * r1), there)
+        w += 0.5 * step * (w1 + w2)
+        r += 0.5 * step * (r1 + r2)
+        motion[i + 1] = w, r
+    return motion
+
+
+@njit(cache=True)
+def reports(car: Car, front: Axle, rear: Axle, given: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """(n, 7): lateral acceleration (m/s^2), then load, side force (N) and slip angle (rad) in front, and behind."""
+    table = np.empty((len(given), 7))
+    for i in range(len(given)):
+        answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (given[i, 0], given[i, 1], given[i, 2]))
+        table[i, 0] = answer[0] / car.mass
+        table[i, 1:] = answer[2:]
+    return table

@@ -1,0 +1,92 @@
+"""A measured drive of a car of two axles: its yaw rate, lateral acceleration and side slip."""
+
+import time
+
+import numpy as np
+
+from models.core.assumptions import judged
+from models.core.discretisation import not_estimated
+from models.core.errors import RunFailed
+from models.core.result import Channel, Result, result
+from models.core.smoothing import smoothed
+from models.systems.single_track.assumptions import assumptions
+from models.systems.single_track.drive import Measured, read_drive
+from models.systems.single_track.equations import march, reports
+from models.systems.single_track.scene import SensorTable, SingleTrackScene
+
+SETTLING = 1.0
+"""s of the first input, held, before the drive begins: the car begins in the steady turn of its first sample."""
+LARGEST = 20.0
+"""rad/s: a car that yaws faster has no tyres of this kind."""
+REPORTS = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
+REPORT_COLUMNS = (1, 3, 5, 2, 4, 6)
+UNITS = ("N", "N", "rad") * 2
+
+
+def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Result:
+    """The whole drive; channels over time are what sensors would show, and loads, side forces and slip angles.
+
+    Raises InputError for a file that is no drive, RunFailed where the motion is not finite.
+    """
+    drive = read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
+    begun = time.process_time()
+    given = inputs(drive, scene)
+    motion, table = motion_of(scene, given, float(drive.times[1] - drive.times[0]))
+    channels = shown(scene.sensors, given, motion, table[:, 0])
+    channels |= {
+        name: Channel("time", table[:, column], unit)
+        for name, column, unit in zip(REPORTS, REPORT_COLUMNS, UNITS, strict=True)
+    }
+    counts = {"steps": len(given) - 1} | {f"samples of {name} left out": n for name, n in drive.left_out.items()}
+    run = result(
+        scene,
+        channels,
+        {"time": Channel("time", drive.times, "s")},
+        engine="plain equations",
+        counts=counts,
+        seconds=time.process_time() - begun,
+        detail=drive,
+    )
+    run = judged(run, assumptions(scene))
+    return not_estimated(run, "steps are the samples of the measurement, whose own error is larger") if error else run
+
+
+def inputs(drive: Measured, scene: SingleTrackScene) -> np.ndarray:
+    """(n, 3): steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and put right."""
+    period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
+    steer, speed = drive.steer, drive.speed
+    if scene.drive.low_pass:
+        both = smoothed(np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass")
+        steer, speed = both.T
+    if sensors.steer_delay:
+        steer = np.interp(drive.times - sensors.steer_delay, drive.times, steer)
+    steer = sensors.steer_ratio * steer + sensors.steer_offset
+    return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
+
+
+def motion_of(scene: SingleTrackScene, given: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral velocity and yaw rate (n, 2), and reports (n, 7), from the steady turn of the first sample on."""
+    parts = scene.car(), scene.front.axle(), scene.rear.axle()
+    settling = np.repeat(given[:1], max(2, round(SETTLING / period)), axis=0)
+    first = march(*parts, settling, period, (0.0, 0.0))[-1]
+    motion = march(*parts, given, period, (float(first[0]), float(first[1])))
+    bad = ~(np.abs(motion[:, 1]) < LARGEST)
+    if bad.any():
+        row = int(bad.argmax())
+        why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
+        raise RunFailed("plain equations", why, period * row, motion[max(row - 1, 0)])
+    return motion, reports(*parts, given, motion)
+
+
+def shown(sensors: SensorTable, given: np.ndarray, motion: np.ndarray, lateral: np.ndarray) -> dict[str, Channel]:
+    """What sensors show of the motion, by the names of channels that a measurement has."""
+    slip = np.arctan2(motion[:, 0], given[:, 1]) + sensors.side_slip_offset
+    acceleration = sensors.acceleration_ratio * lateral + sensors.acceleration_offset
+    return {
+        "yaw rate": Channel("time", motion[:, 1] + sensors.yaw_rate_offset, "rad/s", "left positive"),
+        "lateral acceleration": Channel("time", acceleration, "m/s^2", "of the centre of mass, left positive"),
+        "side slip": Channel("time", slip, "rad", "of the centre of mass, left positive"),
+        "lateral velocity": Channel("time", motion[:, 0], "m/s", "of the centre of mass, left positive"),
+        "wheels steer": Channel("time", given[:, 0], "rad", "angle of the front wheels"),
+        "forward acceleration": Channel("time", given[:, 2], "m/s^2", "rate of the measured speed"),
+    }

@@ -1,0 +1,85 @@
+"""Scenes of a car of two axles that is driven by a measured steer angle and a measured speed."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Strict, quantity
+from models.systems.single_track.equations import Axle, Car
+
+SHARPEST = 20.0
+
+
+class CarTable(Strict):
+    """[vehicle]: a rigid car in the plane."""
+
+    mass: float = quantity("kg", "of the whole car")
+    front: float = quantity("m", "from the centre of mass to the front axle")
+    rear: float = quantity("m", "from the centre of mass to the rear axle")
+    yaw_inertia: float = quantity("kg m^2", "about the upright through the centre of mass")
+    centre_height: float = quantity(
+        "m", "of the centre of mass, by which loads move ahead and back", default=0.0, zero=True
+    )
+    drag: float = quantity("N s^2/m^2", "of the air, by the square of the speed", default=0.0, zero=True)
+    front_brake: float = Field(default=0.6, ge=0, le=1, description="share of the front axle in braking")
+    front_drive: float = Field(default=0.0, ge=0, le=1, description="share of the front axle in driving")
+
+
+class AxleTable(Strict):
+    """[front] and [rear]: the tyres of one axle."""
+
+    stiffness: float = quantity("1/rad", "cornering stiffness by load")
+    friction: float = quantity("", "largest side force by load")
+    sharpness: float = Field(default=2.0, ge=1.0, le=SHARPEST, description="of the bend from stiffness to friction")
+    side: float = Field(default=0.0, ge=-0.5, le=0.5, description="share of friction more in left turns, less in right")
+    lift: float = quantity("N s^2/m^2", "by which the air lifts the axle, or presses it", default=0.0, signed=True)
+
+    def axle(self) -> Axle:
+        """As the equations take it."""
+        return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift)
+
+
+class DriveTable(Strict):
+    """[drive]: what was measured of the driver."""
+
+    file: str = Field(description="CSV with time, steer (of the front wheels, left positive) and speed, with units")
+    low_pass: float = quantity("Hz", "of steer and speed, without phase; 0 for none", default=0.0, zero=True)
+    stretch: list[float] = Field(
+        default=[], max_length=2, description="[s, s] of the file's time that are driven; all of it where empty"
+    )
+
+
+class SensorTable(Strict):
+    """[sensors]: how what was measured differs from what the car does."""
+
+    steer_ratio: float = quantity("", "steer angle of the wheels by the measured one", default=1.0)
+    steer_offset: float = quantity("rad", "added to the measured steer angle", default=0.0, signed=True)
+    steer_delay: float = quantity("s", "by which the wheels follow the measured angle", default=0.0, signed=True)
+    side_slip_offset: float = quantity("rad", "that the sensor adds", default=0.0, signed=True)
+    yaw_rate_offset: float = quantity("rad/s", "that the sensor adds", default=0.0, signed=True)
+    acceleration_offset: float = quantity("m/s^2", "that the sensor adds", default=0.0, signed=True)
+    acceleration_ratio: float = quantity("", "measured by true lateral acceleration", default=1.0)
+
+
+class SingleTrackScene(SceneFile):
+    """One scene of a car of two axles."""
+
+    system: Literal["single-track"] = "single-track"
+    study: str = Field(default="single_track", description="the study that runs the scene")
+    vehicle: CarTable
+    front: AxleTable
+    rear: AxleTable
+    drive: DriveTable
+    sensors: SensorTable = SensorTable()
+
+    def car(self) -> Car:
+        """As the equations take it."""
+        return Car(*self.vehicle.model_dump().values())
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> SingleTrackScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    return checked(SingleTrackScene, table, file, folder)

@@ -1,0 +1,75 @@
+"""A measurement that is made: the car on four rolling tyres, driven through turns of both sides, with sensors' noise.
+
+``python -m studies.four_wheel_drive FILE.csv`` writes it. It is what the studies of the car of two axles run on where
+no measured drive is at hand; nothing in it comes from a measurement.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from models.core.whole_files import write_whole
+from models.systems.handling.run import Drive
+from models.systems.handling.run import run as run_handling
+from models.systems.handling.scene import build
+
+DURATION, RATE, SPEED = 30.0, 50, 20.0
+"""s, samples a second, m/s at the start."""
+NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.3, "side slip": 0.0008}
+"""Standard deviations (rad/s, m/s^2, rad) of white noise, sample by sample."""
+SEED = 20
+Knots = list[list[float]]
+
+
+def controls() -> dict[str, Knots]:
+    """Steer, brake and drive from knot to knot, drawn once."""
+    random = np.random.default_rng(SEED)
+    steer, drive, brake, at, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
+    while at < DURATION - 4.0:
+        angle = side * random.uniform(0.015, 0.055)
+        rise, hold = random.uniform(0.4, 1.0), random.uniform(0.6, 2.0)
+        steer += [[at + rise, angle], [at + rise + hold, angle], [at + 2.0 * rise + hold, 0.0]]
+        pull, stop = random.uniform(150.0, 700.0), random.choice([0.0, 0.0, 400.0, 700.0])
+        drive += [[at + rise, 250.0], [at + rise + hold, 250.0 if stop == 0.0 else 0.0], [at + 2.0 * rise + hold, pull]]
+        brake += [[at + rise, 0.0], [at + rise + 0.5 * hold, stop], [at + rise + hold, 0.0]]
+        at, side = at + 2.0 * rise + hold + random.uniform(0.2, 0.8), side * random.choice([-1.0, -1.0, 1.0])
+    return {"steer": steer, "drive": drive, "brake": brake}
+
+
+def driven() -> Drive:
+    """The drive in MuJoCo."""
+    manoeuvre = {"speed": SPEED, "duration": DURATION, "front_brake": 0.6, **controls()}
+    table = {"title": "a drive that is made", "system": "handling", "manoeuvres": {"drive": manoeuvre}}
+    return run_handling(build(table), "mujoco").detail
+
+
+def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
+    """Columns (unit, values) as a logger on the car would write them."""
+    every = round(1.0 / (RATE * float(drive.run.times[1] - drive.run.times[0])))
+    ahead, aside, yaw = drive.velocity().T
+    random = np.random.default_rng(SEED + 1)
+    front = drive["steer"][:, 0]
+    channels = {
+        "yaw rate": ("rad/s", yaw),
+        "lateral acceleration": ("m/s^2", drive.lateral_acceleration()),
+        "side slip": ("rad", np.arctan2(aside, ahead)),
+    }
+    noisy = {
+        name: (unit, values[::every] + NOISE[name] * random.standard_normal(len(values[::every])))
+        for name, (unit, values) in channels.items()
+    }
+    plain = {"time": ("s", drive.run.times), "steer": ("rad", front), "speed": ("m/s", ahead)}
+    return {name: (unit, values[::every]) for name, (unit, values) in plain.items()} | noisy
+
+
+def save(path: Path) -> None:
+    """Write the measurement with six digits."""
+    columns = measured(driven())
+    head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
+    rows = zip(*(values.tolist() for _, values in columns.values()), strict=True)
+    write_whole(path, "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in rows), ""]))
+
+
+if __name__ == "__main__":
+    save(Path(sys.argv[1]))

@@ -1,0 +1,341 @@
+"""A measured race car: tyres identified on one stretch, the motion of another stretch predicted with bands of 95 %.
+
+Input of the prediction is measured steer angle and speed alone. The file of the drive is that of the scene, or, where
+``options.measurement`` names one, columns as in the race's file: t, delta, vx, beta_true, yawRate, ayCG in SI units.
+Without either the study runs on a drive that was made by the car on four wheels, and says so.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.strict import Strict, read
+from models.core.tables import write_table
+from models.identification.bands import Bands, ErrorModel, bands, error_model
+from models.identification.fit import Fit, fit
+from models.identification.of_scene import problem_of
+from models.identification.problem import Problem
+from models.identification.uncertainty import Uncertainty, uncertainty
+from models.systems.single_track.scene import SingleTrackScene, build
+from studies.command.identify import as_dict, lines
+
+SYSTEM = "single-track"
+Progress = Callable[[str, float], None]
+COLUMNS = {
+    "time": ("t", "s"),
+    "steer": ("delta", "rad"),
+    "speed": ("vx", "m/s"),
+    "yaw rate": ("yawRate", "rad/s"),
+    "lateral acceleration": ("ayCG", "m/s^2"),
+    "side slip": ("beta_true", "rad"),
+}
+"""Name here -> column and unit of the race's file."""
+EVERY = 2
+"""Samples of the race's file of which one is kept, after a low-pass at a quarter of its rate."""
+AIMS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
+"""Rms error by the rms of the measurement that is asked for."""
+GUESSED = {"drag": 0.4, "front_brake": 0.65}
+"""Of the race car: a drag area of 0.65 m^2, and a share of the brakes. Both act through the friction ellipse alone."""
+RACE_CAR = {
+    "vehicle": {"mass": 982.0, "front": 1.33, "rear": 1.07, "yaw_inertia": 1250.0, "centre_height": 0.05, **GUESSED},
+    "front": {"stiffness": 15.0, "friction": 1.3},
+    "rear": {"stiffness": 19.0, "friction": 1.3, "sharpness": 3.0},
+}
+"""Published: mass and lengths. The rest is where the search begins."""
+
+
+class Options(Strict):
+    """[options] of this study."""
+
+    measurement: str = Field("", description="file of the race in TWINRIG_DATA, or a path; empty for the scene's drive")
+    prediction: str = Field("", description="another such file that is predicted; empty: the last part of the first")
+    share: float = Field(
+        0.65, gt=0.1, lt=0.95, description="of the measurement that is identified on, without prediction"
+    )
+    low_pass: float = Field(5.0, gt=0, le=50, description="Hz, of run and measurement alike, without phase")
+    blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
+    parameters: list[str] = Field(
+        [
+            "vehicle.yaw_inertia=300:3000",
+            "vehicle.centre_height=0:0.6",
+            "front.stiffness=5:50",
+            "front.friction=0.5:3",
+            "front.sharpness=1:12",
+            "front.side=-0.3:0.3",
+            "rear.stiffness=5:50",
+            "rear.friction=0.5:3",
+            "rear.sharpness=1:12",
+            "rear.side=-0.3:0.3",
+            "sensors.steer_offset=-0.02:0.02",
+            "sensors.side_slip_offset=-0.02:0.02",
+            "sensors.acceleration_offset=-1:1",
+        ],
+        min_length=1,
+        description="keys that are identified, each KEY or KEY=LOW:HIGH",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What one vehicle gives: the fit, errors that it makes on parts that it was not fitted on, the prediction."""
+
+    known: Uncertainty
+    errors: list[ErrorModel]
+    crossed: np.ndarray
+    bands: Bands
+
+
+SIMPLER = {
+    "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
+    "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
+}
+"""Vehicles with fewer numbers: what they hold, and words of the parameters that stay."""
+
+
+def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
+    """Refuse options that cannot be."""
+    options = read(Options, scene.options, scene.file, "options")
+    for name in ("measurement", "prediction"):
+        if getattr(options, name):
+            _found(scene, getattr(options, name), f"options.{name}")
+    if options.prediction and not options.measurement:
+        raise InputError(scene.file, "options.prediction", options.prediction, "needs options.measurement beside it")
+
+
+def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Identify, predict, compare with simpler vehicles: saves race_car.png and the drives."""
+    from studies.race_car_figure import draw
+
+    options = read(Options, scene.options, scene.file, "options")
+    first, second = stretches(scene, options, folder)
+    chosen = identified(first, second, options, options.parameters, progress)
+    others = {name: simpler(first, second, options, name, progress) for name in SIMPLER}
+    draw(chosen, others, scene.title, folder / "race_car.png")
+    answer = figures(chosen)
+    answer["identified"] = as_dict(chosen.known)
+    answer["simpler vehicles"] = {
+        name: dict(zip(AIMS, each.bands.relative(), strict=True)) for name, each in others.items()
+    }
+    answer["residuals"] = where_wrong(chosen)
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": answer,
+        "results": {},
+        "table": [*lines(chosen.known), *_told(chosen, others), *_wrong(answer["residuals"])],
+    }
+
+
+def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[SingleTrackScene, SingleTrackScene]:
+    """Scenes of the stretch that is identified on and of the one that is predicted; their drives lie in ``folder``."""
+    if not options.measurement:
+        whole, path = scene, scene.path(scene.drive.file, "drive.file")
+    else:
+        path = _plain(_found(scene, options.measurement, "options.measurement"), folder / "measured.csv")
+        whole = _on(scene, path, RACE_CAR)
+    if options.prediction:
+        other = _plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
+        return whole, _on(scene, other, RACE_CAR)
+    from models.systems.single_track.drive import read_drive
+
+    times = read_drive(path).times
+    middle = float(times[round(options.share * len(times))])
+    ends = [float(times[0]), middle], [middle, float(times[-1])]
+    return tuple(_stretched(whole, end) for end in ends)  # type: ignore[return-value]
+
+
+def _found(scene: SingleTrackScene, name: str, place: str) -> Path:
+    """A file in TWINRIG_DATA, or as a scene names files."""
+    data = os.environ.get("TWINRIG_DATA", "")
+    return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
+
+
+def _plain(source: Path, target: Path) -> Path:
+    """The race's file as a table that scenes take: one of EVERY samples, nothing of what those cannot show."""
+    raw = _raw(source)
+    period = float(np.median(np.diff(raw["t"])))
+    columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
+    from models.core.smoothing import smoothed
+    from models.measured.outliers import without_outliers
+
+    for name, (column, unit) in list(COLUMNS.items())[1:]:
+        kept = without_outliers(raw[column])
+        known = np.isfinite(kept)
+        whole = np.interp(raw["t"], raw["t"][known], kept[known])
+        columns[name] = (unit, smoothed(whole[:, None], period, 0.25 / period, str(source), column)[::EVERY, 0])
+    write_table(target, columns)
+    return target
+
+
+def _raw(source: Path) -> dict[str, np.ndarray]:
+    """Columns of the race's file, packed or not; InputError where one is missing, or times do not rise."""
+    import csv
+    import gzip
+
+    with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
+        head, *rows = list(csv.reader(file))
+    for column, _ in COLUMNS.values():
+        if column not in head:
+            raise InputError(source, column, None, "no such column in the race's file", tuple(head))
+    try:
+        table = np.array(rows, float)
+    except ValueError as error:
+        raise InputError(source, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
+    raw = {column: table[:, head.index(column)] for column, _ in COLUMNS.values()}
+    falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
+    if len(falls):
+        raise InputError(
+            source, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
+        )
+    return raw
+
+
+def _on(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
+    """The scene with the race car and a drive."""
+    table = {"title": scene.title, "system": SYSTEM, **car, "drive": {"file": path.name, "low_pass": 10.0}}
+    return build(table, scene.file, path.parent)
+
+
+def _stretched(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
+    return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": ends}), "options": {}})
+
+
+def identified(
+    first: SingleTrackScene, second: SingleTrackScene, options: Options, parameters: Sequence[str], progress: Progress
+) -> Identified:
+    """Fit on the first stretch, errors on parts left out of it, prediction of the second with bands."""
+    problem = _problem(first, parameters, options)
+    solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
+    known = uncertainty(solved)
+    crossed = cross_validated(solved, options.blocks, progress)
+    predicted = problem.predicted(solved.values)
+    errors = [
+        error_model(row[channel.used], model[channel.used])
+        for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
+    ]
+    progress("the prediction", 0.9)
+    return Identified(known, errors, crossed, bands(_problem(second, parameters, options), known, errors))
+
+
+def _problem(scene: SingleTrackScene, parameters: Sequence[str], options: Options) -> Problem:
+    whole = problem_of(scene, scene.path(scene.drive.file), parameters, low_pass=options.low_pass)
+    channels = {channel.name: channel for channel in whole.channels}
+    missing = next((name for name in AIMS if name not in channels), None)
+    if missing:
+        raise InputError(scene.drive.file, missing, None, "the study compares this channel: it must be in the file")
+    return replace(whole, channels=[channels[name] for name in AIMS])
+
+
+def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
+    """(channels, n): prediction less measurement of each part of the stretch, by the fit on all others."""
+    problem, times = solved.problem, solved.problem.clock.times
+    target = np.array([channel.values for channel in problem.channels])
+    answer = np.empty_like(target)
+    part = np.minimum((count * np.arange(len(times))) // len(times), count - 1)
+    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside(solved), strict=True)]
+    for k in range(count):
+        progress(f"part {k + 1} of {count}, predicted from the others", 0.4 + 0.5 * k / count)
+        others = Problem(problem.model, starts, problem.channels, problem.clock, part != k)
+        there = fit(others)
+        answer[:, part == k] = (problem.predicted(there.values) - target)[:, part == k]
+    return answer
+
+
+def _inside(solved: Fit) -> np.ndarray:
+    low, high = solved.problem.bounds
+    margin = 1e-3 * solved.problem.scale
+    return np.clip(solved.values, low + margin, high - margin)
+
+
+def simpler(
+    first: SingleTrackScene, second: SingleTrackScene, options: Options, name: str, progress: Progress
+) -> Identified:
+    """The same with a vehicle of fewer numbers."""
+    holds, kept = SIMPLER[name]
+    parameters = [text for text in options.parameters if any(word in text for word in kept)]
+    scenes = [_with(scene, holds) for scene in (first, second)]
+    few = options.model_copy(update={"blocks": 2})
+    return identified(*scenes, few, parameters, lambda text, share: progress(f"{name}: {text}", 0.95))
+
+
+def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
+    from models.core.scene_file import put
+
+    table = scene.table()
+    for axle in ("front", "rear"):
+        put(table, f"{axle}.sharpness", 2.0)
+    for key, value in holds.items():
+        put(table, key, value)
+    return build(table, scene.file, Path(scene.folder))
+
+
+def figures(chosen: Identified) -> dict[str, Any]:
+    """Per channel: rms error by the rms, share of what was measured inside the bands, their half-width by the error."""
+    sizes = np.array([channel.size for channel in chosen.known.fit.problem.channels])
+    crossed = np.sqrt(np.mean(chosen.crossed**2, axis=1)) / sizes
+    inside, width, relative = chosen.bands.inside(), chosen.bands.width(), chosen.bands.relative()
+    return {
+        name: {
+            "error": float(relative[k]),
+            "inside": float(inside[k]),
+            "half-width by error": float(width[k]),
+            "error between parts": float(crossed[k]),
+        }
+        for k, name in enumerate(AIMS)
+    }
+
+
+def _told(chosen: Identified, others: dict[str, Identified]) -> list[str]:
+    table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
+    for name, each in figures(chosen).items():
+        table.append(
+            f"  {name:<26}{each['error']:>9.1%}{AIMS[name]:>8.0%}{each['inside']:>13.1%}"
+            f"{each['half-width by error']:>12.2f}{each['error between parts']:>9.1%}"
+        )
+    for name, each in others.items():
+        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMS, each.bands.relative(), strict=True))
+        table.append(f"  {name}: {errors}")
+    return table
+
+
+def where_wrong(chosen: Identified) -> dict[str, dict[str, float]]:
+    """Per channel: correlation of the residual's magnitude, and of itself, with what the car does."""
+    problem = chosen.known.fit.problem
+    model = problem.model.result(chosen.known.fit.values)  # type: ignore[attr-defined]
+    clock = problem.clock.times
+    lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
+    speed = np.interp(clock, model.times, model.detail.speed)
+    causes = {
+        "magnitude with |lateral acceleration|": (np.abs, np.abs(lateral)),
+        "magnitude with speed": (np.abs, speed),
+        "magnitude with braking": (np.abs, -np.minimum(ahead, 0.0)),
+        "itself with lateral acceleration": (np.asarray, lateral),
+        "itself with |lateral acceleration|": (np.asarray, np.abs(lateral)),
+        "itself with lateral x forward acceleration": (np.asarray, lateral * ahead),
+        "itself with time x lateral acceleration": (np.asarray, lateral * (clock - clock.mean())),
+    }
+    return {
+        name: {cause: float(np.corrcoef(of(row), values)[0, 1]) for cause, (of, values) in causes.items()}
+        for name, row in zip(AIMS, chosen.crossed, strict=True)
+    }
+
+
+def _wrong(residuals: dict[str, dict[str, float]]) -> list[str]:
+    def told(causes: dict[str, float]) -> str:
+        most = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
+        return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in most)
+
+    return [f"  residual of {name} goes with: {told(causes)}" for name, causes in residuals.items()]
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("race_car")

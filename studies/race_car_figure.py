@@ -1,0 +1,43 @@
+"""Figure of the race car: what was predicted with bands beside what was measured, and what simpler vehicles lose."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.drawing.figures import BLUE, DARK, SKY, VERMILION, heading, plt, save
+
+if TYPE_CHECKING:
+    from studies.race_car import Identified
+
+SECONDS = 60.0
+"""s of the prediction that are shown."""
+
+
+def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path: Path) -> Path:
+    """Channels over time with bands, and below the errors of all vehicles."""
+    problem = chosen.bands.problem
+    times = problem.clock.times
+    shown = times <= times[0] + SECONDS
+    figure, axes = plt.subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6), layout="constrained")
+    for axis, channel, row, half in zip(
+        axes, problem.channels, chosen.bands.predicted, chosen.bands.half_width, strict=False
+    ):
+        low, high = row - half, row + half
+        axis.fill_between(
+            times[shown], low[shown], high[shown], color=SKY, alpha=0.5, linewidth=0, label="band of 95 %"
+        )
+        axis.plot(times[shown], row[shown], color=VERMILION, linewidth=0.9, label="predicted")
+        axis.plot(times[shown], channel.values[shown], color=DARK, linewidth=0.9, label="measured")
+        axis.set(title=channel.name, ylabel=f"[{channel.unit}]", xlabel="time [s]")
+    names = [channel.name for channel in problem.channels]
+    vehicles = {"chosen": chosen, **others}
+    for i, (name, each) in enumerate(vehicles.items()):
+        at = np.arange(len(names)) + 0.25 * i
+        axes[-1].bar(at, 100.0 * each.bands.relative(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
+    axes[-1].set_xticks(np.arange(len(names)) + 0.25, names)
+    axes[-1].set(ylabel="error [% of rms]", title="What simpler vehicles lose")
+    axes[-1].legend()
+    axes[0].legend(ncols=3)
+    heading(figure, title, {})
+    return save(figure, path)

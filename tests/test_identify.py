@@ -1,0 +1,192 @@
+"""Identification: estimates of a car that is known, honest standard errors, bands, and what is refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.core.errors import InputError
+from models.core.tables import write_table
+from models.identification.bands import bands, error_model
+from models.identification.fit import fit
+from models.identification.of_scene import parameter, problem_of
+from models.identification.problem import Clock, Parameter, Problem, measured_channel
+from models.identification.uncertainty import profile, uncertainty
+from models.measured.outliers import without_outliers
+from models.systems.single_track.run import run
+from models.systems.single_track.scene import SingleTrackScene, build
+from studies.command.identify import identify
+
+TRUE = {"yaw_inertia": 1700.0}
+NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
+UNITS = {"yaw rate": "rad/s", "lateral acceleration": "m/s^2", "side slip": "rad"}
+TIMES = np.arange(0.0, 12.0, 0.02)
+KEYS = ["vehicle.yaw_inertia", "front.stiffness", "rear.stiffness", "front.friction"]
+TRUTH = np.array([1700.0, 16.0, 19.0, 0.95])
+
+
+def table(**more: object) -> dict:
+    """A car, its drive in drive.csv."""
+    return {
+        "title": "a car",
+        "system": "single-track",
+        "vehicle": {"mass": 1200.0, "front": 1.2, "rear": 1.4, "yaw_inertia": 1700.0},
+        "front": {"stiffness": 16.0, "friction": 0.95},
+        "rear": {"stiffness": 19.0, "friction": 1.0},
+        "drive": {"file": "drive.csv"},
+        **more,
+    }
+
+
+def steer() -> np.ndarray:
+    """rad, of both sides and several rates."""
+    return 0.045 * np.sin(1.1 * TIMES) * np.cos(0.35 * TIMES) + 0.015 * np.sin(3.7 * TIMES)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> SingleTrackScene:
+    """The car, and a drive."""
+    speed = 20.0 + 3.0 * np.sin(0.4 * TIMES)
+    write_table(tmp_path / "drive.csv", {"time": ("s", TIMES), "steer": ("rad", steer()), "speed": ("m/s", speed)})
+    return build(table(), "car.toml", tmp_path)
+
+
+def measured(scene: SingleTrackScene, seed: int = 1) -> Path:
+    """A file of its channels with noise."""
+    driven, random = run(scene), np.random.default_rng(seed)
+    columns = {n: (UNITS[n], driven[n] + NOISE[n] * random.standard_normal(len(TIMES))) for n in NOISE}
+    path = Path(scene.folder) / f"measured_{seed}.csv"
+    write_table(path, {"time": ("s", TIMES), **columns})
+    return path
+
+
+def begun(scene: SingleTrackScene) -> SingleTrackScene:
+    """The scene from which a search starts: other values."""
+    changed = table(
+        vehicle={"mass": 1200.0, "front": 1.2, "rear": 1.4, "yaw_inertia": 1400.0},
+        front={"stiffness": 13.0, "friction": 1.1},
+        rear={"stiffness": 22.0, "friction": 1.0},
+    )
+    return build(changed, "car.toml", Path(scene.folder))
+
+
+def test_estimates_are_the_truth_within_their_errors(scene: SingleTrackScene) -> None:
+    """Over several noises the squared distances by their covariance are those of chi-square: not too small, either."""
+    distances, inside = [], []
+    for seed in range(6):
+        known = uncertainty(fit(problem_of(begun(scene), measured(scene, seed), KEYS, low_pass=5.0)))
+        assert known.fit.converged
+        off = (known.fit.values - TRUTH) / known.fit.problem.scale
+        distances.append(float(off @ np.linalg.solve(known.covariance, off)))
+        inside.append(np.abs(known.fit.values - TRUTH) < 2.0 * known.deviations)
+    total = sum(distances)  # of chi-square with 24 freedoms 99.9 % lie below 52; errors are the larger of two estimates
+    assert 3.0 < total < 52.0
+    assert np.mean(inside) > 0.75
+    with_fault = (known.fit.values * 1.05 - TRUTH) / known.fit.problem.scale
+    assert with_fault @ np.linalg.solve(known.covariance, with_fault) > 52.0  # estimates 5 % off are seen
+
+
+def test_noise_that_stays_widens_errors(scene: SingleTrackScene) -> None:
+    """Standard errors from coloured residuals are larger than those of white ones of the same size."""
+    problem = problem_of(scene, measured(scene), KEYS)
+    white = uncertainty(fit(problem))
+    random, coloured = np.random.default_rng(3), []
+    for channel in problem.channels:
+        slow = np.convolve(random.standard_normal(len(channel.values) + 49), np.ones(50) / np.sqrt(50), "valid")
+        coloured.append(replace(channel, values=channel.values + NOISE[channel.name] * slow))
+    known = uncertainty(fit(replace(problem, channels=coloured)))
+    assert np.all(known.deviations > 1.5 * white.deviations)
+    assert known.staying > 5.0 * white.staying
+
+
+def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
+    """Mass and friction of both axles scale together: the worst combination is theirs, and it is named."""
+    keys = ["vehicle.mass", "vehicle.yaw_inertia", "vehicle.drag=-0.0:10.0"]
+    blind = build(table(vehicle={**table()["vehicle"], "drag": 1.0}), "car.toml", Path(scene.folder))
+    known = uncertainty(fit(problem_of(blind, measured(scene), keys)))
+    error, direction = known.combinations()[-1]
+    assert np.argmax(np.abs(direction)) == 2 or error > 1.0
+    assert not known.determined[2]
+
+
+def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
+    """Another noise over the same drive lies inside of 95 % bands; bands of a quarter of the width do not hold it."""
+    known = uncertainty(fit(problem_of(begun(scene), measured(scene), KEYS, low_pass=5.0)))
+    problem = known.fit.problem
+    predicted = problem.predicted(known.fit.values)
+    errors = [error_model(row - channel.values, row) for row, channel in zip(predicted, problem.channels, strict=True)]
+    fresh = problem_of(begun(scene), measured(scene, 7), KEYS, low_pass=5.0)
+    answer = bands(fresh, known, errors)
+    assert np.all(answer.inside() > 0.9) and np.all(answer.inside() <= 0.995)
+    assert np.all(answer.width() < 2.5)
+    assert np.all(replace(answer, half_width=0.25 * answer.half_width).inside() < 0.7)
+
+
+def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
+    """Stages that are kept give the same bits."""
+    path = measured(scene)
+    whole, _ = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    stages = sorted((tmp_path / "kept" / "stages").glob("block*"))
+    stages[-1].unlink()
+    again, _ = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    assert np.array_equal(whole.fit.values, again.fit.values)
+    with pytest.raises(InputError, match="another job"):
+        identify(begun(scene), path, KEYS, low_pass=4.0, folder=tmp_path / "kept")
+
+
+def test_profile_of_a_straight_problem_is_a_parabola() -> None:
+    """A model that is linear in its parameters: the profile is what the standard error says."""
+    times, random = np.linspace(0.0, 1.0, 400), np.random.default_rng(5)
+    clock = Clock(times)
+
+    def model(values: np.ndarray) -> dict:
+        return {"y": (times, values[0] + values[1] * times)}
+
+    channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(400)), clock)
+    known = uncertainty(fit(Problem(model, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
+    closed = np.linalg.inv(np.array([[400.0, times.sum()], [times.sum(), (times**2).sum()]])) * 0.01
+    assert known.deviations == pytest.approx(np.sqrt(np.diag(closed)), rel=0.4)  # long-run scores scatter
+    rises = profile(known, 1)
+    assert rises.quadratic
+    assert rises.rise == pytest.approx(rises.parabola, rel=0.02)
+
+
+def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
+    """One sample far off is bridged, and counted; noise is kept."""
+    values = 0.1 * np.random.default_rng(2).standard_normal(2000)
+    assert np.isfinite(without_outliers(values)).all()
+    values[700] = 5.0
+    assert np.flatnonzero(np.isnan(without_outliers(values))).tolist() == [700]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("front.frictoin", "is no key of the scene"),
+        ("front", "holds no number"),
+        ("sensors.steer_offset", "starts at 0"),
+        ("front.friction=2:3", "must start between its bounds"),
+        ("front.friction=2", "LOW:HIGH"),
+    ],
+)
+def test_parameters_are_refused(scene: SingleTrackScene, text: str, said: str) -> None:
+    """Each with the key."""
+    with pytest.raises(InputError, match=said) as caught:
+        parameter(scene, text)
+    assert text.partition("=")[0] in str(caught.value)
+
+
+def test_files_are_refused(scene: SingleTrackScene, tmp_path: Path) -> None:
+    """No channel of the run, a channel without a unit, a measurement of another time."""
+    other = tmp_path / "other.csv"
+    write_table(other, {"time": ("s", TIMES), "yaw": ("rad/s", TIMES)})
+    with pytest.raises(InputError, match="no channel has the name"):
+        problem_of(scene, other, KEYS)
+    write_table(tmp_path / "late.csv", {"time": ("s", TIMES + 100.0), "yaw rate": ("rad/s", np.sin(TIMES))})
+    with pytest.raises(InputError, match="share no time"):
+        problem_of(scene, tmp_path / "late.csv", KEYS)
+    with pytest.raises(InputError, match="half the sampling rate"):
+        problem_of(scene, measured(scene), KEYS, low_pass=30.0)
+    with pytest.raises(InputError, match="named twice"):
+        problem_of(scene, measured(scene), [KEYS[0], KEYS[0]])
