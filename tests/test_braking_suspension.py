@@ -1,11 +1,15 @@
 """A braked vehicle on its suspension: closed forms, symmetry, engines, scenes that name a vehicle file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.sprung import PITCH, ROLL, sprung
+from models.brake.trailer import CHOSEN
 from models.core.errors import InputError, Refused, RunFailed
+from models.multibody.numbers import Handling
 from models.systems.braking.plan import check, describe
 from models.systems.braking.procedures import engines_of, ready
 from models.systems.braking.run import run as drive
@@ -113,3 +117,17 @@ def test_what_a_vehicle_file_has_no_place_for_is_refused():
         assert told.value.place == place
     with pytest.raises(InputError, match="two of each of two axles"):
         sprung(load_vehicle("three_axle_truck"), 1.0)
+    with pytest.raises(InputError, match="trailer: cannot stand beside 'suspension'"):
+        scene(trailer=CHOSEN.model_dump())
+
+
+def test_tyres_behind_a_hitch_are_refused_and_do_not_silently_keep_to_the_heading_of_the_chassis():
+    car = load_vehicle("r19_free")
+    bodies = tuple(
+        replace(body, freedoms=("x", "z", "rz"), parent="body") if body.name == "rl" else body for body in car.bodies
+    )
+    hitched = replace(car, bodies=bodies)
+    for build_one in (lambda: sprung(hitched, 1.0), lambda: Handling(hitched).vehicle):
+        with pytest.raises(InputError, match=r"bodies\[rl\]\.freedoms .* keep to the heading of 'body'"):
+            build_one()
+    assert sprung(car, 1.0).size == len(car.coordinates())

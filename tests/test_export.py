@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.engines.assembly import Settings
-from models.engines.cut_vehicle import HubModel
+from models.engines.cut_vehicle import build as hub_model
 from models.engines.export import Subject, of_free
 from models.engines.exudyn_system import mass_and_force, start
 from models.engines.free_vehicle_exudyn import FreeExudyn
@@ -147,7 +147,7 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
         assert lowered == [text for text in answer.left_out if "inertia" in text]
     smooth = tuple(part.element for part in divide(whole, engine).native)
     drive = Drive(np.zeros((3, 6 * len(whole.hubs))))
-    product = HubModel(engine, replace(whole, tree=tree, elements=smooth), drive, 1e-3, 1e-3, "native")
+    product = hub_model(engine, replace(whole, tree=tree, elements=smooth), drive, 1e-3, 1e-3, "native")
     assert product.division.shared == ()
     assert error(answer.text, engine, lambda q, v: product.acceleration(0.0, q, v), whole.size, tmp_path) < 1e-10
 

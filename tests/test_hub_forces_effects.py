@@ -46,7 +46,7 @@ def test_what_is_stated_stays_without_noise():
     quiet = without(scene(angles={"angle_deviation": 0.01}), *NOISES)
     assert quiet.angles.deviations == (0.01, 5e-3)  # the filter weighs by it, and needs some
     told = plan_of(quiet).describe(quiet)
-    assert "  noise      none\n" in told and "absent     angle_noise, force_noise, kalman_filter" in told
+    assert "  noise      none\n" in told and "absent     angle_noise, force_noise, held_forces, kalman_filter" in told
 
 
 def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():

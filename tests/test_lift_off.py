@@ -342,12 +342,12 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
     """Independent of the compiled kernel: places and rates from MuJoCo's own Jacobians, the law written here."""
     import mujoco
 
-    from models.engines.cut_vehicle import HubModel
+    from models.engines.cut_vehicle import build as hub_model
 
     car = hubs(lift_off={})
     car = replace(car, whole=replace(car.whole, tyres=tuple(replace(t, damping=500.0) for t in car.whole.tyres)))
     drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), 20.0, 1e-3, 100)
-    own = HubModel("mujoco", car, replace(drive, frame="inertial"), 1e-3, 0.1)
+    own = hub_model("mujoco", car, replace(drive, frame="inertial"), 1e-3, 0.1)
     model, data = own.model.model, own.model.data
     random = np.random.default_rng(2)
     names = [body.name for body in car.tree.bodies]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused
-from models.engines.cut_vehicle import HubModel, native_share
+from models.engines.cut_vehicle import build, native_share
 from models.engines.native_parts import NO_CURVE, NO_FRAME, NO_TRAVEL, AxialTravel, divide
 from models.multibody.cut_table import Drive
 from models.systems.hub_forces import run as running
@@ -68,7 +68,7 @@ def test_the_first_evaluation_reads_no_stale_law():
     """At rest on its static loads a native vehicle stands still: preloads and hub forces balance, m/s^2."""
     for engine in NATIVE:
         for car in (r19(), rough_car()):
-            built = HubModel(engine, car, static(car, 3), 1e-3, 1e-3, "native")
+            built = build(engine, car, static(car, 3), 1e-3, 1e-3, "native")
             rest = np.zeros(car.size)
             assert np.abs(built.acceleration(0.0, rest, rest)).max() < 1e-9
 
@@ -116,8 +116,8 @@ def scene(**tables):
 
 def test_a_scene_chooses_whose_springs_it_has(monkeypatch):
     """Native unless it says compiled; an enforced tilt is compiled whatever the run before it was."""
-    routes, real = [], running.build
-    monkeypatch.setattr(running, "build", lambda *given: routes.append(given[5]) or real(*given))
+    routes, real = [], running.HubModel
+    monkeypatch.setattr(running, "HubModel", lambda *given: routes.append(given[4]) or real(*given))
     own, other = (run(scene(run={"duration": 0.06, "forces": route}), "mujoco") for route in ("native", "compiled"))
     assert routes == ["native", "native", "compiled", "compiled"]  # the virtual measurement, and the run
     assert 0.0 < np.abs(own.detail.states - other.detail.states).max() < 1e-10
@@ -131,7 +131,7 @@ def test_a_scene_chooses_whose_springs_it_has(monkeypatch):
 def test_an_enforced_tilt_is_refused_where_forces_are_in_two_places():
     car, guide = r19(), np.zeros((3, 6))
     with pytest.raises(Refused, match="enforced tilt"):
-        HubModel("mujoco", car, Drive(static(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
+        build("mujoco", car, Drive(static(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
 
 
 def test_show_tells_what_is_native_and_what_is_shared():

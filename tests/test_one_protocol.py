@@ -8,7 +8,7 @@ import pytest
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import RECOMMENDED
-from models.engines.cut_vehicle import HubModel
+from models.engines.cut_vehicle import build
 from models.engines.model import Model
 from models.engines.protocol import build as in_plane
 from models.engines.spatial_protocol import INTEGRATORS
@@ -40,7 +40,7 @@ def ride(engine: str) -> tuple[Model, Trajectory]:
 
 def hub_forces(engine: str) -> tuple[Model, Trajectory]:
     vehicle = cut(load_vehicle("r19_free"), "body")
-    model = HubModel(engine, vehicle, static(vehicle, 2 * STEPS + 1), STEP, STEPS * STEP)
+    model = build(engine, vehicle, static(vehicle, 2 * STEPS + 1), STEP, STEPS * STEP)
     moved = 1e-3 * np.random.default_rng(1).standard_normal((2, vehicle.size))
     return model, model.run(*moved)
 

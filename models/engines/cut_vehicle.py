@@ -5,6 +5,7 @@ forces of ``models.multibody.cut_kernel``. "reference" solves the written-out eq
 "plain" shares nothing with any of them (``models.multibody.plain``), and takes some seconds for each of the run.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -13,11 +14,21 @@ import numpy as np
 from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
+from models.engines.catalogue import ADAPTIVE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, built_share, free_model
 from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
-from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
+from models.multibody.cut_kernel import (
+    ANY_TIME,
+    WRENCH,
+    accelerate,
+    joint_forces,
+    march,
+    parts,
+    report,
+    set_joint_forces,
+)
 from models.multibody.cut_table import Drive, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
@@ -26,6 +37,8 @@ if TYPE_CHECKING:
     from models.multibody.plain.hubs import PlainHubs
 
 ENGINES = ("reference", "exudyn", "mujoco")
+FIXED = "RK4"
+"""The classical Runge-Kutta method, which every engine has; others pick their own steps."""
 PLAIN = "plain"
 """The independent reference, which runs where it is named."""
 Route = Literal["native", "compiled"]
@@ -75,26 +88,30 @@ class Written(FreeModel):
 
 
 class HubModel:
-    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4.
+    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4, or by an
+    integrator that picks its own steps, from row to row of as many.
 
     ``model`` is the free vehicle there.
     """
 
     def __init__(
-        self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Route = "compiled"
+        self, engine: str, vehicle: CutVehicle, drive: Drive, settings: Settings, forces: Route = "compiled"
     ) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step.
 
+        settings : "RK4", or an integrator of the engine that picks its own steps.
         forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
         equations of the reference are the same either way. An enforced tilt needs them "compiled".
         """
-        check_divides(engine, Settings("RK4", step, duration))
-        self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
+        check_divides(engine, settings)
+        self.engine, self.vehicle, self.drive, self.settings = engine, vehicle, drive, settings
+        step, self.step, self.steps, self.size = settings.step, settings.step, settings.steps, vehicle.size
+        self.adaptive = settings.integrator != FIXED
         _check(engine, vehicle, drive, 2 * self.steps + 1)
-        check_step(engine, vehicle, step, duration)
-        self.numbers, self.size = table(vehicle, drive, step), vehicle.size
+        _check_settings(engine, vehicle, settings)
+        self.numbers = table(vehicle, drive, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.plain = _plain(vehicle, drive, step) if engine == PLAIN else None
+        self.plain = _plain(vehicle, drive, step, self.adaptive) if engine == PLAIN else None
         division, numbers = Division((), vehicle.elements), self.numbers
         if forces == "native" and engine not in (PLAIN, "reference"):
             if drive.guide is not None and drive.pull is None:
@@ -102,9 +119,13 @@ class HubModel:
             division = divide(vehicle, engine)
             numbers = table(replace(vehicle, elements=division.shared), drive, step)
         self.division = division
+        if drive.held or self.adaptive:
+            numbers = numbers.copy()  # forces are reported by the whole table, read at its rows
         self.model = self._in_engine(
             Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
         )
+        if self.adaptive and not self.plain:
+            self.model.numbers[ANY_TIME] = 1.0
 
     def _in_engine(self, driven: Driven) -> FreeModel:
         if self.plain:
@@ -115,9 +136,43 @@ class HubModel:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
-    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where it stops."""
-        return self.model.march(q, v, self.steps, self.step)
+    def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
+        """From coordinates and rates (n,), unguarded; RunFailed where it stops."""
+        if not self.drive.held:
+            return self._march(q, v, self.steps)
+        states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
+        states[0] = np.concatenate((q, v))
+        for first, last in self.drive.spans():
+            self._hold(first, last)
+            try:
+                path = self._march(states[first, : self.size], states[first, self.size :], last - first)
+            except RunFailed as error:
+                since = None if error.time is None else first * self.step + error.time
+                raise RunFailed(error.engine, error.reason, since, error.state) from error
+            states[first : last + 1] = path.states
+            counts.update(path.counts)
+        return Trajectory(self._times(self.steps), states, counts=dict(counts))
+
+    def _march(self, q: np.ndarray, v: np.ndarray, steps: int) -> Trajectory:
+        """So many steps from time 0 on."""
+        if self.adaptive:
+            from models.engines.free_vehicle_adaptive import march_adaptively
+
+            return march_adaptively(self.model, q, v, replace(self.settings, duration=steps * self.step))
+        states = self.model.march(q, v, steps, self.step)
+        return Trajectory(self._times(steps), states, counts={"steps": steps, "force calls": 4 * steps})
+
+    def _times(self, steps: int) -> np.ndarray:
+        return self.step * np.arange(steps + 1)
+
+    def _hold(self, first: int, last: int) -> None:
+        """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
+        drive = self.drive.during(first, last)
+        if self.plain:
+            self.plain.drive = drive
+        else:
+            rows = drive.rows
+            parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
@@ -126,25 +181,21 @@ class HubModel:
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:
         """March from coordinates and rates (n,), or from rest; RunFailed unless the vehicle stays upright."""
         rest = np.zeros(self.size)
-        states = self.marched(rest if q is None else q, rest if v is None else v)
-        times = self.step * np.arange(len(states))
+        path = self.marched(rest if q is None else q, rest if v is None else v)
+        times, states = path.times, path.states
         guard(self.engine, times, states, self.steps * self.step)
         tumbled = np.abs(states[:, PITCH]) > UPRIGHT
         if tumbled.any():
             at = int(np.argmax(tumbled))
             raise RunFailed(self.engine, f"the vehicle pitches by more than {UPRIGHT} rad", times[at], states[at])
-        return self.reported(times, states)
+        return replace(self.reported(times, states), counts=path.counts)
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
         if self.plain:
             inside, wrenches, moments = self.plain.report(times, states)
             return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
-        rows, vehicle = len(times), self.vehicle
-        inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
-        wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
-        report(self.numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
-        return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
+        return reported(self.vehicle, self.numbers, times, states)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
         """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""
@@ -153,10 +204,27 @@ class HubModel:
         return block[: self.size].copy()
 
 
-def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
+def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
+    """A run with the compiled forces of its states, by the vehicle's table of numbers."""
+    rows = len(times)
+    inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
+    wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
+    report(numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
+    return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
+
+
+def build(
+    engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Route = "compiled"
+) -> HubModel:
+    """A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco" for steps (s) of Runge-Kutta 4 over a duration
+    (s), as ``HubModel``; raises Refused."""
+    return HubModel(engine, vehicle, drive, Settings(FIXED, step, duration), forces)
+
+
+def _plain(vehicle: CutVehicle, drive: Drive, step: float, any_time: bool) -> "PlainHubs":
     from models.multibody.plain.hubs import PlainHubs
 
-    return PlainHubs(vehicle, drive, step)
+    return PlainHubs(vehicle, drive, step, any_time)
 
 
 @dataclass(frozen=True)
@@ -189,7 +257,14 @@ def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
         raise Refused(engine, f"inputs must be {rows} rows (half steps) of {width} finite numbers")
     if drive.guide is not None and (drive.guide.shape != (rows, 6) or not np.isfinite(drive.guide).all()):
         raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
+    if drive.held and not np.array_equal(drive.hubs[1::2], drive.hubs[:-1:2]):
+        raise Refused(engine, "held forces change within a step: it must divide the period of their samples")
 
 
-build = HubModel
-"""A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
+def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
+    """Refused where fixed steps are too long, or where the engine has no such integrator."""
+    adaptive = ADAPTIVE.get("reference" if engine == PLAIN else engine, ())
+    if settings.integrator == FIXED:
+        check_step(engine, vehicle, settings.step, settings.duration)
+    elif settings.integrator not in adaptive:
+        raise Refused(engine, f"{settings.integrator} is not offered: {' or '.join((FIXED, *adaptive))}")

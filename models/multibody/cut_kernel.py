@@ -52,10 +52,12 @@ from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
     PITCH_DAMPING,
     HOLDING,
     ALL,
+    ANY_TIME,
     HEADER,
-) = range(20)
+) = range(21)
 """Head: counts; whether tyres on a road act; frame of the hub forces; what stabilises; rows of inputs per second, rows,
-columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all."""
+columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all;
+whether inputs are read at any time, or at half steps alone."""
 FRAMES = ("hub", "body", "inertial")
 NONE, PULLED, HELD = range(3)
 """Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
@@ -126,6 +128,23 @@ def _element(e, numbers, motion, chassis, row):
     if e[ON_RATE] != 0.0:
         force += on_curve(beyond(start(numbers), int(e[ON_RATE])), rate)
     return force
+
+
+@lean
+def _read_inputs(head, inputs, t, row):
+    """Fill ``row`` with the inputs at a time (s): those of the nearest half step, or of the parabola through the three
+    rows of a step, for methods that pick their own steps."""
+    last, place = len(inputs) - 1, t * head[PER_TIME]
+    if head[ANY_TIME] == 0.0:
+        nearest = min(max(int(np.rint(place)), 0), last)
+        for k in range(len(row)):
+            row[k] = inputs[nearest, k]
+        return
+    first = 2 * min(max(int(place / 2.0), 0), (last - 2) // 2)
+    part = min(max(place - first, 0.0), 2.0)
+    begin, middle, end = 0.5 * (part - 1.0) * (part - 2.0), part * (2.0 - part), 0.5 * part * (part - 1.0)
+    for k in range(len(row)):
+        row[k] = begin * inputs[first, k] + middle * inputs[first + 1, k] + end * inputs[first + 2, k]
 
 
 @lean
@@ -223,7 +242,9 @@ def forces(numbers, t, q, v, m, out, told):
     Also fills ``m`` and the ``ForceReport``.
     """
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
-    row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
+    columns = int(head[COLUMNS])
+    row = array(doubles(columns), (columns,))
+    _read_inputs(head, inputs, t, row)
     chassis, count, motion, moments = int(head[CHASSIS]), len(hubs), JointMotion(joints, q, v, m), told.moments
     travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)

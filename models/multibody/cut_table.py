@@ -1,6 +1,7 @@
 """The table that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over time."""
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +22,7 @@ class Drive:
     guide : (m, 6), roll, pitch, rates and accelerations to hold, rad; None leaves the vehicle free
     pull : stiffness and damping (N m/rad, N m s/rad) of roll, then pitch, towards them; None enforces them
     holding : 1/s, how fast an enforced angle comes back to its file, critically damped
+    held : whether the hubs' forces at the start of a step are those of the whole step
     """
 
     hubs: np.ndarray
@@ -29,11 +31,29 @@ class Drive:
     guide: np.ndarray | None = None
     pull: tuple[float, float, float, float] | None = None
     holding: float = 20.0
+    held: bool = False
 
     @property
     def road(self) -> bool:
         """Whether tyres on a road act instead of measured forces."""
         return self.speed > 0.0
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(m, 6 h or 2 h, and 6 with a guide): inputs as the kernel reads them."""
+        return self.hubs if self.guide is None else np.hstack([self.hubs, self.guide])
+
+    def spans(self) -> list[tuple[int, int]]:
+        """First and last step of every span over which the hubs' forces are held, one after another."""
+        begins = self.hubs[:-1:2]
+        changes = np.flatnonzero((begins[1:] != begins[:-1]).any(axis=1)) + 1
+        ends = [0, *changes.tolist(), len(begins)]
+        return list(itertools.pairwise(ends))
+
+    def during(self, first: int, last: int) -> "Drive":
+        """The drive of one span of steps, whose time begins with it."""
+        hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last - first) + 1, axis=0)
+        return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last + 1])
 
 
 @dataclass(frozen=True)
@@ -63,7 +83,7 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
         bodies.append([joined.last[body.name], body.mass, *arm, *np.ravel(body.inertia)])
     elements = [_element(element, joined) for element in vehicle.elements]
     hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
-    inputs = drive.hubs if drive.guide is None else np.hstack([drive.hubs, drive.guide])
+    inputs = drive.rows
     head = np.zeros(kernel.HEADER)
     counts = [len(rows) for rows in (joined.rows, bodies, elements, hubs)]
     head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = counts

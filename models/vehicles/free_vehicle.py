@@ -29,9 +29,11 @@ def free_vehicle(
     """The vehicle on a carrier, bodies in the order of a walk through their tree, without side forces, drag, outputs.
 
     gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle, 0 for wheels that do not spin; fixed : tyres
-    whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six freedoms and no parent.
+    whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six freedoms and no parent, and
+    where a body that carries a tyre turns about the vertical beside it.
     """
     chassis = chassis_of(vehicle)
+    _check_headings(vehicle, chassis.name)
     x, y, _ = chassis.position
     bodies = [Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE), Body(SWAY, 0.0, (x, y, 0.0), REST, parent=CARRIER)]
     bodies += [
@@ -75,6 +77,18 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
         allowed = "a vehicle that is steered needs a chassis with the freedoms x, y, z, rx, ry, rz and without a parent"
         raise InputError(vehicle.name, f"bodies[{chassis.name}].freedoms", list(chassis.freedoms), allowed)
     return chassis
+
+
+def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
+    """Refuse a trailer, or an axle, that takes its tyres to another heading than the chassis': forces keep to that."""
+    for tyre in vehicle.tyres:
+        for name in vehicle.chain(tyre.body):
+            if name != chassis and "rz" in vehicle.body(name).freedoms:
+                allowed = (
+                    f"must not have rz: the body carries the tyre {tyre.name!r}, and tyres of a vehicle file keep to "
+                    f"the heading of {chassis!r}; a trailer stands in [trailer] of the system braking, in the plane"
+                )
+                raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(vehicle.body(name).freedoms), allowed)
 
 
 def rotor(tyre: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from models.core.time_series import write_time_series
 from models.engines.cut_vehicle import build
 from models.multibody import cut_kernel as kernel
+from models.multibody.cut_kernel import WRENCH
 from models.systems.hub_forces.measurement import recorded
 from models.systems.hub_forces.run import Measurement, measure
 from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
@@ -55,13 +56,14 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     model = build(engine, measurement.vehicle, drive, step, scene.run.duration)
     head = model.numbers
     period = drive.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
-    curved = np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    curved = not drive.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
     noisy_forces, noisy_angles = _noisy(measurement)
     counts = {
         "runs on tyres": int(measurement.truth is not None),
         "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.whole.tyres),
         "noisy forces": noisy_forces,
         "noisy angles": noisy_angles,
+        "held forces": drive.held * WRENCH * int(head[kernel.HUBS]),
         "pulled angles": 2 * int(head[kernel.GUIDE] == kernel.PULLED),
         "enforced angles": 2 * int(head[kernel.GUIDE] == kernel.HELD),
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from models.core.errors import InputError
 from models.core.signals import Interpolation
-from models.engines.cut_vehicle import ENGINES, HubModel, HubRun, build
+from models.engines.cut_vehicle import ENGINES, HubRun, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
@@ -24,6 +24,7 @@ from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicl
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing
 from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.spatial import hub_inputs
 from validation.spatial.cars import anywhere, by_jacobians, r19, shaken, static, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
@@ -45,6 +46,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         *_gravity(car),
         _toppling(car),
         _together(car, 0.2 if quick else 2.0),
+        *hub_inputs.rows(car, quick),
     ]
     if quick:
         return rows, {}
@@ -98,7 +100,7 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     for frame in ("hub", "inertial"):
         drive = shaken(vehicle, frame, guide=False)
         built, bare = (
-            HubModel("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
+            build("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
         )
         expected = by_jacobians(built, q, drive.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()

@@ -283,7 +283,7 @@ def _drift_off(vehicle: CutVehicle, true: VirtualMeasurement, level: Level, path
     start = np.zeros(2 * vehicle.size)
     start[[ROLL, PITCH]] = level.tilt
     run = model("mujoco", vehicle, forces.noisy(deviation, SEED, path), true.step, float(true.run.times[-1]), "smooth")
-    states = run.marched(*np.split(start, 2))
+    states = run.marched(*np.split(start, 2)).states
     off = np.abs((states - true.run.states[: len(states)])[:, [ROLL, PITCH]]).max(axis=1) > 0.05
     return float(true.run.times[off.argmax()]) if off.any() else np.inf
 

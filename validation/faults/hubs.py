@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.cut_vehicle import HubModel
+from models.engines.cut_vehicle import HubModel, build
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import CutVehicle
@@ -18,7 +18,7 @@ from validation.spatial.cars import by_jacobians, r19, static
 
 def _driven(hubs: np.ndarray) -> HubModel:
     """R19-free in MuJoCo with these wrenches (3, 6 h) on its hubs."""
-    return HubModel("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
+    return build("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
 
 
 def _jacobians() -> float:

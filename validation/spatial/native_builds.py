@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.engines.cut_vehicle import HubModel, Route
+from models.engines.cut_vehicle import HubModel, Route, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -32,7 +32,7 @@ def shaken_drive(vehicle: CutVehicle, rows: int) -> Drive:
 
 def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
     """The vehicle on its shaken hubs in an engine."""
-    return HubModel(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
+    return build(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 
 
 def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
@@ -45,7 +45,7 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
     """Largest relative difference between accelerations by compiled forces and by ``SpatialReference``, which share no
     code, without hub forces."""
     still = Drive(0.0 * static(vehicle, 3).hubs)
-    compiled, equations = HubModel("reference", vehicle, still, STEP, STEP), written(vehicle)
+    compiled, equations = build("reference", vehicle, still, STEP, STEP), written(vehicle)
     paths = [
         [compiled.acceleration(0.0, *state) for state in states],
         [equations.acceleration(0.0, *state) for state in states],

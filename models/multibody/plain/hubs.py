@@ -32,10 +32,13 @@ class State(NamedTuple):
 
 
 class PlainHubs:
-    """A driven cut vehicle; ``step`` (s) is that of the rows of its drive, two to a step."""
+    """A driven cut vehicle; ``step`` (s) is that of the rows of its drive, two to a step.
 
-    def __init__(self, vehicle: CutVehicle, drive: "Drive", step: float) -> None:
-        self.vehicle, self.drive, self.step = vehicle, drive, step
+    any_time : whether the drive is read between its rows, too, for methods that pick their own steps.
+    """
+
+    def __init__(self, vehicle: CutVehicle, drive: "Drive", step: float, any_time: bool = False) -> None:
+        self.vehicle, self.drive, self.step, self.any_time = vehicle, drive, step, any_time
         self.bodies = Bodies(vehicle.tree)
         self.parts = Parts(self.bodies, vehicle.whole, vehicle.chassis)
         self.held, self.loads = held_at_rest(vehicle.whole, vehicle.chassis)
@@ -52,16 +55,32 @@ class PlainHubs:
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
-        row = min(max(round(2.0 * t / self.step), 0), len(self.drive.hubs) - 1)
+        hubs, guide = self._inputs(t)
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self._weight)
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
         inside = spring + other
-        by_hubs, wrenches = self._act(motion, row, q)
+        by_hubs, wrenches = self._act(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
-        acceleration, moments = self._hold(mass, force, row, q, v)
+        acceleration, moments = self._hold(mass, force, guide, q, v)
         return State(acceleration, inside, wrenches, moments)
+
+    def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
+        """Rows of the hubs and of the guide at a time (s): the nearest ones, or by differences of a step's three."""
+        last, place = len(self.drive.hubs) - 1, 2.0 * t / self.step
+        if not self.any_time:
+            nearest = min(max(round(place), 0), last)
+            return self.drive.hubs[nearest], None if self.drive.guide is None else self.drive.guide[nearest]
+        first = min(2 * int(max(place, 0.0) // 2), last - 2)
+        part = min(max(place - first, 0.0), 2.0)
+
+        def between(rows: np.ndarray) -> np.ndarray:
+            slope, bend = np.diff(rows[first : first + 2], axis=0)[0], np.diff(rows[first : first + 3], 2, axis=0)[0]
+            value: np.ndarray = rows[first] + part * slope + 0.5 * part * (part - 1.0) * bend
+            return value
+
+        return between(self.drive.hubs), None if self.drive.guide is None else between(self.drive.guide)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -72,24 +91,26 @@ class PlainHubs:
         rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
-    def _act(self, motion: Motion, row: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs, and their wrenches (h, 6)."""
+    def _act(self, motion: Motion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Generalised forces (n,) of all hubs by a row of the drive, and their wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
             if self.drive.road:
-                force, moment = self._tyre(i, point, motion, row, q)
+                force, moment = self._tyre(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
                 wrenches[i] = np.concatenate((force @ axes, moment @ axes))
             else:
-                wrenches[i] = self.drive.hubs[row, WRENCH * i : WRENCH * (i + 1)]
+                wrenches[i] = hubs[WRENCH * i : WRENCH * (i + 1)]
                 force, moment = axes @ wrenches[i, :3], axes @ wrenches[i, 3:]
             total += point[FIRST:] @ force + motion.by_moment(int(self._hubs.rows[i]), moment)
         return total, wrenches
 
-    def _tyre(self, i: int, hub: np.ndarray, motion: Motion, row: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) in space at a hub by its tyre on the road."""
+    def _tyre(
+        self, i: int, hub: np.ndarray, motion: Motion, road: tuple[float, float], q: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) and moment (N m) in space at a hub by its tyre on a road of a height (m) and rate (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.whole.tyres[i], self._sides[i], self.drive.speed
-        height, rising = self.drive.hubs[row, i], self.drive.hubs[row, len(self.loads) + i]
+        height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
         spin = motion.axes(int(self._hubs.rows[i]))
         sideways = (hub[RATE] + spin[RATE] @ (spin[PLACE].T @ down))[1]
@@ -102,13 +123,13 @@ class PlainHubs:
         return np.array([-load * rising / speed, side, load]), side * np.array([-down[2], 0.0, down[0]])
 
     def _hold(
-        self, mass: np.ndarray, force: np.ndarray, row: int, q: np.ndarray, v: np.ndarray
+        self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""
         drive, moments = self.drive, np.zeros(2)
-        if drive.guide is None:
+        if guide is None:
             return np.linalg.solve(mass, force), moments
-        wanted, rates, accelerations = drive.guide[row].reshape(3, 2)
+        wanted, rates, accelerations = guide.reshape(3, 2)
         off, late = wanted - q[LEANS], rates - v[LEANS]
         if drive.pull:
             moments = np.array(drive.pull[0::2]) * off + np.array(drive.pull[1::2]) * late

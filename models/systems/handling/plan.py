@@ -3,6 +3,7 @@
 from models.core.assumptions import assumption_lines
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
+from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import joints_alone
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
@@ -41,7 +42,7 @@ def describe(scene: HandlingScene) -> str:
         ),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
-        *(_line(engine, _adaptive(scene, engine)) for engine in scene.engines),
+        *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
         *(_line(*line) for line in joints_alone(free)),
         _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
         _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
@@ -49,12 +50,6 @@ def describe(scene: HandlingScene) -> str:
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
-
-
-def _adaptive(scene: HandlingScene, engine: str) -> str:
-    adaptive, step = scene.engines[engine], scene.run.step
-    steps = f"which picks its own steps to {adaptive.tolerance:g}, rows every {step:g} s"
-    return f"{adaptive.integrator} in its place, {steps}"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

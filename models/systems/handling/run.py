@@ -16,6 +16,7 @@ from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
+from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
@@ -45,8 +46,6 @@ MOST_CELLS, CELLS = 200, "tyres.cells"
 """Most cells per strip, and the key that they are set by."""
 MIDDLE = 0.4
 """Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
-ADAPTIVE = "its steps are kept to a tolerance; for an error leave engines.NAME out: Runge-Kutta 4 tells it"
-"""Why a run whose integrator picks its own steps states no error: that of its tyres' net would be missing."""
 STILL = 1e-6
 """Share of the load at rest, and of the speed at the start, below which a force or a speed is rounding."""
 REPORTS = {
@@ -124,7 +123,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     asked, handling, adaptive = scene.manoeuvres[name], scene.handling(name), scene.adaptive(engine, name)
     if adaptive is not None:
         run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, asked.speed, adaptive))
-        return not_estimated(run, ADAPTIVE) if error else run
+        return not_estimated(run, NO_ESTIMATE) if error else run
     drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
     labelled = judged_drive(scene, engine, name, drive)
     return _with_error(labelled, drive, asked.speed) if error else labelled

@@ -13,7 +13,7 @@ from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
 from models.engines.assembly import Settings
-from models.engines.catalogue import ADAPTIVE
+from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
@@ -63,13 +63,6 @@ class RunTable(Strict):
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
     )
-
-
-class Adaptive(Strict):
-    """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that picks its own steps."""
-
-    integrator: str = Field(description="DOPRI5 or ODE23 of exudyn; DOP853, Radau or LSODA of the reference")
-    tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
 
 
 class Manoeuvre(Strict):
@@ -130,19 +123,8 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         _check_times(scene, place, manoeuvre)
         for control, limits in LIMITS.items():
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
-    for engine, adaptive in scene.engines.items():
-        _check_engine(scene, engine, adaptive)
+    check_engines(scene.file, scene.engines)
     return with_own(scene)
-
-
-def _check_engine(scene: HandlingScene, engine: str, adaptive: Adaptive) -> None:
-    """Refuse an engine, or an integrator, that does not pick its own steps."""
-    if engine not in ADAPTIVE:
-        allowed = "no engine with integrators that pick their own steps"
-        raise InputError(scene.file, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
-    if adaptive.integrator not in ADAPTIVE[engine]:
-        allowed = "no integrator of this engine that picks its own steps"
-        raise InputError(scene.file, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
 
 
 def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:

@@ -25,8 +25,9 @@ TURNED = 0.05
 """rad that turn 5 % of a force into another axis."""
 TRAVEL, TURN = 0.12, 0.3
 """m and rad: a car's springs meet their stops about there; no stop is in a linear spring or bar."""
-SAMPLED = {"linear": 0.25, "smooth": 0.4}
-"""Waves of the road by samples: between samples on straight lines 19 % of such a wave are lost, on cubics 20 %."""
+SAMPLED = {"held": 0.064, "linear": 0.25, "smooth": 0.4}
+"""Waves of the road by samples: held samples are half a period late, 20 % of such a wave; between samples on straight
+lines 19 % of it are lost, on cubics 20 %."""
 BALANCE, RISING = 0.05, 0.5
 """Of the weight: forces that are out of balance by so much lift or drop a vehicle by 55 m in 15 s; and the change of
 vertical speed (m/s) that a rough road may leave between the ends of a run."""
@@ -163,7 +164,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
     """Assumption on the sampling of a virtual measurement."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
-    other = ' or use forces.interpolation = "smooth",' if rule == "linear" else ""
+    other = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""
     return Assumption(
         "samples",
         "samples show every wave of the road",

@@ -6,9 +6,9 @@ import numpy as np
 
 from models.core.noise import FORCES, PITCH_SENSOR, normal
 from models.core.signals import Interpolation, sampled
-from models.engines.cut_vehicle import HubModel, HubRun, build
+from models.engines.cut_vehicle import HubModel, HubRun, build, reported
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import Drive, table
 from models.road.profile import Profile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
@@ -28,7 +28,7 @@ class HubForces:
     def drive(self, step: float, steps: int, interpolation: Interpolation = "linear") -> Drive:
         """The arrays that drive the cut vehicle at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
-        return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame)
+        return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
@@ -71,8 +71,8 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     compression, along a run."""
     gauges = tuple(element.gauge() for element in vehicle.elements)
     still = Drive(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
-    model = build("reference", replace(vehicle, elements=gauges), still, run.times[1], run.times[-1])
-    values = model.reported(run.times, run.states).elements
+    gauged = replace(vehicle, elements=gauges)
+    values = reported(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 

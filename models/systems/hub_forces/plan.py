@@ -11,6 +11,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding, gathered
 from models.core.scene_effects import lines as effect_lines
 from models.engines.cut_vehicle import check_step, native_share
+from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES as FREE_ENGINES
 from models.measured.signal import UNITS, Quantity, Signal
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
@@ -34,7 +35,8 @@ REMEDY = "Correct the columns of the file, or map them in a scene of the system 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     vehicle = scene.cut_vehicle()
-    check_step(engines[-1], vehicle, scene.run.step, scene.run.duration)
+    if fixed := [engine for engine in engines if engine not in scene.engines]:
+        check_step(fixed[-1], vehicle, scene.run.step, scene.run.duration)
     if scene.forces.frame == "inertial":
         growth = float(rigid(vehicle).toppling().max()) / (2 * np.pi)
         if scene.stabilise.bandwidth <= growth:
@@ -80,6 +82,7 @@ def describe(scene: HubScene) -> str:
             )
         )
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
+    lines += [_line(*line) for line in plan_lines(scene.engines, scene.run.step)]
     if scene.study == COMPARING:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
     lines += [_line("doubt", text) for text in doubts(scene)]

@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import judged
-from models.core.discretisation import Estimate, Series, by_steps, stated, summed
+from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
 from models.core.smoothing import smoothed
 from models.core.steps import divides
-from models.engines.cut_vehicle import HubRun, Route, build
+from models.engines.assembly import Settings
+from models.engines.cut_vehicle import HubModel, HubRun, Route, build
+from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
@@ -107,8 +109,8 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
     vehicle, road, step = scene.cut_vehicle(), scene.road, scene.run.step
     if road is None:
         return Measurement(scene, vehicle, None, *scene.measured(vehicle))
-    march = (engine, step, scene.run.duration, scene.run.forces)
-    true, errors = on_road(vehicle, road, scene.forces.frame, march, error)
+    march = (engine, scene.settings(engine), scene.run.forces)
+    true, errors = on_road(vehicle, road, scene.forces.frame, march, error and engine not in scene.engines)
     forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
         forces = forces.noisy(scene.deviations(vehicle), scene.seed)
@@ -118,19 +120,19 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
 
 
 def on_road(
-    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, float, float, Route], error: bool = False
+    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, Settings, Route], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
     """The vehicle on its tyres over a road, its hub forces in a frame; and errors of the run, where they are asked for.
 
-    march : engine, step and duration (s), and whose the forces of springs are.
+    march : engine, its integrator with step and duration, and whose the forces of springs are.
     """
-    engine, step, duration, kind = march
+    engine, settings, kind = march
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
     def drive(step: float, steps: int) -> Drive:
         return replace(two_tracks(vehicle, left, right, road.speed, step, steps), frame=frame)
 
-    true = build(engine, vehicle, drive(step, round(duration / step)), step, duration, kind).run()
+    true = HubModel(engine, vehicle, drive(settings.step, settings.steps), settings, kind).run()
     return true, errors_of_steps(engine, vehicle, true, drive, forces=kind)[0] if error else {}
 
 
@@ -207,13 +209,15 @@ def run(
     measurement, method = measurement or measure(scene, engine, error), method or scene.stabilise.method
     drive = measurement.drive(method, scene.run.step, scene.steps)
     kind = scene.forces_with(method)
-    model = build(engine, measurement.vehicle, drive, scene.run.step, scene.run.duration, kind)
+    model = HubModel(engine, measurement.vehicle, drive, scene.settings(engine), kind)
     begun = time.process_time()
     path = model.run(*np.split(measurement.start(drive), 2))
     seconds = time.process_time() - begun
     result = labelled(measurement, path, engine, method, seconds)
     if not error:
         return result
+    if engine in scene.engines:
+        return not_estimated(result, NO_ESTIMATE)
     vehicle, period = measurement.vehicle, measurement.forces.period
     told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period, kind)
     if (
@@ -227,7 +231,6 @@ def labelled(
     measurement: Measurement, path: HubRun, engine: str, method: str = ON_TYRES, seconds: float = 0.0
 ) -> Result:
     """A run of the measurement's vehicle: motion of its chassis, section forces, moments that hold roll and pitch."""
-    steps = len(path.times) - 1
     channels = {name: Channel("time", path.states[:, column], unit) for name, (column, unit) in MOTION.items()}
     channels |= {
         "section_force": Channel(("time", "element"), path.elements, "N", "compression; of bars a moment, N m"),
@@ -243,7 +246,7 @@ def labelled(
         channels,
         axes,
         engine=engine,
-        counts={"steps": steps, "force calls": 4 * steps, "states": path.states.shape[1]},
+        counts=path.counts | {"states": path.states.shape[1]},
         seconds=seconds,
         doubts=measurement.tilt.doubts if method == "kalman" else (),
         detail=path,

@@ -10,11 +10,14 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.scene_effects import extended, with_own
 from models.core.scene_file import SceneFile, checked
+from models.core.signals import Interpolation
 from models.core.steps import divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS, other_unit, read_time_series
-from models.engines.cut_vehicle import Route
+from models.engines.assembly import Settings
+from models.engines.cut_vehicle import FIXED, Route
+from models.engines.error_control import Adaptive, check_engines
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.vehicle_file import load_vehicle
@@ -41,7 +44,9 @@ class Run(Strict):
     """[run]."""
 
     duration: float = quantity("s", "of the measurement and of every run", default=15.0)
-    step: float = quantity("s", "of Runge-Kutta 4 in every engine", default=1e-3)
+    step: float = quantity(
+        "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
+    )
     forces: Route = Field(
         default="native", description="springs, mounts and bars of the engine's own, or all in its one callback"
     )
@@ -60,7 +65,7 @@ class Forces(Strict):
 
     file: str | None = Field(default=None, description="CSV: time [s], then HUB_fx [N] ... HUB_mz [N m] of every hub")
     frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
-    interpolation: Literal["linear", "smooth"] = Field(default="linear", description="between samples")
+    interpolation: Interpolation = Field(default="linear", description="held, linear or smooth between the samples")
     accept: list[str] = Field(default=[], description="findings of the checks of a file, by name, that are meant so")
     sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
     noise: Noise = Field(default="white", description="of the virtual measurement; what is stated stays")
@@ -104,11 +109,19 @@ class HubScene(SceneFile):
     stabilise: Stabilise = Stabilise()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
 
     @property
     def steps(self) -> int:
         """Steps of every run."""
         return round(self.run.duration / self.run.step)
+
+    def settings(self, engine: str) -> Settings:
+        """How an engine marches: by Runge-Kutta 4, or by an integrator that picks its own steps."""
+        step, duration, adaptive = self.run.step, self.run.duration, self.engines.get(engine)
+        if adaptive is None:
+            return Settings(FIXED, step, duration)
+        return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
     def forces_with(self, method: Method) -> Route:
         """Route springs a run has: an enforced tilt needs all forces in one place, whatever the scene says."""
@@ -147,6 +160,9 @@ class HubScene(SceneFile):
         if last < self.run.duration * (1 - 1e-9):
             allowed = f"the files end at {last:g} s{other_unit(last, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
+        if self.forces.interpolation == "held" and not divides(self.run.step, period):
+            allowed = f"must divide the period of {period:g} s over which samples are held"
+            raise InputError(self.file, "run.step", self.run.step, allowed)
         count = round(self.run.duration / period) + 1
         return HubForces(forces[:count], period, self.forces.frame), Angles(angles[:count], period)
 
@@ -167,6 +183,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         allowed = "an enforced tilt needs all forces in one place: drop it, or choose another stabilise.method"
         raise InputError(file, "run.forces", scene.run.forces, allowed)
     _check_steps(file, scene)
+    check_engines(file, scene.engines)
     return with_own(scene)
 
 

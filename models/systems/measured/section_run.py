@@ -230,7 +230,7 @@ class _March:
         """States of a block until its end or until the vehicle topples, and the failure that says when."""
         began, steps = self.done * self.grid.period * self.grid.skip, model.steps
         try:
-            states = model.marched(*np.split(self.state, 2))
+            states = model.marched(*np.split(self.state, 2)).states
         except RunFailed:
             states = self._until(model)
         inside = states[:, 4:]  # where it is and where it heads may be anything
@@ -253,7 +253,7 @@ class _March:
         while bad - good > 1:
             model.steps = (good + bad) // 2
             try:
-                states = model.marched(*np.split(self.state, 2))
+                states = model.marched(*np.split(self.state, 2)).states
                 good = model.steps
             except RunFailed:
                 bad = model.steps

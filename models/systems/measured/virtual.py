@@ -14,7 +14,8 @@ from models.core.errors import InputError
 from models.core.steps import divides, fitting
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
-from models.engines.cut_vehicle import HubRun
+from models.engines.assembly import Settings
+from models.engines.cut_vehicle import FIXED, HubRun
 from models.measured.channel import BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured
@@ -105,7 +106,11 @@ def virtual_measurement(
     """
     signals = check(vehicle, virtual, file)
     run, told = on_road(
-        vehicle, virtual.road, virtual.frame, (engine, virtual.step, virtual.duration, "compiled"), error
+        vehicle,
+        virtual.road,
+        virtual.frame,
+        (engine, Settings(FIXED, virtual.step, virtual.duration), "compiled"),
+        error,
     )
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]

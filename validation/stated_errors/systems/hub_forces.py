@@ -14,6 +14,7 @@ import numpy as np
 from models.core.discretisation import errors_of
 from models.core.errors import RunFailed
 from models.core.result import Result
+from models.core.trajectory import Trajectory
 from models.engines.cut_vehicle import ENGINES, HubModel
 from models.systems.hub_forces.run import principal, run
 from models.systems.hub_forces.scene import HubScene, build
@@ -93,7 +94,7 @@ def counted() -> Iterator[list[float]]:
     """Evaluations of the forces within the block, run by run."""
     calls, march = list[float](), HubModel.marched
 
-    def counting(model: HubModel, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def counting(model: HubModel, q: np.ndarray, v: np.ndarray) -> Trajectory:
         calls.append(4.0 * model.steps)
         return march(model, q, v)
 

@@ -39,6 +39,7 @@ def _keep_road(table: Table, scene: Any) -> None:
 
 
 NOISE: dict[str, Any] = {"needs": ("virtual_measurement",), "why": "for files have the noise that they have"}
+BETWEEN = "as forces.interpolation is one word"
 HOLDING = "as one moment holds roll and pitch"
 FILTER = tuple(f"models.systems.hub_forces.{name}" for name in ("tilt_filter", "tilt_march"))
 TABLE = {
@@ -59,6 +60,16 @@ TABLE = {
         "white",
         "none",
         **NOISE,
+    ),
+    "held_forces": _chosen(
+        "Forces that stay what they are from one sample to the next",
+        "forces.interpolation",
+        "a march of its own from sample to sample",
+        {"held forces": 24},
+        "held",
+        None,
+        excludes=("smooth_forces",),
+        why=BETWEEN,
     ),
     "kalman_filter": _chosen(
         "Roll and pitch held by a moment towards a Kalman filter's estimate",
@@ -88,6 +99,8 @@ TABLE = {
         {"curves between samples": 1},
         "smooth",
         None,
+        excludes=("held_forces",),
+        why=BETWEEN,
     ),
     "turning_forces": _chosen(
         "Forces that turn with the hub or the chassis",

@@ -1,0 +1,42 @@
+"""[engines.NAME] of scenes that Runge-Kutta 4 marches: an integrator of an engine that controls its error instead."""
+
+from collections.abc import Mapping
+
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.strict import Strict
+from models.engines.catalogue import ADAPTIVE
+
+NO_ESTIMATE = "its steps are kept to a tolerance; for an error leave engines.NAME out: Runge-Kutta 4 tells it"
+"""Why a run whose integrator picks its own steps states no error: that of what drives it would be missing."""
+
+
+class Adaptive(Strict):
+    """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that picks its own steps."""
+
+    integrator: str = Field(description="DOPRI5 or ODE23 of exudyn; DOP853, Radau or LSODA of the reference")
+    tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
+
+
+def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
+    """InputError for an engine, or an integrator, that does not pick its own steps."""
+    for engine, adaptive in engines.items():
+        if engine not in ADAPTIVE:
+            allowed = "no engine with integrators that pick their own steps"
+            raise InputError(file, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
+        if adaptive.integrator not in ADAPTIVE[engine]:
+            allowed = "no integrator of this engine that picks its own steps"
+            raise InputError(file, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
+
+
+def plan_lines(engines: Mapping[str, Adaptive], step: float) -> list[tuple[str, str]]:
+    """Heads and texts of a plan: what marches in place of Runge-Kutta 4, with rows every ``step`` (s)."""
+    return [
+        (
+            engine,
+            f"{adaptive.integrator} in its place, which picks its own steps to {adaptive.tolerance:g}, "
+            f"rows every {step:g} s",
+        )
+        for engine, adaptive in engines.items()
+    ]

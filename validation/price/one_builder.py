@@ -1,0 +1,156 @@
+"""Ride and the pitch plane by the free vehicles' one builder: the same accelerations, and the seconds of a step.
+
+That builder has one kinematic tree of all bodies, and one callback of compiled forces. The compiled forces of hub
+forces read an axis that is fixed in space, too; springs and tyres are their elements here. Anti-roll bars are left out
+on both sides: ride's law of them reads the roll coordinate, which no element does.
+
+``python -m validation.price.one_builder`` prints the figures of ``docs/findings/engines.md``.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.engines import spatial_exudyn_build
+from models.engines.assembly import Settings
+from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.protocol import build as in_plane
+from models.engines.spatial_protocol import INTEGRATORS
+from models.engines.spatial_protocol import build as in_space
+from models.machine.timing import interleave, paired_ratio
+from models.multibody.cut_kernel import AXIS_JOINT, CHASSIS, ONE, POINT_ONE, TWO, joint_forces, parts, set_joint_forces
+from models.multibody.cut_table import Drive, table
+from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import build as pitch_plane_scene
+from models.vehicles.cut_vehicle import CutVehicle, Element
+from models.vehicles.description import Vehicle
+from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre, Vector
+from models.vehicles.vehicle_file import load_vehicle
+
+SEED, STEP, STEPS = 43, 1e-3, 200
+UP: Vector = (0.0, 0.0, 1.0)
+Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Sides:
+    """A vehicle twice: as its system builds it, and by the free vehicles' builder; ``sign`` of the latter's axes."""
+
+    system: Any
+    free: FreeModel
+    sign: float = 1.0
+
+    def gap(self, count: int) -> float:
+        """Largest difference of the accelerations at random states, divided by the largest of the state."""
+        rng, worst = np.random.default_rng(SEED), 0.0
+        for _ in range(count):
+            q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
+            expected = self.system.acceleration(0.0, q, v)
+            free = self.sign * self.free.acceleration(0.0, self.sign * q, self.sign * v)
+            worst = max(worst, float(np.abs(free - expected).max() / np.abs(expected).max()))
+        return worst
+
+
+def ride_vehicle() -> SpatialVehicle:
+    """Ride's 19 degrees of freedom without anti-roll bars."""
+    return replace(load_vehicle("r19_ride"), bars=())
+
+
+def ride(engine: str) -> Sides:
+    """Ride's vehicle in an engine."""
+    vehicle, settings = ride_vehicle(), Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
+    return Sides(in_space(engine, vehicle, settings), free_model(engine, driven(vehicle), settings))
+
+
+def pitch_plane(engine: str) -> Sides:
+    """The pitch plane's vehicle on its tyres in an engine; its axes count down, those of a vehicle in space up."""
+    settings = Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
+    scene = pitch_plane_scene({"title": "free", "run": {"duration": STEPS * STEP, "step": STEP}})
+    assembly = replace(assemble(scene), mode="free", input=None, initial=np.zeros(8))
+    free = free_model(engine, driven(_raised(assembly.vehicle), assembly.vehicle.gravity), settings)
+    return Sides(in_plane(engine, assembly, settings), free, -1.0)
+
+
+def _raised(plane: Vehicle) -> SpatialVehicle:
+    """A vehicle in the plane as one in space."""
+    bodies = tuple(
+        Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
+        if body.pitch_inertia is None
+        else Body(
+            body.name, body.mass, (0.0, 0.0, 0.0), ("z", "ry"), ((0, 0, 0), (0, body.pitch_inertia, 0), (0, 0, 0))
+        )
+        for body in plane.bodies
+    )
+    inside = [strut for strut in plane.struts if strut.lower.body is not None]
+    springs = tuple(
+        SpringDamper(
+            s.name, str(s.lower.body), s.upper.body, (s.lower.x, 0, 0), (s.upper.x, 0, 0), UP, s.stiffness, s.damping
+        )
+        for s in inside
+    )
+    tyres = tuple(
+        Tyre(s.name, str(s.upper.body), (s.upper.x, 0.0, 0.0), i, s.stiffness, s.damping)
+        for i, s in enumerate(plane.tyres)
+    )
+    return SpatialVehicle("pitch plane", bodies, springs, tyres, (0.0,))
+
+
+def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
+    """A vehicle on a flat road for the free vehicles' builder, all its forces compiled."""
+    tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
+    numbers = _numbers(tree, vehicle)
+    return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
+
+
+def _numbers(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
+    """The table of the compiled forces: every axis is fixed in space, and tyres begin on the ground."""
+    springs = [_element(s.name, s.one, str(s.two), s, s.point_one, s.point_two, s.axis) for s in vehicle.springs]
+    tyres = [_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
+    whole = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
+    numbers = table(whole, Drive(np.zeros((3, 0))), STEP)
+    rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
+    rows[:, AXIS_JOINT] = -1.0
+    for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):
+        row[ONE], row[POINT_ONE:TWO] = -1.0, tyre.point
+    return numbers
+
+
+def _element(
+    name: str, first: str, second: str, law: SpringDamper | Tyre, start: Vector, end: Vector, axis: Vector
+) -> Element:
+    places = (np.array(start, float), np.array(end, float), np.array(axis, float))
+    return Element(name, first, second, *places, law.stiffness, law.damping, 0.0, second)
+
+
+@contextmanager
+def one_tree() -> Iterator[None]:
+    """Within the block ride's builder in Exudyn has one tree of all bodies, and keeps its springs and callbacks."""
+    with mock.patch.object(spatial_exudyn_build, "_trees", lambda vehicle: [list(vehicle.bodies)]):
+        yield
+
+
+def ratios(rounds: int, least: float) -> dict[str, tuple[float, float, float]]:
+    """Ratios of the processor's time of a run, by the builder of today, with their intervals."""
+    jobs, names = list[Callable[[], Any]](), list[str]()
+    for engine in INTEGRATORS:
+        for system, sides in (("ride", ride(engine)), ("pitch plane", pitch_plane(engine))):
+            jobs += [sides.system.run, sides.free.run]
+            names.append(f"{system}, {engine}: the free builder to today's")
+    with one_tree():
+        jobs += [ride("exudyn").system.run]
+    seconds = interleave(jobs, rounds, least, clock=time.process_time)
+    told = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
+    return told | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
+
+
+if __name__ == "__main__":
+    for each_engine in INTEGRATORS:
+        for each in (ride, pitch_plane):
+            print(f"{each.__name__}, {each_engine}: accelerations apart by {each(each_engine).gap(100):.1e}")
+    for each_name, (middle, low, high) in ratios(15, 0.1).items():
+        print(f"{each_name}: {middle:.2f} ({low:.2f} to {high:.2f})")

@@ -1,0 +1,132 @@
+"""How hub forces are read: held, linear, and by integrators that pick their own steps, against closed forms.
+
+Forces in the axes of space move the centre of mass of all bodies as they would a point, whatever springs do inside: a
+force that is held moves it along a parabola, one that is linear along a cubic. All integrators meet both but for
+rounding, or for their tolerance.
+"""
+
+import numpy as np
+
+from models.engines.assembly import Settings
+from models.engines.cut_vehicle import ENGINES, FIXED, PLAIN, HubModel
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_table import Drive
+from models.multibody.plain.motion import PLACE, Bodies
+from models.systems.hub_forces.measurement import HubForces
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+from validation.common.rows import Observed, Row, System
+from validation.spatial.cars import anywhere, static
+from validation.spatial.written_equations import FRAMES
+
+SEED, SAMPLES, STEP, EVERY = 37, 12, 2e-3, 4
+"""Seed and count of the samples, s, and steps from one sample to the next."""
+TIGHT = 1e-11
+"""Relative tolerance of methods that pick their own steps."""
+QUICK = {"DOPRI5": "exudyn", "LSODA": "reference"}
+METHODS = QUICK | {"DOP853": "reference"}
+"""Such methods, and the engine of each; ODE23 and Radau take twenty times as long for as much."""
+SYSTEM: System = "drift"
+
+
+def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
+    """Held forces in every engine, and integrators that pick their own steps, on a vehicle."""
+    methods = QUICK if quick else METHODS
+    names = " and ".join(methods)
+    return [
+        Observed(
+            "hub_forces.held_centre",
+            SYSTEM,
+            "largest distance of the centre of mass from its parabolas, forces held from sample to sample in the axes "
+            f"of space, in {len(ENGINES)} implementations",
+            max(centre_gap(vehicle, engine, "held") for engine in ENGINES),
+            "m",
+        ).at_most(1e-9, "a step in which a stage reads the next sample is 1e-5 m off after 12 samples", "closed form"),
+        Observed(
+            "hub_forces.own_steps_centre",
+            SYSTEM,
+            f"the same of {names}, which pick their own steps, held and linear forces",
+            max(centre_gap(vehicle, m, how, name) for name, m in methods.items() for how in ("held", "linear")),
+            "m",
+        ).at_most(1e-10, f"a tolerance of {TIGHT:g} per step", "closed form"),
+        Observed(
+            "hub_forces.own_steps_path",
+            SYSTEM,
+            f"largest difference of coordinates and rates by {names} from Runge-Kutta 4 in steps of "
+            f"{1e3 * STEP / 8:g} ms",
+            max(path_gap(vehicle, engine, name) for name, engine in methods.items()),
+            "m, rad, 1/s",
+        ).at_most(1e-7, "the error of Runge-Kutta 4, which falls 16 times with half the step", "shared kernel"),
+        Observed(
+            "hub_forces.between_rows",
+            SYSTEM,
+            "relative difference of the accelerations at random times between the rows of forces and of angles from "
+            "the plain equations",
+            instants_gap(vehicle, 6),
+            "1",
+        ).at_most(1e-12, "weights of the compiled forces, differences of the plain ones", "native"),
+    ]
+
+
+def settings(integrator: str = FIXED) -> Settings:
+    """Of a run over all samples."""
+    return Settings(integrator, STEP, (SAMPLES - 1) * EVERY * STEP, TIGHT)
+
+
+def samples(vehicle: CutVehicle) -> HubForces:
+    """Static loads and 400 N, 40 N m at random, in the axes of space."""
+    rest = static(vehicle, SAMPLES, "inertial")
+    deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
+    return HubForces(rest.hubs, EVERY * STEP, "inertial").noisy(deviations, SEED)
+
+
+def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
+    """Largest distance (m) along any axis of the centre of mass from its closed form, from sample to sample."""
+    forces, how = samples(vehicle), settings(integrator)
+    run = HubModel(engine, vehicle, forces.drive(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
+    moved = centres(vehicle, run.positions[::EVERY])
+    return float(np.abs(moved - moved[0] - _fallen(vehicle, forces, interpolation == "held")).max())
+
+
+def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
+    """Centre of mass (m, 3) of all bodies at coordinates (m, n), m."""
+    bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
+    points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
+    places = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
+    return np.array([np.average(each, axis=0, weights=masses) for each in places])
+
+
+def _fallen(vehicle: CutVehicle, forces: HubForces, held: bool) -> np.ndarray:
+    """Path (samples, 3) of a point of the vehicle's mass under its weight and the sum of all forces, from rest."""
+    mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
+    hubs = forces.samples.reshape(SAMPLES, -1, WRENCH)[:, :, :3].sum(axis=1)
+    begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
+    end = begin if held else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
+    speeds = np.vstack([np.zeros(3), np.cumsum(period / 2.0 * (begin + end), axis=0)])
+    steps = period * speeds[:-1] + period**2 / 6.0 * (2.0 * begin + end)
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+
+
+def instants_gap(vehicle: CutVehicle, count: int) -> float:
+    """Relative difference of the compiled accelerations from the plain ones at random states and times, of hub forces
+    and guides at random, read between their rows."""
+    rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
+    for i in range(count):
+        hubs = static(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
+        drive = Drive(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
+        how = Settings("DOP853", STEP, (rows // 2) * STEP)
+        compiled, plain = (HubModel(engine, vehicle, drive, how) for engine in ("reference", PLAIN))
+        state, time = anywhere(vehicle, i), rng.uniform(0.0, how.duration)
+        expected = plain.acceleration(time, *state)
+        gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()
+        worst = max(worst, float(gap))
+    return worst
+
+
+def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
+    """Largest difference of any coordinate or rate of a run by an integrator that picks its own steps from Runge-Kutta
+    4 in an eighth of the step, of forces that are linear between their samples."""
+    forces, how = samples(vehicle), settings(integrator)
+    fine = Settings(FIXED, STEP / 8.0, how.duration)
+    drive, finer = (forces.drive(each.step, each.steps) for each in (how, fine))
+    run, truth = HubModel(engine, vehicle, drive, how).run(), HubModel("reference", vehicle, finer, fine).run()
+    return float(np.abs(run.states - truth.states[::8]).max())
