@@ -63,6 +63,7 @@ CASES = (
     "contact_bridges",
     "handling",
     "written_equations",
+    "adams_joints",
     "braking_stop",
     "braking_limits",
     "braking_port",
