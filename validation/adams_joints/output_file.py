@@ -36,13 +36,17 @@ class OutputFile:
         c = self.columns
         return BodyMotion(self.times, c["Pos"], c["Vel"], c["Acc"], turned, c["Avel"], c["Aacc"])
 
-    def energy_lost(self, mechanism: Mechanism) -> float:
-        """Largest change of kinetic and potential energy by the largest kinetic energy; 0 for a body at rest."""
+    def energies(self, mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+        """Kinetic energy, and its sum with the potential one (m,), J."""
         motion = self.motion(mechanism)
         inertia = motion.turned @ mechanism.inertia @ np.transpose(motion.turned, (0, 2, 1))
         kinetic = 0.5 * mechanism.mass * (motion.velocity**2).sum(axis=1)
         kinetic += 0.5 * np.einsum("mi,mij,mj->m", motion.turning, inertia, motion.turning)
-        whole = kinetic - mechanism.mass * motion.place @ mechanism.gravity
+        return kinetic, kinetic - mechanism.mass * motion.place @ mechanism.gravity
+
+    def energy_lost(self, mechanism: Mechanism) -> float:
+        """Largest change of the whole energy by the largest kinetic one; 0 for a body at rest."""
+        kinetic, whole = self.energies(mechanism)
         return float(np.abs(whole - whole[0]).max() / max(kinetic.max(), 1e-30))
 
     def reaction(self) -> Reaction:

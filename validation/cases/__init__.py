@@ -48,6 +48,7 @@ CASES = (
     "contact_simplified",
     "contact_profiles",
     "manchester",
+    "conicity",
     "ride_road",
     "ride_covariance",
     "ride_engines",
