@@ -16,6 +16,7 @@ from models.rail.equations import Y
 from models.rail.limit_cycle import maxima
 from models.rail.linear import critical_or_why, kinematic_wavelength, klingel
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
 from models.systems.wheelset.run import Linear, at_speeds, linearised, over_speeds
 from models.systems.wheelset.run import run as run_path
@@ -32,6 +33,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
 
     wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
+    conicities = conicity.run(scene) if conicity.told_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
@@ -49,16 +51,24 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         over_speeds(paths).save(folder / "paths.nc")
         paths_figure(paths, scene.title, folder / "paths.png")
         creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
+    if conicities:
+        conicities.save(folder / "conicity.nc")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer(wheelset, linear, paths),
+        "answer": _answer(wheelset, linear, paths) | (conicity.answer(conicities) if conicities else {}),
         "results": {
             **_results(paths),
             **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},
+            **({"conicity": conicities} if conicities else {}),
         },
-        "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)],
+        "table": [
+            *(conicity.lines(conicities.detail) if conicities else []),
+            *_waves(wheelset, linear),
+            *_stability(wheelset, linear),
+            *_motions(scene, paths),
+        ],
     }
 
 

@@ -13,6 +13,7 @@ from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import Orbit
 from models.rail.linear import klingel
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset.conicity import Conicities
 from models.systems.wheelset.run import Linear, at_speeds
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
@@ -166,4 +167,26 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
     heading(figure, title, results)
+    save(figure, path)
+
+
+def conicity_figure(run: Result, title: str, path: Path) -> None:
+    """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
+    conicities: Conicities = run.detail
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.6))
+    table, rows = conicities.table, conicities.rows
+    left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="difference of the rolling radii")
+    for row in rows:
+        if np.isfinite(row.centre):
+            swing = row.centre + np.array([-row.amplitude, 0.0, row.amplitude])
+            heights = 1e3 * np.interp(swing, table.displacements, table.differences)
+            left.plot(1e3 * swing, heights, "|-", color="0.7", linewidth=0.7, zorder=1)
+            left.plot(1e3 * swing[1], heights[1], "o", color=VERMILION, markersize=4)
+    left.set(xlabel="lateral displacement [mm]", ylabel="right less left [mm]", title="Rolling radii, centres of waves")
+    amplitudes = [1e3 * row.amplitude for row in rows]
+    right.plot(amplitudes, [row.equivalent for row in rows], "o-", color=BLUE, label="EN 15302")
+    right.plot(amplitudes, [row.harmonic for row in rows], "s--", color=VERMILION, label="first harmonic")
+    right.set(xlabel="amplitude, half of peak to peak [mm]", ylabel="conicity", title="Conicity", ylim=(0, None))
+    right.legend()
+    heading(figure, title, {"conicity": run})
     save(figure, path)

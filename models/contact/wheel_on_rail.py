@@ -193,11 +193,26 @@ def laid(rail: Profile, track: Track) -> Profile:
     return Profile(y - face + track.gauge / 2.0, z, inclined.smoothing)
 
 
-def placed(side: Side, shift: float, yaw: float) -> Pose:
-    """The pose in which both wheels just touch."""
+def lowest_point(side: Side, pose: Pose) -> Array:
+    """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
+    points, gap = side.gaps(pose)
+    k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
+    share = _share(gap, k)
+    return points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
+
+
+def _share(gap: Array, k: int) -> float:
+    """Where the parabola through three gaps is least, in steps from the one in the middle."""
+    rise, bend = _parabola(gap, k)
+    return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+
+
+def placed(side: Side, shift: float, yaw: float, left: Side | None = None) -> Pose:
+    """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
+    other = left or side
 
     def right_over_left(roll: float) -> float:
-        return side.clearance(Pose(shift, yaw, roll, 0.0)) - side.clearance(Pose(-shift, -yaw, -roll, 0.0))
+        return side.clearance(Pose(shift, yaw, roll, 0.0)) - other.clearance(Pose(-shift, -yaw, -roll, 0.0))
 
     if right_over_left(-STEEPEST_ROLL) * right_over_left(STEEPEST_ROLL) > 0.0:
         raise InputError("", "lateral_shift", shift, "lets only one wheel touch: profiles, gauge and shift do not fit")
@@ -219,8 +234,7 @@ def touches_of(side: Side, pose: Pose) -> list[Touch]:
 def _touch(side: Side, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
     """One touching place, where the parabola through three gaps is least, and the distance around it."""
     first, k, last = at
-    rise, bend = _parabola(gap, k)
-    share = float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+    share = _share(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))

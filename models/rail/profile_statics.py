@@ -1,13 +1,13 @@
 """A wheelset on profiles at rest on smooth rails, held sideways: heights, loads, and the cones that steer alike."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import root
 
-from models.contact.inputs import Array, quantity
+from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
+from models.rail.equivalent_conicity import harmonic_linearised_conicity
 from models.rail.profile_contact import TOUCH, Pose, pressed
 from models.rail.wheel_forces import contact_points, patches, rails_of
 from models.rail.wheelset import Wheelset
@@ -70,20 +70,4 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     """The wheelset with the cones that steer as its profiles do at an amplitude (m): for ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
     differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
-    return wheelset.coned(equivalent_conicity(shifts, differences, amplitude)).changed(profiles=None)
-
-
-def equivalent_conicity(shifts: Array, differences: Array, amplitude: float) -> float:
-    """Conicity of the cones whose first harmonic is that of profiles moving sideways as amplitude (m) times a sine.
-
-    shifts : (n,) m, ascending, from -amplitude to amplitude at least, or from 0 on for profiles alike on both sides;
-    differences : (n,) of the rolling radii (m), right less left.
-    """
-    shifts, differences = np.asarray(shifts, float), np.asarray(differences, float)
-    if shifts[0] == 0.0:
-        shifts = np.concatenate([-shifts[:0:-1], shifts])
-        differences = np.concatenate([-differences[:0:-1], differences])
-    quantity("amplitude", amplitude, f"an amplitude in m, above 0 and up to {shifts[-1]:g}", 1e-9, shifts[-1])
-    phase = 2.0 * math.pi * (np.arange(720) + 0.5) / 720
-    values = np.interp(amplitude * np.sin(phase), shifts, differences)
-    return float((values * np.sin(phase)).mean() / amplitude)
+    return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

@@ -6,14 +6,16 @@ from models.core.scene_effects import lines as effect_lines
 from models.rail.linear import critical_or_why, klingel
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.assumptions import assumptions, of_linear
+from models.systems.wheelset.conicity import check as check_conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
-from models.systems.wheelset.scene import WheelsetScene
+from models.systems.wheelset.scene import ConicityTable, WheelsetScene
 
 LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, what reading alone does not find: a wheelset or a step that cannot be."""
+    check_conicity(scene)
     for speed in path_speeds(scene):
         equations = equations_of(scene, "reference", speed)
         try:
@@ -47,6 +49,8 @@ def describe(scene: WheelsetScene) -> str:
         "paths": f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
         f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
     }
+    if scene.conicity is not None:
+        lines["conicity"] = _conicity(scene.conicity)
     told = [f"  {head:<10} {text}" for head, text in lines.items()]
     return "\n".join([scene.title, *told, *effect_lines(scene), *_assumed(scene), "", *ENGINES])
 
@@ -64,6 +68,12 @@ def _wheels(wheelset: Wheelset) -> str:
         return cones
     rails = f"{p.rail} inclined by {p.inclination:g} rad, gauge {p.gauge:g} m"
     return f"{p.wheel} of radius {w.radius:g} m on {rails}; closed forms for {cones}"
+
+
+def _conicity(asked: ConicityTable) -> str:
+    amplitudes = ", ".join(f"{1e3 * amplitude:g}" for amplitude in asked.amplitudes)
+    of = f"of {asked.table}" if asked.table else "of these wheels"
+    return f"{of}, at amplitudes of {amplitudes} mm, by EN 15302 and by the first harmonic"
 
 
 def _suspension(wheelset: Wheelset) -> str:

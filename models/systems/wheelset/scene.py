@@ -20,6 +20,12 @@ LARGEST_SHIFT, LARGEST_YAW = 0.02, 0.05
 """m, rad: beyond, no wheelset stands on its rails."""
 
 
+WHEELS_OF_SCENE = {"reach", "spacing", "right_radius", "left_radius", "left_wheel", "left_rail"}
+"""Keys of [conicity] that say which wheels the scene has."""
+MOST_PLACES = 1000
+"""Displacements on one side at which profiles are put on their rails: some hundredths of a second for each."""
+RADII = (0.1, 1.5)
+"""m: of a railway's wheels, with room."""
 MOST_CELLS = 200
 """Of FASTSIM, along each strip."""
 
@@ -50,6 +56,30 @@ class RunTable(Strict):
     )
 
 
+class ConicityTable(Strict):
+    """[conicity]: amplitudes at which the equivalent conicity is told, and the wheels that have it.
+
+    A table of rolling radius differences takes the place of the scene's cones or profiles. Beside these, the right
+    wheel has the scene's shape and radius, and the left one too unless another is named here.
+    """
+
+    amplitudes: list[float] = Field(
+        default=[0.003], min_length=1, description="half of peak to peak, m; the standard names 0.003"
+    )
+    table: str | None = Field(
+        default=None, description="CSV file with y and dr: displacement to the right, radius of the right less the left"
+    )
+    near: float | None = quantity(
+        "m", "where the wave's centre is looked for if there are several", default=None, signed=True
+    )
+    reach: float = quantity("m", "largest displacement at which profiles are put on their rails", default=0.01)
+    spacing: float = quantity("m", "between these displacements", default=1e-4)
+    right_radius: float | None = quantity("m", "rolling radius of the right wheel, if not the scene's", default=None)
+    left_radius: float | None = quantity("m", "of the left wheel", default=None)
+    left_wheel: str | None = Field(default=None, description="profile of the left wheel, built in or a file")
+    left_rail: str | None = Field(default=None, description="profile of the left rail, built in or a file")
+
+
 class WheelsetScene(SceneFile):
     """One scene of a wheelset."""
 
@@ -60,6 +90,7 @@ class WheelsetScene(SceneFile):
     contact: Creep = Creep()
     speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
     run: RunTable = RunTable()
+    conicity: ConicityTable | None = Field(default=None, description="equivalent conicity, of these wheels")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
 
@@ -68,6 +99,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
     scene = checked(WheelsetScene, table, file, folder)
     _check_speeds(scene)
     _check_run(scene)
+    _check_conicity(scene)
     if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
         raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
     return with_own(scene)
@@ -90,6 +122,34 @@ def _check_speeds(scene: WheelsetScene) -> None:
             raise InputError(scene.file, place, speed, f"must be at most {HIGHEST_SPEED:g} m/s")
         if place.startswith("run") and not speed > 0.0:
             raise InputError(scene.file, place, speed, "must be above 0, in m/s")
+
+
+def _check_conicity(scene: WheelsetScene) -> None:
+    asked = scene.conicity
+    if asked is None:
+        return
+    for i, amplitude in enumerate(asked.amplitudes):
+        if not 0.0 < amplitude <= LARGEST_SHIFT:
+            allowed = f"must be above 0 and at most {LARGEST_SHIFT:g} m: half of peak to peak"
+            raise InputError(scene.file, f"conicity.amplitudes.{i}", amplitude, allowed)
+    if asked.table is not None:
+        for key in sorted(asked.model_fields_set & WHEELS_OF_SCENE):
+            allowed = "is not read beside a table, which has both wheels in it: drop one of them"
+            raise InputError(scene.file, f"conicity.{key}", getattr(asked, key), allowed)
+        return
+    if scene.profiles is None:
+        for key in sorted(asked.model_fields_set & {"left_wheel", "left_rail", "spacing"}):
+            allowed = "needs [profiles]: without them both wheels are cones"
+            raise InputError(scene.file, f"conicity.{key}", getattr(asked, key), allowed)
+    if not (asked.reach <= LARGEST_SHIFT and asked.reach / MOST_PLACES <= asked.spacing <= asked.reach / 4.0):
+        allowed = (
+            f"must be at most a quarter of reach, at least a {MOST_PLACES}th of it; reach at most {LARGEST_SHIFT:g} m"
+        )
+        raise InputError(scene.file, "conicity.spacing", asked.spacing, allowed)
+    for key in ("right_radius", "left_radius"):
+        radius = getattr(asked, key)
+        if radius is not None and not RADII[0] <= radius <= RADII[1]:
+            raise InputError(scene.file, f"conicity.{key}", radius, f"must be from {RADII[0]:g} to {RADII[1]:g} m")
 
 
 def _check_run(scene: WheelsetScene) -> None:

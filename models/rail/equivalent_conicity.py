@@ -1,0 +1,261 @@
+"""Equivalent conicity of a wheelset from the difference of its rolling radii: EN 15302, and its first harmonic.
+
+Without slip a wheelset on straight track follows Klingel's wave, y'' = -dr(y) / (s r) over the way, with s the distance
+of the contact points and r the rolling radius. Equivalent conicity at an amplitude is that of the cones whose wave is
+as long (EN 15302:2021, clause 4). With the way in units of the root of s r the equation is
+
+    y'' = -dr(y),    conicity = (2 pi / T)^2 / 2,
+
+T the period of the amplitude; cones have dr = 2 conicity y. **The amplitude is half of peak to peak.** The wave swings
+between two places of one potential V = int dr dy, which need not lie symmetrically about y = 0: of wheels of unequal
+radius or shape they do not, and the middle between them is the wave's centre.
+
+dr is straight between the rows of a table, on which the time from one row to the next is known: with K the square of
+the speed over two, w the root of a piece's slope and l its length,
+
+    t = (2 / w) arctan(w l / (v_1 + v_2)),    arctanh where the slope is negative,
+
+which is smooth at the turning points, where v = 0. So T is exact but for rounding; what is left is how far the table's
+lines are from the true difference, which ``ConicityRow.spacing_error`` estimates.
+
+The **harmonic linearisation** (quasi-linearisation) instead takes the first harmonic of dr on a sine of that amplitude.
+Both agree on cones only.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from models.contact.inputs import Array, number, quantity
+from models.core.errors import InputError
+from models.rail.rolling_radius_table import RollingRadiusTable
+
+SMALL = 1e-6
+"""Argument below which arctan z / z is its series to rounding."""
+SAME = 1e-9
+"""Share of an amplitude within which two waves are the same, or an amplitude is that of the table's ends."""
+NODES = 720
+"""Phases of the first harmonic."""
+
+
+@dataclass(frozen=True)
+class KlingelWave:
+    """Klingel's wave of an amplitude, in the table's unit of length.
+
+    centre : middle between both turning points ``lowest`` and ``highest``. period : T of y'' = -dr(y); infinite where
+    dr is zero over the whole of the amplitude: then the wheelset does not steer, the conicity is 0 and there is no
+    wave. conicity : -.
+    """
+
+    amplitude: float
+    centre: float
+    period: float
+
+    @property
+    def lowest(self) -> float:
+        """Turning point to the left."""
+        return self.centre - self.amplitude
+
+    @property
+    def highest(self) -> float:
+        """Turning point to the right."""
+        return self.centre + self.amplitude
+
+    @property
+    def conicity(self) -> float:
+        """Equivalent conicity by EN 15302."""
+        return 0.5 * (2.0 * math.pi / self.period) ** 2
+
+    def wavelength(self, radius: float, spacing: float) -> float:
+        """Length (m) of the wave on the track, for a rolling radius and a distance of the contact points (m)."""
+        return self.period * math.sqrt(radius * spacing)
+
+
+def equivalent_conicity(
+    displacements: Array, differences: Array, amplitude: float, *, near: float | None = None
+) -> float:
+    """Equivalent conicity by EN 15302 at an amplitude, which is half of peak to peak; see ``klingel_wave``.
+
+    displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
+    amplitude : above 0. All in one unit of length.
+    """
+    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, near=near).conicity
+
+
+def klingel_wave(table: RollingRadiusTable, amplitude: float, *, near: float | None = None) -> KlingelWave:
+    """Klingel's wave of an amplitude (the table's unit, half of peak to peak).
+
+    near : where the centre is looked for, if several waves have this amplitude. Raises InputError where there is no
+    wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the table; or
+    where there are several and ``near`` is not given.
+    """
+    amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
+    first, last = table.ends
+    if 0.0 <= 2.0 * amplitude - (last - first) <= SAME * amplitude:
+        amplitude = (last - first) / 2.0
+    if 2.0 * amplitude > last - first:
+        allowed = f"is half of peak to peak, and the table goes from {first:g} to {last:g}: it cannot hold the wave"
+        raise InputError(table.source, "amplitude", amplitude, allowed)
+    waves = [wave for low in _turning_points(table, amplitude) if (wave := _wave(table, low, amplitude)) is not None]
+    if not waves:
+        return _without_wave(table, amplitude)
+    if len(waves) > 1 and near is None:
+        centres = ", ".join(f"{wave.centre:.6g}" for wave in waves)
+        allowed = f"has {len(waves)} waves, about {centres}: smooth the table, or choose one by near"
+        raise InputError(table.source, "amplitude", amplitude, allowed)
+    return min(waves, key=lambda wave: abs(wave.centre - (near or 0.0)))
+
+
+def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
+    """Where waves of an amplitude may turn back on their left side: both ends of the swing have one potential.
+
+    Between the displacements at which either end meets a row, the difference of both potentials is a parabola.
+    """
+    y, width = table.displacements, 2.0 * amplitude
+    places = np.unique(np.concatenate([y, y - width, [y[-1] - width]]))
+    places = places[(places >= y[0]) & (places <= y[-1] - width)]
+    points: list[float] = []
+    for low, high in pairwise(places.tolist()):
+        begin, middle, end = (
+            table.integral(low + share * (high - low) + width) - table.integral(low + share * (high - low))
+            for share in (0.0, 0.5, 1.0)
+        )
+        points += [float(low + share * (high - low)) for share in _roots(begin, middle, end)]
+    if len(places) == 1:
+        points = [float(places[0])]
+    apart = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > SAME * amplitude]
+    return [points[k] for k in apart]
+
+
+def _roots(begin: float, middle: float, end: float) -> list[float]:
+    """Zeros from 0 to 1 of the parabola with these values at 0, 1/2 and 1; none of one that is zero throughout."""
+    bend, slope = 2.0 * (begin - 2.0 * middle + end), 4.0 * middle - 3.0 * begin - end
+    scale = max(abs(begin), abs(middle), abs(end))
+    if scale == 0.0:
+        return []
+    if abs(bend) <= 1e-14 * abs(slope):
+        roots = [-begin / slope] if slope else []
+    elif (inside := slope * slope - 4.0 * bend * begin) < 0.0:
+        roots = []
+    else:
+        half = -0.5 * (slope + math.copysign(math.sqrt(inside), slope))
+        roots = [half / bend] + ([begin / half] if half else [])
+    return sorted(min(max(root, 0.0), 1.0) for root in roots if -1e-12 <= root <= 1.0 + 1e-12)
+
+
+def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
+    """The wave that turns back at ``low``; None where the wheelset would not come across, or not come back."""
+    y, dr = table.between(low, low + 2.0 * amplitude)
+    if dr[0] > 0.0 or dr[-1] < 0.0:
+        return None
+    length = np.diff(y)
+    if y.size == 2:  # within one straight piece, which makes a sine
+        slope = float(dr[1] - dr[0]) / (2.0 * amplitude)
+        return KlingelWave(amplitude, low + amplitude, 2.0 * math.pi / math.sqrt(slope)) if slope > 0.0 else None
+    energy = _energy(dr, length)
+    if not ((energy[1:-1] > 0.0).all() and (_least(dr, length, energy) > 0.0).all()):
+        return None
+    speed = np.sqrt(2.0 * energy)
+    speed[0] = speed[-1] = 0.0
+    moving = length > 0.0
+    way = length[moving] / (speed[1:] + speed[:-1])[moving]
+    return KlingelWave(amplitude, low + amplitude, 2.0 * float(_times(way, np.diff(dr)[moving] / length[moving]).sum()))
+
+
+def _energy(dr: Array, length: Array) -> Array:
+    """v^2 / 2 (n,) at the rows of a swing, each summed from the nearer turning point, where it is small."""
+    work = length * (dr[1:] + dr[:-1]) / 2.0
+    from_left, from_right = -np.append(0.0, np.cumsum(work)), np.append(np.cumsum(work[::-1])[::-1], 0.0)
+    return np.where(np.arange(len(dr)) <= np.argmax(from_left), from_left, from_right)
+
+
+def _least(dr: Array, length: Array, energy: Array) -> Array:
+    """Energy where the potential is highest within a piece: where a falling difference passes zero."""
+    falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
+    way = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
+    return energy[:-1][falls] - 0.5 * way * dr[:-1][falls]
+
+
+def _times(way: Array, slope: Array) -> Array:
+    """Time (n,) across pieces of dr: ``way``, length by the sum of the speeds at both ends; slope of dr."""
+    root = np.sqrt(np.abs(slope))
+    angle = root * way
+    small, rising = angle < SMALL, slope > 0.0
+    safe = np.where(small, 1.0, root)
+    across = np.where(rising, np.arctan(angle), np.arctanh(np.where(rising, 0.0, np.minimum(angle, 1.0 - 1e-16))))
+    return 2.0 * np.where(small, way, across / safe)
+
+
+def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
+    """No conicity where the wheels do not steer over the whole swing; else the error that says why no wave is there."""
+    idle = _idle(table, amplitude)
+    if idle is not None:
+        return KlingelWave(amplitude, idle, math.inf)
+    dr, (first, last) = table.differences, table.ends
+    rises = table.difference(last, "left") - table.difference(first)
+    if (dr >= 0.0).all() or (dr <= 0.0).all():
+        why = f"has no wave: dr does not change its sign from {first:g} to {last:g}, so that nothing swings"
+    elif rises < 0.0:
+        why = "has no wave: dr falls with the displacement; is it left less right? Right less left is wanted"
+    else:
+        why = f"has no wave within the table, from {first:g} to {last:g}: it would swing beyond, or not come across"
+    raise InputError(table.source, "amplitude", amplitude, why)
+
+
+def _idle(table: RollingRadiusTable, amplitude: float) -> float | None:
+    """Middle of a stretch of zeros that holds the whole swing, the one nearest to y = 0; None if there is none."""
+    y, zero = table.displacements, table.differences == 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], zero.astype(int), [0]])))
+    stretches = [(float(y[a]), float(y[b - 1])) for a, b in edges.reshape(-1, 2)]
+    wide = [(low + high) / 2.0 for low, high in stretches if high - low >= 2.0 * amplitude * (1.0 - SAME)]
+    return min(wide, key=abs) if wide else None
+
+
+def harmonic_linearised_conicity(
+    displacements: Array, differences: Array, amplitude: float, centre: float = 0.0
+) -> float:
+    """Conicity of the cones whose first harmonic is that of wheels that move as ``amplitude`` times a sine.
+
+    displacements : (n,) ascending, over the whole of the swing about ``centre``, or from 0 on for wheels that are alike
+    and a swing about 0; differences : (n,) of the rolling radii, right less left. All in one unit of length.
+    """
+    displacements, differences = np.asarray(displacements, float), np.asarray(differences, float)
+    if displacements[0] == 0.0:
+        displacements = np.concatenate([-displacements[:0:-1], displacements])
+        differences = np.concatenate([-differences[:0:-1], differences])
+    most = min(displacements[-1] - centre, centre - displacements[0])
+    quantity("amplitude", amplitude, f"an amplitude above 0 and up to {most:g}, the table's", 1e-12, most)
+    phase = 2.0 * math.pi * (np.arange(NODES) + 0.5) / NODES
+    values = np.interp(centre + amplitude * np.sin(phase), displacements, differences)
+    return float((values * np.sin(phase)).mean() / amplitude)
+
+
+@dataclass(frozen=True)
+class ConicityRow:
+    """Both conicities at an amplitude (m): the standard's with the wave's centre (m), the first harmonic about it.
+
+    spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
+    such wave.
+    """
+
+    amplitude: float
+    centre: float
+    period: float
+    equivalent: float
+    harmonic: float
+    spacing_error: float
+
+
+def conicity_row(table: RollingRadiusTable, amplitude: float, *, near: float | None = None) -> ConicityRow:
+    """Both conicities of a table at an amplitude; InputError as ``klingel_wave``."""
+    wave = klingel_wave(table, amplitude, near=near)
+    harmonic = harmonic_linearised_conicity(
+        table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
+    )
+    try:
+        coarse = klingel_wave(table.thinned(), amplitude, near=wave.centre).conicity
+    except InputError:
+        coarse = math.nan
+    return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -1,0 +1,152 @@
+"""Tables of the difference of rolling radii over the lateral displacement of a wheelset.
+
+The difference dr is the rolling radius of the right wheel less that of the left one; the displacement y is positive to
+the right, so that dr rises with y where a wheelset steers back to the middle. Between two rows dr is a straight line;
+two rows at one displacement are a jump. A table is measured, written down, or worked out from profiles here.
+
+Where profiles first touch is found without load, with the roll that lets both wheels touch, and without yaw.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.contact.inputs import Array, quantity
+from models.contact.wheel_on_rail import Pose, Side, lowest_point, placed
+from models.core.errors import InputError
+from models.core.tables import METRES, read_table
+
+COLUMNS = {"y": METRES, "dr": METRES}
+"""Of a file: displacement to the right, rolling radius of the right wheel less that of the left one."""
+LEAST = 3
+"""Rows of a table."""
+
+
+@dataclass(frozen=True, eq=False)
+class RollingRadiusTable:
+    """displacements (n,), rising but for pairs that are jumps, and differences (n,), in one unit of length.
+
+    source : the file, for messages. Descending rows are turned round. Raises InputError for values that are not finite,
+    fewer than three rows, rows out of order, and three rows at one displacement.
+    """
+
+    displacements: Array
+    differences: Array
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        y, dr = (quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences"))
+        if y.ndim != 1 or y.shape != dr.shape or y.size < LEAST:
+            shapes = [list(y.shape), list(dr.shape)]
+            raise InputError(self.source, "table", shapes, f"must be two columns of {LEAST} rows or more, as long")
+        if y[0] > y[-1]:
+            y, dr = y[::-1], dr[::-1]
+        self._check_order(y)
+        repeated = np.append(False, (np.diff(y) == 0.0) & (np.diff(dr) == 0.0))
+        object.__setattr__(self, "displacements", y[~repeated])
+        object.__setattr__(self, "differences", dr[~repeated])
+
+    def _check_order(self, y: Array) -> None:
+        steps = np.diff(y)
+        back = np.flatnonzero(steps < 0.0)
+        if back.size:
+            i = int(back[0]) + 1
+            allowed = f"comes after {y[i - 1]:g}: displacements must rise (or fall) from row to row; sort the table"
+            raise InputError(self.source, f"displacement, row {i + 1}", float(y[i]), allowed)
+        thrice = np.flatnonzero((steps[1:] == 0.0) & (steps[:-1] == 0.0))
+        if thrice.size:
+            i = int(thrice[0])
+            allowed = "stands in three rows: two rows at one displacement are a jump, three have no meaning"
+            raise InputError(self.source, f"displacement, row {i + 3}", float(y[i]), allowed)
+
+    @cached_property
+    def potential(self) -> Array:
+        """Integral (n,) of the difference from the first row on, the square of the table's unit."""
+        y, dr = self.displacements, self.differences
+        return np.append(0.0, np.cumsum(np.diff(y) * (dr[1:] + dr[:-1]) / 2.0))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last displacement."""
+        return float(self.displacements[0]), float(self.displacements[-1])
+
+    def between(self, low: float, high: float) -> tuple[Array, Array]:
+        """Displacements and differences of the part from ``low`` to ``high``, both ends in it."""
+        y, dr = self.displacements, self.differences
+        first, last = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
+        ends = self.difference(low, "right"), self.difference(high, "left")
+        return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
+
+    def difference(self, place: float, side: Any = "right") -> float:
+        """The difference at a displacement; at a jump the value to its left or right."""
+        i, share = self._piece(place, side)
+        dr = self.differences
+        return float(dr[i] + share * (dr[i + 1] - dr[i]))
+
+    def integral(self, place: float) -> float:
+        """The potential at a displacement."""
+        i, share = self._piece(place, "right")
+        y, dr = self.displacements, self.differences
+        step = share * (y[i + 1] - y[i])
+        return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
+
+    def _piece(self, place: float, side: Any) -> tuple[int, float]:
+        """The row before a displacement, and the share of the way from there to the next one."""
+        y = self.displacements
+        i = int(np.clip(np.searchsorted(y, place, side) - 1, 0, y.size - 2))
+        width = y[i + 1] - y[i]
+        return i, float((place - y[i]) / width) if width > 0.0 else 0.0
+
+    def thinned(self) -> "RollingRadiusTable":
+        """The table without every other row, both ends kept: what its spacing costs."""
+        kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
+        return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
+
+
+def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
+    """The table in a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; here in m.
+
+    InputError names the line that is wrong.
+    """
+    table = read_table(path, COLUMNS, least=LEAST)
+    return RollingRadiusTable(table["y"], table["dr"], str(path))
+
+
+def rolling_radii_of(
+    right: Side, left: Side, displacements: Array, told: Callable[[float], Any] = lambda share: None
+) -> RollingRadiusTable:
+    """The table of two wheels on their rails; the left one is described as a right one seen in a mirror.
+
+    displacements : (n,) m, rising. Those at the ends at which not both wheels touch are left out. told : called with
+    the share that is done. Raises InputError where fewer than three are left.
+    """
+    shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
+    rows = []
+    for k, shift in enumerate(shifts.tolist()):
+        told(k / shifts.size)
+        try:
+            rows.append((shift, *_radii(right, left, shift)))
+        except InputError:
+            if rows and shift > 0.0:
+                break
+            rows = []
+    if len(rows) < LEAST:
+        raise InputError("", "displacements", None, "both wheels touch their rails at fewer than three of them")
+    y, of_right, of_left = np.array(rows).T
+    return RollingRadiusTable(y, of_right - of_left)
+
+
+def _radii(right: Side, left: Side, shift: float) -> tuple[float, float]:
+    """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
+    pose = placed(right, shift, 0.0, left)
+    return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
+
+
+def rolling_radius(side: Side, pose: Pose) -> float:
+    """Radius (m) of a wheel where it comes nearest to its rail."""
+    across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
+    return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))

@@ -1,0 +1,149 @@
+"""Equivalent conicity of a scene's wheels, or of a table: by EN 15302 and by the first harmonic, at each amplitude."""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.result import Channel, Result, result
+from models.core.tables import write_table
+from models.rail.equivalent_conicity import ConicityRow, conicity_row
+from models.rail.laid_profiles import Profiles
+from models.rail.rolling_radius_table import RollingRadiusTable, read_rolling_radii, rolling_radii_of
+from models.rail.wheelset import Wheelset
+from models.systems.wheelset.of_scene import wheelset_of
+from models.systems.wheelset.scene import ConicityTable, WheelsetScene
+
+CHANNELS = {
+    "centre": ("m", "of the wave, to the right"),
+    "equivalent": ("-", "equivalent conicity by EN 15302"),
+    "harmonic": ("-", "conicity of the harmonic linearisation"),
+    "spacing_error": ("-", "of the standard's: its difference on the table without every other row"),
+    "wavelength": ("m", "of Klingel's wave on the track"),
+}
+"""What is saved at each amplitude, with its unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conicities:
+    """table : differences of rolling radii (m). rows : at each amplitude, not a number where there is no wave. why :
+    by amplitude (m), the reason there. source : what the table is of, in words. wavelengths (m) of the rows."""
+
+    table: RollingRadiusTable
+    rows: tuple[ConicityRow, ...]
+    why: dict[float, str]
+    source: str
+    wavelengths: tuple[float, ...]
+
+    def save_table(self, path: Path) -> None:
+        """Write the differences as a table that ``read_rolling_radii`` reads."""
+        write_table(path, {"y": ("m", self.table.displacements), "dr": ("m", self.table.differences)})
+
+
+def told_conicity(scene: WheelsetScene) -> bool:
+    """Whether the conicity is told of a scene that does not ask for it alone: where it asks, and on profiles."""
+    return scene.conicity is not None or wheelset_of(scene).profiles is not None
+
+
+def run(scene: WheelsetScene, told: Callable[[float], Any] = lambda share: None) -> Result:
+    """Both conicities at the scene's amplitudes; the detail are ``Conicities``.
+
+    told : called with the share of the rolling radii that is done. InputError for a file that is no table and for
+    wheels that do not stand on their rails; an amplitude without a wave is a doubt.
+    """
+    asked, wheelset = scene.conicity or ConicityTable(), wheelset_of(scene)
+    table, source = _table(scene, asked, wheelset, told)
+    rows, why = list[ConicityRow](), dict[float, str]()
+    for amplitude in asked.amplitudes:
+        try:
+            rows.append(conicity_row(table, amplitude, near=asked.near))
+        except InputError as error:
+            rows.append(ConicityRow(amplitude, *[math.nan] * 5))
+            why[amplitude] = error.allowed
+    track = math.sqrt(wheelset.radius * 2.0 * wheelset.half_gauge)
+    detail = Conicities(table, tuple(rows), why, source, tuple(row.period * track for row in rows))
+    values = [asdict(row) | {"wavelength": row.period * track} for row in rows]
+    channels = {
+        name: Channel("amplitude", np.array([row[name] for row in values]), unit, meaning)
+        for name, (unit, meaning) in CHANNELS.items()
+    }
+    axis = Channel("amplitude", np.array(asked.amplitudes), "m")
+    doubts = [f"at {amplitude:g} m: {reason}" for amplitude, reason in why.items()]
+    return result(scene, channels, {"amplitude": axis}, engine="reference", doubts=doubts, detail=detail)
+
+
+def check(scene: WheelsetScene) -> None:
+    """Refuse a file that is no table, and a left side that is no profile, before anything is computed."""
+    asked = scene.conicity or ConicityTable()
+    if asked.table is not None:
+        read_rolling_radii(scene.path(asked.table, "conicity.table"))
+    elif (profiles := wheelset_of(scene).profiles) is not None:
+        _left(scene, asked, profiles)
+
+
+def _left(scene: WheelsetScene, asked: ConicityTable, profiles: Profiles) -> Profiles:
+    """Cross-sections of the left side."""
+    named = {key: value for key, value in (("wheel", asked.left_wheel), ("rail", asked.left_rail)) if value is not None}
+    return profiles.model_copy(update=named).located(scene) if named else profiles
+
+
+def _table(
+    scene: WheelsetScene, asked: ConicityTable, wheelset: Wheelset, told: Callable[[float], Any]
+) -> tuple[RollingRadiusTable, str]:
+    if asked.table is not None:
+        return read_rolling_radii(scene.path(asked.table, "conicity.table")), asked.table
+    right, left = asked.right_radius or wheelset.radius, asked.left_radius or wheelset.radius
+    radii = f"radius {right:g} m" if right == left else f"radii {right:g} m right, {left:g} m left"
+    if wheelset.profiles is None:
+        half = max(asked.amplitudes) + abs(right - left) / wheelset.equivalent_conicity
+        y = np.array([-half, 0.0, half])
+        cones = f"cones of conicity {wheelset.conicity:g}, {radii}"
+        return RollingRadiusTable(y, 2.0 * wheelset.equivalent_conicity * y + right - left), cones
+    profiles = wheelset.profiles
+    of_left = _left(scene, asked, profiles)
+    count = round(asked.reach / asked.spacing)
+    displacements = asked.reach * np.arange(-count, count + 1) / count
+    sides = f"{profiles.wheel} on {profiles.rail}"
+    sides += f", left {of_left.wheel} on {of_left.rail}" if of_left != profiles else ""
+    table = rolling_radii_of(profiles.side(right), of_left.side(left), displacements, told)
+    return replace(table, source=sides), f"{sides}, {radii}"
+
+
+def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
+    """InputError where no amplitude of a scene has a wave."""
+    if len(conicities.why) == len(conicities.rows):
+        amplitude, why = next(iter(conicities.why.items()))
+        table = scene.conicity.table if scene.conicity else None
+        raise InputError(table or scene.file, "conicity.amplitudes", amplitude, why)
+
+
+def answer(run_of_scene: Result) -> dict[str, Any]:
+    """Both conicities as plain numbers at each amplitude (m), the wave's centre (m); None where there is no wave."""
+    rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
+    return {
+        "conicity": [
+            {name: value if math.isfinite(value) else None for name, value in asdict(row).items() if name != "period"}
+            for row in rows
+        ]
+    }
+
+
+def lines(conicities: Conicities) -> list[str]:
+    """Both conicities at every amplitude, as text."""
+    head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
+    told = [f"  equivalent conicity of {conicities.source}", head]
+    for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):
+        if row.amplitude in conicities.why:
+            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.why[row.amplitude]}")
+            continue
+        error = f"{row.spacing_error:>10.1g}" if math.isfinite(row.spacing_error) else f"{'-':>10}"
+        wave = f"{wavelength:>12.5g} m" if math.isfinite(wavelength) else f"{'no wave':>14}"
+        told.append(
+            f"    {1e3 * row.amplitude:>9.4g} mm{row.equivalent:>12.5f}{error}{row.harmonic:>14.5f}"
+            f"{1e3 * row.centre + 0.0:>10.4f} mm{wave}"
+        )
+    return told

@@ -1,0 +1,40 @@
+"""Equivalent conicity of a wheelset by EN 15302 and by the first harmonic, from a table or from profiles."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from models.systems.wheelset import conicity
+from models.systems.wheelset.scene import WheelsetScene
+
+SYSTEM = "wheelset"
+Progress = Callable[[str, float], None]
+
+
+def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Both conicities at each amplitude; saves ``conicity.nc``, ``conicity.csv``, ``rolling_radii.csv``, a figure.
+
+    ``rolling_radii.csv`` holds the differences that were used and can be read as a table again.
+    """
+    from studies.wheelset_figures import conicity_figure
+
+    conicities = conicity.run(scene, lambda share: progress("rolling radii", 0.9 * share))
+    conicity.refuse_without_wave(scene, conicities.detail)
+    conicities.save(folder / "conicity.nc")
+    conicities.save_table(folder / "conicity.csv", "amplitude", *conicity.CHANNELS)
+    conicities.detail.save_table(folder / "rolling_radii.csv")
+    conicity_figure(conicities, scene.title, folder / "conicity.png")
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": conicity.answer(conicities),
+        "results": {"conicity": conicities},
+        "table": conicity.lines(conicities.detail),
+    }
+
+
+if __name__ == "__main__":
+    from studies.command_line import study
+
+    study("conicity")

@@ -1,0 +1,193 @@
+"""A mechanism on the common description: a chain of slides and hinges, for the engines.
+
+The vehicle's axes are laid along those of the joint, so that slides and hinges need no others; gravity then points
+anywhere. A universal joint is two hinges, a ball three, a distance a massless rod on two hinges with a ball at its end:
+neither engine then needs a constraint, and a step costs no projection. Three hinges in a row cannot tell the first
+from the last where the second has turned by 90 degrees, as two cannot once the rod lies along the first: of several
+ways to lay the axes the one is taken that stays farthest from there on the reference's path.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.core.errors import InputError, Refused
+from models.engines.assembly import Settings
+from models.engines.free_vehicle import Driven, free_model
+from models.vehicles.free_vehicle import joints
+from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
+from validation.adams_joints.mechanism import Mechanism
+from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_momentum
+from validation.adams_joints.spring_kernel import set_spring_forces, spring_forces, spring_table
+
+NEAREST = 0.05
+"""Least cosine of the second of three hinges on the whole path."""
+BREAKS = 1e-9
+"""m/s, rad/s: start velocities that the joint does not allow."""
+BODY = "body"
+
+
+@dataclass(frozen=True, eq=False)
+class JointTree:
+    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in those of the ground."""
+
+    mechanism: Mechanism
+    axes: np.ndarray
+
+    def local(self, vector: np.ndarray) -> np.ndarray:
+        """A vector of the ground's axes in the vehicle's."""
+        return self.axes.T @ vector
+
+    def vehicle(self) -> SpatialVehicle:
+        """Joints as massless bodies, then the body at its centre."""
+        m = self.mechanism
+        ground, end = _vector(self.local(m.ground.place)), _vector(self.local(m.body.place))
+        held = {
+            "revolute": [Body("joint", 0.0, end, ("rz",))],
+            "prismatic": [Body("joint", 0.0, end, ("z",))],
+            "cylindrical": [Body("joint", 0.0, end, ("z", "rz"))],
+            "spherical": [Body("joint", 0.0, end, ("rx", "ry", "rz"))],
+            "universal": [Body("cross", 0.0, end, ("rx",)), Body("joint", 0.0, end, ("ry",), parent="cross")],
+            "distance": [
+                Body("rod", 0.0, ground, ("rx", "ry")),
+                Body("joint", 0.0, end, ("rx", "ry", "rz"), parent="rod"),
+            ],
+            "free": [Body("joint", 0.0, _vector(self.local(m.centre)), FREEDOMS)],
+        }[m.kind]
+        inertia = self.axes.T @ m.inertia @ self.axes
+        rows = tuple(_vector(row) for row in 0.5 * (inertia + inertia.T))
+        body = Body(BODY, m.mass, _vector(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), held[-1].name)
+        return SpatialVehicle("mechanism", (*held, body), (), (), ())
+
+    def driven(self) -> Driven:
+        """What an engine builds."""
+        vehicle = self.vehicle()
+        springs = [
+            replace(spring, ground=self.local(spring.ground), body=self.local(spring.body))
+            for spring in self.mechanism.springs
+        ]
+        gravity = self.local(self.mechanism.gravity)
+        return Driven(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
+
+    def motion(self, times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
+        """The body by coordinates, rates and accelerations (m, n) of the joints, in the axes of the ground."""
+        place, velocity, acceleration, turned, turning, spin_up = _walked(self.vehicle(), q, v, a)
+        out = self.axes.T
+        return BodyMotion(
+            times,
+            place @ out,
+            velocity @ out,
+            acceleration @ out,
+            self.axes @ turned @ out,
+            turning @ out,
+            spin_up @ out,
+        )
+
+    def start_rates(self) -> np.ndarray:
+        """Rates (n,) of the joints at the start; InputError where the joint does not allow the body's velocity."""
+        n = len(self.vehicle().coordinates())
+        zero, unit = np.zeros((n, n)), np.eye(n)
+        each = self.motion(np.zeros(n), zero, unit, zero)
+        columns = np.hstack([each.velocity, each.turning]).T
+        wanted = np.concatenate([self.mechanism.velocity, self.mechanism.turning])
+        rates = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+        if np.abs(columns @ rates - wanted).max() > BREAKS:
+            raise InputError("", "PART, V and W", wanted.tolist(), "is no velocity that the joint allows at the start")
+        return rates
+
+    def run(self, engine: str, duration: float, step: float, every: int) -> tuple[BodyMotion, Reaction]:
+        """Motion and reaction in an engine at every so many of its steps (s), reactions from its accelerations."""
+        model = free_model(engine, self.driven(), Settings("RK44", step, duration))
+        rates = self.start_rates()
+        states = model.march(0.0 * rates, rates, round(duration / step), step)[::every]
+        q, v = np.split(states, 2, axis=1)
+        times = step * every * np.arange(len(q))
+        a = np.array([model.acceleration(t, *row) for t, *row in zip(times.tolist(), q, v, strict=True)])
+        motion = self.motion(times, q, v, a)
+        return motion, reaction_by_momentum(self.mechanism, motion)
+
+
+def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
+    """The chain whose hinges stay apart on a path; Refused where none does."""
+    trees = [JointTree(mechanism, axes) for axes in _layouts(mechanism)]
+    apart = [_apart(tree, path) for tree in trees]
+    best = int(np.argmax(apart))
+    if apart[best] < NEAREST:
+        raise Refused("joint tree", "the body turns so far that two hinges of its ball fall into one in every layout")
+    return trees[best]
+
+
+def _layouts(m: Mechanism) -> list[np.ndarray]:
+    """Axes that the vehicle may have."""
+    if m.kind in ("revolute", "prismatic", "cylindrical"):
+        return [m.ground.axes]
+    if m.kind == "universal":
+        x, y = m.ground.axes[:, 2], m.body.axes[:, 2]
+        return [np.column_stack([x, y, np.cross(x, y)])]
+    arm = (m.body.place if m.kind == "distance" else m.centre) - m.ground.place
+    along = arm / np.linalg.norm(arm) if np.linalg.norm(arm) > 0.0 else np.array([0.0, 0.0, 1.0])
+    side = np.cross(along, m.gravity)
+    if np.linalg.norm(side) < 1e-6 * (1.0 + np.linalg.norm(m.gravity)):
+        side = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    x = side / np.linalg.norm(side)
+    base = np.column_stack([x, np.cross(along, x), along])
+    if m.kind == "distance":
+        return [base, np.column_stack([base[:, 1], -base[:, 0], base[:, 2]])]
+    return [np.roll(base, shift, axis=1) for shift in range(3)]
+
+
+def _apart(tree: JointTree, path: BodyMotion) -> float:
+    """Least cosine of the second hinge of a ball or a rod on a path; 1 where there is none."""
+    if tree.mechanism.kind not in ("spherical", "free", "distance"):
+        return 1.0
+    turned = tree.axes.T @ path.turned @ tree.axes
+    if tree.mechanism.kind != "distance":
+        return float(np.sqrt(1.0 - np.minimum(turned[:, 0, 2] ** 2, 1.0)).min())
+    m = tree.mechanism
+    end = path.place + path.turned @ (m.body.place - m.centre)
+    d = (end - m.ground.place) @ tree.axes / m.length
+    of_rod = np.sqrt(np.maximum(1.0 - d[:, 0] ** 2, 0.0))
+    tilt = np.arctan2(-d[:, 1], d[:, 2])
+    first = np.column_stack([of_rod, d[:, 0] * np.sin(tilt), -d[:, 0] * np.cos(tilt)])  # the rod's own x axis
+    of_ball = np.sqrt(1.0 - np.minimum(np.einsum("mi,mi->m", first, turned[:, :, 2]) ** 2, 1.0))
+    return float(min(of_rod.min(), of_ball.min()))
+
+
+def _walked(vehicle: SpatialVehicle, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Place, velocity, acceleration (m, 3), rotation (m, 3, 3), angular velocity and acceleration (m, 3) of the last
+    body of a chain, in the vehicle's axes, by relative motion from joint to joint."""
+    count = len(q)
+    x, w, alpha = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
+    speed, gain, turned = np.zeros((count, 3)), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+    kinds, origin = joints(vehicle), np.zeros(3)
+    places = [(int(kind), tuple(arm)) for kind, _, *arm in kinds]
+    for j, (kind, arm) in enumerate(places):
+        origin = origin + arm
+        axis = turned[:, :, kind % 3]
+        reach = turned @ np.array(arm) + (axis * q[:, j : j + 1] if kind < 3 else 0.0)
+        x, gain = x + reach, gain + np.cross(alpha, reach) + np.cross(w, np.cross(w, reach))
+        speed = speed + np.cross(w, reach)
+        rate, more = axis * v[:, j : j + 1], axis * a[:, j : j + 1]
+        if kind < 3:
+            speed, gain = speed + rate, gain + more + 2.0 * np.cross(w, rate)
+        else:
+            w, alpha = w + rate, alpha + more + np.cross(w, rate)
+            turned = turned @ _turns(kind % 3, q[:, j])
+    reach = turned @ (np.array(vehicle.bodies[-1].position) - origin)
+    gain = gain + np.cross(alpha, reach) + np.cross(w, np.cross(w, reach))
+    return x + reach, speed + np.cross(w, reach), gain, turned, w, alpha
+
+
+def _turns(axis: int, angle: np.ndarray) -> np.ndarray:
+    """Rotations (m, 3, 3) about an axis by angles (m,)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turns = np.tile(np.eye(3), (len(angle), 1, 1))
+    turns[:, i, i] = turns[:, j, j] = np.cos(angle)
+    turns[:, j, i] = np.sin(angle)
+    turns[:, i, j] = -turns[:, j, i]
+    return turns
+
+
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,282 @@
+"""One rigid body and what holds it to the ground, from the statements of a model file.
+
+Everything is in SI and in the axes of the ground, at the start. The ground's markers lie where the file says; those of
+the body follow its own frame. Inertia is about the centre of mass.
+"""
+
+import ast
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.core.errors import InputError
+from validation.adams_joints.model_file import Statement, read_statements
+
+Kind = Literal["revolute", "prismatic", "cylindrical", "spherical", "universal", "distance", "free"]
+JOINTS: dict[str, Kind] = {
+    "REVOLUTE": "revolute",
+    "TRANSLATIONAL": "prismatic",
+    "CYLINDRICAL": "cylindrical",
+    "SPHERICAL": "spherical",
+    "HOOKE": "universal",
+}
+CLOSE = 1e-6
+"""m and rad within which a joint must be assembled at the start; angles in files have six digits or more."""
+NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """part : number of its part. place (3,): m. axes (3, 3): its axes as columns."""
+
+    part: int
+    place: np.ndarray
+    axes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Spring:
+    """A spring and damper from the ground to the body.
+
+    turns : about the joint's axis, or else along the line between both points. ground, body (3,): points at the start
+    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), rest : length (m) or angle (rad) without force.
+    """
+
+    turns: bool
+    ground: np.ndarray
+    body: np.ndarray
+    stiffness: float
+    damping: float
+    rest: float
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """mass (kg), centre (3,) m, inertia (3, 3) kg m^2, axes (3, 3) of the centre's marker; gravity (3,) m/s^2.
+
+    kind, ground, body : the joint and its markers on both; length (m): of a distance. velocity (3,) m/s, turning (3,)
+    rad/s : of the centre and the body at the start. on_body : whether the joint's first marker, at which reactions are
+    told, is the body's.
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    axes: np.ndarray
+    gravity: np.ndarray
+    kind: Kind
+    ground: Marker
+    body: Marker
+    length: float
+    springs: tuple[Spring, ...]
+    velocity: np.ndarray
+    turning: np.ndarray
+    on_body: bool = False
+
+    def with_spring(self, **values: float) -> "Mechanism":
+        """The same with other values of its only spring."""
+        (spring,) = self.springs
+        return replace(self, springs=(replace(spring, **values),))  # type: ignore[arg-type]
+
+    def moved(self, shift: np.ndarray) -> "Mechanism":
+        """The same with the body, its end of the joint and its ends of springs moved at the start (m)."""
+        return replace(
+            self,
+            centre=self.centre + shift,
+            body=replace(self.body, place=self.body.place + shift),
+            springs=tuple(replace(spring, body=spring.body + shift) for spring in self.springs),
+        )
+
+
+def read_mechanism(path: str | Path) -> Mechanism:
+    """The mechanism of a model file; InputError by name and line for what is not supported or not assembled."""
+    return _Reading(str(path), read_statements(path)).mechanism()
+
+
+class _Reading:
+    """Statements of one file by kind."""
+
+    def __init__(self, file: str, statements: list[Statement]) -> None:
+        self.file, self.statements = file, statements
+        parts = {each.number: each for each in self.named("PART")}
+        grounds = [each for each in parts.values() if each.has("GROUND")]
+        bodies = [each for each in parts.values() if not each.has("GROUND")]
+        if len(grounds) != 1 or len(bodies) != 1:
+            told = [len(grounds), len(bodies)]
+            raise InputError(file, "PART", told, "must be one GROUND and one body: other counts are not supported")
+        self.ground, self.part = grounds[0], bodies[0]
+        self.markers = {each.number: self._marker(each, parts) for each in self.named("MARKER")}
+
+    def named(self, *names: str) -> list[Statement]:
+        return [each for each in self.statements if each.name in names]
+
+    def _marker(self, of: Statement, parts: dict[int, Statement]) -> Marker:
+        part = parts.get(of.whole("PART"))
+        if part is None:
+            raise of.refuse(", PART", of.whole("PART"), "is no part of the file")
+        frame = _turned(part.numbers("REULER", (0.0, 0.0, 0.0)))
+        place = part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ of.numbers("QP", (0.0, 0.0, 0.0))
+        return Marker(part.number, place, frame @ _turned(of.numbers("REULER", (0.0, 0.0, 0.0))))
+
+    def marker(self, of: Statement, number: int) -> Marker:
+        if number not in self.markers:
+            raise of.refuse("", number, "is no marker of the file")
+        return self.markers[number]
+
+    def pair(self, of: Statement, first: int, second: int) -> tuple[Marker, Marker]:
+        """The ground's marker and the body's of two."""
+        both = self.marker(of, first), self.marker(of, second)
+        if {marker.part for marker in both} != {self.ground.number, self.part.number}:
+            raise of.refuse("", [first, second], "must be a marker of the ground and one of the body")
+        return both if both[0].part == self.ground.number else both[::-1]
+
+    def mechanism(self) -> Mechanism:
+        part = self.part
+        centre = self.marker(part, part.whole("CM"))
+        ixx, iyy, izz, ixy, ixz, iyz = part.numbers("IP", (0.0,) * 6)
+        own = np.array([[ixx, -ixy, -ixz], [-ixy, iyy, -iyz], [-ixz, -iyz, izz]])
+        mass = float(part.numbers("MASS", (0.0,))[0])
+        if mass <= 0.0 or np.linalg.eigvalsh(own)[0] <= 0.0:
+            raise part.refuse("", None, "must have a mass and a positive inertia")
+        kind, (ground, body), length = self._joint(centre)
+        gravity = [sum(float(g.numbers(f"{axis}GRAV", (0.0,))[0]) for g in self.named("ACCGRAV")) for axis in "IJK"]
+        return Mechanism(
+            mass=mass,
+            centre=centre.place,
+            inertia=centre.axes @ own @ centre.axes.T,
+            axes=centre.axes,
+            gravity=np.array(gravity),
+            kind=kind,
+            ground=ground,
+            body=body,
+            length=length,
+            springs=tuple(self._spring(each, kind, ground) for each in self.named("SFORCE", "SPRINGDAMPER")),
+            velocity=np.array([part.numbers(f"V{axis}", (0.0,))[0] for axis in "XYZ"]),
+            on_body=any(self.marker(j, j.whole("I")).part == part.number for j in self.named("JOINT")),
+            turning=centre.axes @ [part.numbers(f"W{axis}", (0.0,))[0] for axis in "XYZ"],
+        )
+
+    def _joint(self, centre: Marker) -> tuple[Kind, tuple[Marker, Marker], float]:
+        joints = self.named("JOINT", "GCON")
+        if len(joints) > 1:
+            raise joints[1].refuse("", None, "is the second joint of one body: not supported")
+        if not joints:
+            springs = [self.pair(s, s.whole("I"), s.whole("J")) for s in self.named("SFORCE", "SPRINGDAMPER")]
+            origin = Marker(self.ground.number, np.zeros(3), np.eye(3))
+            return "free", (springs[0][0] if springs else origin, centre), 0.0
+        (joint,) = joints
+        if joint.name == "GCON":
+            return self._distance(joint)
+        kind = next((kind for name, kind in JOINTS.items() if joint.has(name)), None)
+        if kind is None:
+            raise joint.refuse("", ", ".join(joint.values), "is not supported: " + ", ".join(JOINTS) + " are")
+        ends = self.pair(joint, joint.whole("I"), joint.whole("J"))
+        first = self.marker(joint, joint.whole("I"))
+        if kind == "universal":
+            ends = _cross(*ends, first.part == self.ground.number)
+        _check_assembled(joint, kind, *ends)
+        return kind, ends, 0.0
+
+    def _distance(self, joint: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
+        text = re.sub(r"\s", "", joint.text("FUNCTION")).upper()
+        match = re.fullmatch(r"DM\((\d+),(\d+)\)-" + NUMBER, text)
+        if match is None:
+            raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
+        ends, length = self.pair(joint, int(match[1]), int(match[2])), float(match[3])
+        apart = float(np.linalg.norm(ends[1].place - ends[0].place))
+        if abs(apart - length) > CLOSE or length <= 0.0:
+            raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {apart:g} m")
+        return "distance", ends, apart
+
+    def _spring(self, of: Statement, kind: Kind, joint: Marker) -> Spring:
+        ground, body = self.pair(of, of.whole("I"), of.whole("J"))
+        turns = of.has("ROTATIONAL") or of.has("ROTATION")
+        if turns and not (kind == "revolute" and _parallel(ground.axes[:, 2], joint.axes[:, 2])):
+            raise of.refuse("", None, "turns about an axis that no revolute joint has: not supported")
+        law = self._sprung(of, turns) if of.name == "SPRINGDAMPER" else self._function(of, turns)
+        angle = 0.0
+        if turns:  # of the body beside the ground about the joint's axis, at the start
+            x, y = (ground.axes[:, k] @ body.axes[:, 0] for k in range(2))
+            sense = math.copysign(1.0, ground.axes[:, 2] @ joint.axes[:, 2])
+            angle = math.atan2(y, x) * sense
+        stiffness, damping, rest = law
+        return Spring(turns, ground.place, body.place, stiffness, damping, rest - angle if turns else rest)
+
+    def _sprung(self, of: Statement, turns: bool) -> tuple[float, float, float]:
+        names = ("KT", "CT", "ANGLE", "TORQUE") if turns else ("K", "C", "LENGTH", "FORCE")
+        stiffness, damping, rest, held = (float(of.numbers(name, (0.0,))[0]) for name in names)
+        if held:
+            raise of.refuse(f", {names[3]}", held, "is not supported: give the free length or angle")
+        return stiffness, damping, rest
+
+    def _function(self, of: Statement, turns: bool) -> tuple[float, float, float]:
+        """Stiffness, damping and rest of a force that is affine in travel and rate, read off its values."""
+        text = of.text("FUNCTION").lower().replace("\\", " ")
+        i, j = (f"0*{of.whole(end)}" for end in "IJ")
+        travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
+        if not turns:
+            travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
+        plain = re.sub(rate, "(rate)", re.sub(travel, "(travel)", text))
+        force = _evaluated(of, plain)
+        base, k, c = force(0.0, 0.0), force(1.0, 0.0), force(0.0, 1.0)
+        stiffness, damping = base - k, base - c
+        if abs(force(2.0, 3.0) - (base - 2.0 * stiffness - 3.0 * damping)) > 1e-9 * (abs(stiffness) + abs(damping)):
+            raise of.refuse(", FUNCTION", text, "is not supported: only forces that are straight in travel and rate")
+        if not stiffness and base:
+            raise of.refuse(", FUNCTION", text, "is not supported: a constant force needs a stiffness")
+        rest = base / stiffness if stiffness else 0.0
+        return stiffness, damping, -rest if turns else rest  # az is the angle of the ground beside the body
+
+
+def _evaluated(of: Statement, text: str) -> Callable[[float, float], float]:
+    """Value of an expression of numbers, travel, rate, RTOD and DTOR."""
+    names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except SyntaxError:
+        raise of.refuse(", FUNCTION", text, "cannot be read") from None
+    allowed = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
+    for node in ast.walk(tree):
+        strange = isinstance(node, ast.Name) and node.id not in (*names, "travel", "rate")
+        if strange or not isinstance(node, allowed):
+            shown = node.id if isinstance(node, ast.Name) else ast.unparse(node)
+            raise of.refuse(", FUNCTION", shown, "is not supported: numbers, DM, VR, AZ, WZ, RTOD and DTOR are")
+    code = compile(tree, "", "eval")
+    return lambda travel, rate: float(eval(code, {"__builtins__": {}}, {**names, "travel": travel, "rate": rate}))
+
+
+def _turned(angles: np.ndarray) -> np.ndarray:
+    """Axes (3, 3) as columns after turns about z, the new x and the new z."""
+    return Rotation.from_euler("ZXZ", angles).as_matrix()
+
+
+def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.linalg.norm(np.cross(a, b)) < CLOSE)
+
+
+def _cross(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
+    """Markers whose z axes are the arms of the cross: x of the I marker, y of the J marker."""
+    of_ground, of_body = (0, 1) if ground_first else (1, 0)
+    return replace(ground, axes=np.roll(ground.axes, 2 - of_ground, 1)), replace(
+        body, axes=np.roll(body.axes, 2 - of_body, 1)
+    )
+
+
+def _check_assembled(joint: Statement, kind: Kind, ground: Marker, body: Marker) -> None:
+    """Refuse a joint that the start does not fit."""
+    apart, z = body.place - ground.place, ground.axes[:, 2]
+    if kind in ("prismatic", "cylindrical"):
+        apart = apart - z * (z @ apart)
+    if np.linalg.norm(apart) > CLOSE:
+        raise joint.refuse("", apart.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
+    if kind == "universal":
+        if abs(z @ body.axes[:, 2]) > CLOSE:
+            raise joint.refuse("", None, "has arms that are not square to each other at the start")
+    elif kind != "spherical" and not (_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
+        raise joint.refuse("", None, "has z axes that are not parallel at the start")

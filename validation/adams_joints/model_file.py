@@ -1,0 +1,144 @@
+"""Model files of Adams/Solver (.adm): statements with numbers, keys and values, as far as single bodies on joints go.
+
+A statement is ``NAME/number, key = value, ...`` and goes on in lines that begin with a comma; ``!`` begins a comment.
+What draws, prints or steers the solver is passed over. Whatever else is not supported is refused by name and line.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+
+PASSED_OVER = ("ADAMS", "GRAPHICS", "REQUEST", "OUTPUT", "RESULTS", "VARIABLE", "END", "LIST", "INTEGRATOR")
+"""Statements that change no motion; a force that reads a VARIABLE is refused where it names it."""
+KEYS = {
+    "UNITS": ("FORCE", "MASS", "LENGTH", "TIME"),
+    "PART": ("GROUND", "MASS", "CM", "IP", "QG", "REULER", "VX", "VY", "VZ", "WX", "WY", "WZ"),
+    "MARKER": ("PART", "QP", "REULER"),
+    "JOINT": ("REVOLUTE", "TRANSLATIONAL", "CYLINDRICAL", "SPHERICAL", "HOOKE", "UNIVERSAL", "I", "J"),
+    "GCON": ("I", "FUNCTION"),
+    "SFORCE": ("TRANSLATIONAL", "ROTATIONAL", "I", "J", "FUNCTION"),
+    "SPRINGDAMPER": ("TRANSLATION", "ROTATION", "I", "J", "K", "C", "LENGTH", "FORCE", "KT", "CT", "ANGLE", "TORQUE"),
+    "ACCGRAV": ("IGRAV", "JGRAV", "KGRAV"),
+}
+"""Statements that are read, and what each may say."""
+SI = {"FORCE": "NEWTON", "MASS": "KILOGRAM", "LENGTH": "METER", "TIME": "SECOND"}
+_HEAD = re.compile(r"\s*([A-Za-z_]+)\s*/\s*(\d*)\s*(?:,|$|\b)(.*)", re.DOTALL)
+_KEY = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement: file, line where it begins, name, number (0 if it has none), values by key, flags as empty."""
+
+    file: str
+    line: int
+    name: str
+    number: int
+    values: dict[str, list[str]]
+
+    def refuse(self, what: str, value: object, allowed: str) -> InputError:
+        """The error about a part of this statement."""
+        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{what}", value, allowed)
+
+    def has(self, key: str) -> bool:
+        """Whether a key or a flag is there."""
+        return key in self.values
+
+    def whole(self, key: str) -> int:
+        """The number of a marker or a part; InputError where it is missing."""
+        text = self.values.get(key, [""])[0]
+        if not text.isdigit():
+            raise self.refuse(f", {key}", text or None, "must be the number of a statement")
+        return int(text)
+
+    def numbers(self, key: str, default: tuple[float, ...]) -> np.ndarray:
+        """Values of a key, angles in rad, as many as the default, of which those that are left out are taken."""
+        given = [self._number(key, text) for text in self.values.get(key, [])]
+        if len(given) > len(default):
+            raise self.refuse(f", {key}", len(given), f"values found, at most {len(default)} have a meaning")
+        return np.array([*given, *default[len(given) :]])
+
+    def _number(self, key: str, text: str) -> float:
+        degrees = text.upper().endswith("D") and not text.upper().endswith("ED")
+        try:
+            value = float(text[:-1]) if degrees else float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.refuse(f", {key}", text, "must be a finite number, or an angle as 90D")
+        return math.radians(value) if degrees else value
+
+    def text(self, key: str) -> str:
+        """An expression, lines joined."""
+        return " ".join(self.values.get(key, []))
+
+
+def read_statements(path: str | Path) -> list[Statement]:
+    """All statements of a file that change its motion; InputError for what is not supported, by name and line."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+    statements = [_statement(str(path), number, text) for number, text in _joined(lines) if not _passed(text)]
+    for statement in (each for each in statements if each.name == "UNITS"):
+        for key, (value, *_) in statement.values.items():
+            if value.upper() != SI[key]:
+                raise statement.refuse(f", {key}", value, f"is not supported: only {SI[key]}")
+    return statements
+
+
+def _joined(lines: list[str]) -> list[tuple[int, str]]:
+    """Number of the first line and text of every statement."""
+    joined: list[tuple[int, str]] = []
+    for number, line in enumerate(lines, 1):
+        text = line.partition("!")[0].strip()
+        if text.startswith(",") and joined:
+            joined[-1] = joined[-1][0], f"{joined[-1][1]} {text}"
+        elif text:
+            joined.append((number, text))
+    return joined
+
+
+def _passed(text: str) -> bool:
+    return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in PASSED_OVER
+
+
+def _statement(file: str, line: int, text: str) -> Statement:
+    head = _HEAD.fullmatch(text)
+    name = head.group(1).upper() if head else ""
+    if head is None or name not in KEYS:
+        raise InputError(file, f"line {line}", text[:40], f"is not supported; read are {', '.join(KEYS)}")
+    values: dict[str, list[str]] = {}
+    key = ""
+    for part in _parts(head.group(3)):
+        named = _KEY.fullmatch(part)
+        if named:
+            key = named.group(1).upper()
+            values[key] = [named.group(2).strip()]
+        elif part.strip().upper() in KEYS[name]:
+            values[part.strip().upper()] = []
+        elif key:
+            values[key].append(part.strip())
+        elif part.strip():
+            values[part.strip().upper()] = []
+    statement = Statement(file, line, name, int(head.group(2) or 0), values)
+    for unknown in (each for each in values if each not in KEYS[name]):
+        raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS[name])}")
+    return statement
+
+
+def _parts(text: str) -> list[str]:
+    """Text between the commas that stand outside of brackets."""
+    parts, depth = [""], 0
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        if sign == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return [part for part in parts if part.strip()]

@@ -1,0 +1,74 @@
+"""Compiled forces of springs from the ground to a body on a chain of joints, as forces of the joints.
+
+For engines: all but the time are pointers to doubles, see ``models.engines.free_vehicle``. The table is a head (counts
+of joints and springs), the joints as ``models.multibody.cut_mechanics`` has them, then the springs.
+"""
+
+import math
+
+import numpy as np
+
+from models.machine.compiled import njit
+from models.machine.stack import array, at, beyond, doubles
+from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, TURNS, add_wrench, column, locate, move
+from models.multibody.tree import dot, plus, three, times
+from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.spatial import FREEDOMS, SpatialVehicle
+from validation.adams_joints.mechanism import Spring
+
+HEAD, PER_SPRING = 2, 10
+COORDINATE, STIFFNESS, DAMPING, REST, GROUND, ARM = 0, 1, 2, 3, 4, 7
+"""Of a spring: the coordinate that it turns (-1: it lies between two points), N/m, N s/m, m, place of its point on the
+ground, and that on the body from the last joint (m)."""
+_NONE = (0.0, 0.0, 0.0)
+
+
+def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
+    """The table of springs whose points lie in the vehicle's axes; one that turns does so with the last coordinate."""
+    chain = joints(vehicle)
+    kinds = chain[:, 0].astype(int)
+    rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
+    last, origin = anchor(vehicle, vehicle.bodies[-1].name)
+    laws = [
+        [last if each.turns else -1, each.stiffness, each.damping, each.rest, *each.ground, *(each.body - origin)]
+        for each in springs
+    ]
+    return np.concatenate([[len(rows), len(laws)], rows.ravel(), np.array(laws).ravel()])
+
+
+@njit(cache=True, error_model="numpy")
+def spring_forces(numbers, t, q, v, f):
+    """Add the springs' forces (N, N m) to ``f`` (n,), at coordinates and rates (n,)."""
+    head = array(numbers, (HEAD,))
+    n, count = int(head[0]), int(head[1])
+    if count == 0:
+        return
+    chain = array(beyond(numbers, HEAD), (n, PER_JOINT))
+    springs = array(beyond(numbers, HEAD + n * PER_JOINT), (count, PER_SPRING))
+    place, rate, out = array(q, (n,)), array(v, (n,)), array(f, (n,))
+    m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
+    move(chain, place, rate, m)
+    for i in range(count):
+        law = springs[i]
+        j = int(law[COORDINATE])
+        if j >= 0:
+            out[j] -= law[STIFFNESS] * (place[j] - law[REST]) + law[DAMPING] * rate[j]
+            continue
+        tip = locate(m[n], springs[i], ARM)
+        apart = plus(tip, times(three(law, GROUND), -1.0))
+        length = math.sqrt(dot(apart, apart))
+        if length == 0.0:  # no line, hence no force along it
+            continue
+        along, speed = times(apart, 1.0 / length), 0.0
+        for k in range(n):
+            speed += dot(along, column(chain[k, TURNS], m[k + 1], tip)) * rate[k]
+        push = -law[STIFFNESS] * (length - law[REST]) - law[DAMPING] * speed
+        add_wrench(chain, m, n - 1, tip, times(along, push), _NONE, out)
+
+
+@njit(cache=True, error_model="numpy")
+def set_spring_forces(block, t, n):
+    """``spring_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    f = at(block)
+    array(f, (n,))[:] = 0.0
+    spring_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

@@ -1,0 +1,221 @@
+"""Joints and springs against another multibody code: motion and reactions of single bodies on single joints.
+
+Every body is built from the other code's model file on the common description, marched in both engines, and by the
+plain reference, which has constraints with multipliers where the engines have joint coordinates. Reactions of the
+engines follow from their accelerations by Newton's and Euler's equations of the body; those of the reference are its
+multipliers.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validation.adams_joints.constrained import ConstrainedBody
+from validation.adams_joints.joint_tree import joint_tree
+from validation.adams_joints.mechanism import Mechanism, read_mechanism
+from validation.adams_joints.motion import BodyMotion, Reaction
+from validation.adams_joints.output_file import OutputFile, read_output, starts_alike
+from validation.common.rows import Observed, Row, System, Table, not_run
+from validation.common.scenes import data_folder
+
+TITLE = "Joints and springs of another multibody code"
+SYSTEM: System = "rolling-vehicle"
+FOLDER = "adams_joints"
+FAMILIES = ("Revolute", "Prismatic", "Cylindrical", "Spherical", "Universal", "Distance", "RotSpring", "TranSpring")
+QUICK = ("Revolute", "Distance")
+MODELS = {"TranSpring": "TransSpring"}
+"""Families whose model file has another name."""
+ENGINES = ("exudyn", "mujoco")
+STEP, EVERY, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
+"""s; steps for each row of the files."""
+PLACE, FORCE = 1e-5, 1e-4
+"""Bounds asked for: m, and share of the largest reaction, which is the weight where nothing larger acts."""
+TWINS = 1e-6
+"""Of engines and reference, m and share: steps of 5 ms leave 3e-7 of both."""
+LOSES = 1e-4
+"""Share of the largest kinetic energy that a file's own motion may lose without friction."""
+WINDOW = 10
+"""Rows of a file, a tenth of a second, after which a march from its own state is compared."""
+READ_OFF = 1.0
+"""s of a file from which a spring's constants are read off, where the model file describes another case."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows of every family; in the quick share of two, one second long."""
+    data = data_folder()
+    rows: list[Row] = []
+    saved: dict[str, Any] = {}
+    for family in QUICK if quick else FAMILIES:
+        model = None if data is None else data / FOLDER / f"{MODELS.get(family, family)}_Case01.adm"
+        if model is None or not model.is_file():
+            reason = "TWINRIG_DATA names no folder with the other code's models"
+            rows.append(not_run(_id(family, "position"), SYSTEM, f"{family}: position and reaction", reason))
+            continue
+        output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
+        mechanism, notes = _fitting(read_mechanism(model), output)
+        rows += [*notes_rows(family, notes), *family_rows(family, mechanism, output, quick)]
+        saved[family] = {
+            "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
+            "digits": output.digits,
+        }
+    return rows, saved
+
+
+def _id(family: str, what: str) -> str:
+    return f"adams_joints.{family.lower()}.{what}"
+
+
+def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[str, float]]:
+    """The mechanism; where the output is of another start or spring, with those of the output, which are told."""
+    if not mechanism.springs:
+        return mechanism, {}
+    shift = output.columns["Pos"][0] - mechanism.centre
+    moved = mechanism if starts_alike(mechanism, output) else mechanism.moved(shift)
+    (spring,) = moved.springs
+    travel, rate, law = _sprung(moved, output)
+    told = spring.stiffness * (travel - spring.rest) + spring.damping * rate
+    if moved is mechanism and np.abs(told - law).max() <= FORCE * np.abs(law).max():
+        return mechanism, {}
+    early = output.times <= READ_OFF
+    parts = np.column_stack([travel, rate, np.ones(len(travel))])[early]
+    stiffness, damping, held = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
+    constants = {"stiffness": stiffness, "damping": damping, "rest": -held / stiffness}
+    return moved.with_spring(**constants), constants
+
+
+def _sprung(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Travel and rate of the only spring on the output's motion, and its force there (m,), positive in extension."""
+    (spring,), motion = mechanism.springs, output.motion(mechanism)
+    if spring.turns:
+        axis = mechanism.ground.axes[:, 2]
+        return np.unwrap(np.arctan2(*_angle(motion, axis))), motion.turning @ axis, output.columns["Rtorque"] @ axis
+    arm = motion.turned @ (spring.body - mechanism.centre)
+    apart, speed = motion.place + arm - spring.ground, motion.velocity + np.cross(motion.turning, arm)
+    travel = np.linalg.norm(apart, axis=1)
+    unit = apart / np.maximum(travel, 1e-30)[:, None]
+    return travel, (speed * unit).sum(axis=1), (output.columns["Rforce"] * unit).sum(axis=1)
+
+
+def _angle(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sine and cosine (m,) of the turn about an axis."""
+    side = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(axis, side) / np.linalg.norm(np.cross(axis, side))
+    turned = motion.turned @ first
+    return turned @ np.cross(axis, first), turned @ first
+
+
+def notes_rows(family: str, constants: dict[str, float]) -> list[Row]:
+    """What was read off a file: its model file has another start or other constants."""
+    why = f"read off the first {READ_OFF:g} s of the output: the model file describes another case; calibrated"
+    units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
+    return [
+        Observed(_id(family, name), SYSTEM, f"{family}: {name} of the spring", value, units[name]).beside("-", why)
+        for name, value in constants.items()
+    ]
+
+
+def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bool = False) -> list[Row]:
+    """Rows of one model and its output: positions, reactions, reactions on the file's own motion, the twins."""
+    duration = min(QUICK_DURATION if quick else DURATION, float(output.times[-1]))
+    motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, EVERY)
+    runs = {"reference": (motion, reaction)}
+    tree = joint_tree(mechanism, motion)
+    runs |= {engine: tree.run(engine, duration, STEP, EVERY) for engine in ENGINES}
+    rows = [_own_motion(family, mechanism, output)]
+    for name, (path, pushed) in runs.items():
+        rows += _against_file(family, name, mechanism, output, path, pushed)
+    if not mechanism.springs and output.energy_lost(mechanism) > LOSES:
+        rows.append(_windows(family, mechanism, output, duration))
+    for name in ENGINES:
+        rows.append(_twin(family, name, mechanism, runs[name], runs["reference"]))
+    return rows
+
+
+def _largest(mechanism: Mechanism, reaction: Reaction) -> tuple[float, float]:
+    """Largest force (N) of a reaction, or the weight, and that by the arm of the centre, or 1 m, as a moment (N m)."""
+    weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
+    force = max(float(np.abs(reaction.force).max()), weight)
+    return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.place)), 1.0)
+
+
+def _apart(mechanism: Mechanism, one: Reaction, two: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)) -> float:
+    """Largest difference of two reactions, less what rounding may explain, by the largest."""
+    force, moment = _largest(mechanism, two)
+    off = np.abs(one.force - two.force) - rounding[0], np.abs(one.moment - two.moment) - rounding[1]
+    return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
+
+
+def _own_motion(family: str, mechanism: Mechanism, output: OutputFile) -> Row:
+    """Reactions on the file's own motion: no integration takes part."""
+    off = _apart(mechanism, output.reaction_of_motion(mechanism), output.reaction())
+    why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
+    quantity = f"{family}: reaction on the file's own motion, by the largest"
+    return Observed(_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE, why, "published")
+
+
+def _against_file(
+    family: str, name: str, mechanism: Mechanism, output: OutputFile, path: BodyMotion, pushed: Reaction
+) -> list[Row]:
+    m = len(path.times)
+    place = np.abs(path.place - output.columns["Pos"][:m]) - output.rounding("Pos")[:m]
+    digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
+    theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
+    seen = (
+        ("position", "position of the centre", max(0.0, float(place.max())), "m", PLACE),
+        ("reaction", "reaction by the largest", _apart(mechanism, pushed, theirs, digits), "", FORCE),
+    )
+    lost = 0.0 if mechanism.springs else output.energy_lost(mechanism)
+    rows = []
+    for what, words, off, unit, bound in seen:
+        quantity = f"{family}: {words}, beside the other code's digits, {name}"
+        observed = Observed(_id(family, f"{what}.{name}"), SYSTEM, quantity, off, unit)
+        if lost <= LOSES:
+            rows.append(observed.at_most(bound, "the bound asked for", "published"))
+        else:
+            why = f"nothing damps, and the motion in the file loses {100 * lost:.2g} % of its kinetic energy: its error"
+            rows.append(observed.aim(bound, why))
+    return rows
+
+
+def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: float) -> Row:
+    """Positions a tenth of a second after each of the file's own states: its error has no time to add up.
+
+    What energy the file loses meanwhile, dE, changes its speed by dE / (m v), and its place by that for this time.
+    """
+    body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
+    starts = np.arange(0, round(duration / STEP / EVERY) - WINDOW, WINDOW)
+    ends = [body.marched(body.at_motion(theirs, k), WINDOW * EVERY, STEP)[:3] for k in starts.tolist()]
+    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW]
+    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW]) - digits).max(axis=1)
+    _, whole = output.energies(mechanism)
+    speed = np.linalg.norm(theirs.velocity, axis=1)
+    fastest = np.maximum(speed[starts], speed[starts + WINDOW])
+    lost = np.abs(whole[starts + WINDOW] - whole[starts]) / (mechanism.mass * fastest) * (WINDOW * EVERY * STEP)
+    why = "from one state of the file to another, less its digits and what its loss of energy explains; the bound asked for"
+    quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
+    left = max(0.0, float((off - lost).max()))
+    return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE, why, "published")
+
+
+def _twin(
+    family: str, name: str, mechanism: Mechanism, run: tuple[BodyMotion, Reaction], plain: tuple[BodyMotion, Reaction]
+) -> Row:
+    """An engine's joints against the reference's constraints."""
+    place = float(np.abs(run[0].place - plain[0].place).max())
+    turned = float(np.abs(run[0].turned - plain[0].turned).max())
+    off = max(place, turned, _apart(mechanism, run[1], plain[1]))
+    why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
+    quantity = f"{family}: {name} from the reference: position, rotation, reaction by the largest"
+    return Observed(_id(family, f"twin.{name}"), SYSTEM, quantity, off, "m, -").at_most(TWINS, why, "native")
+
+
+def tables(data: dict[str, Any]) -> list[Table]:
+    """What the files themselves hold."""
+    rows = tuple(
+        (family, str(kept["digits"]), "-" if kept["lost"] is None else f"{kept['lost']:.1e}")
+        for family, kept in data.items()
+    )
+    note = "Where nothing damps, a motion that loses energy carries an integration error of the code that wrote it."
+    heads = ("family", "digits of the file", "energy lost by the largest kinetic one")
+    return [Table("Motion of the other code", note, heads, rows)] if rows else []

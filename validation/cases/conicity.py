@@ -1,0 +1,186 @@
+"""Equivalent conicity: closed forms of Klingel's nonlinear wave, and the limits of EN 15302 on its reference tables."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import ellipk
+
+from models.core.errors import InputError
+from models.rail.equivalent_conicity import KlingelWave, equivalent_conicity, harmonic_linearised_conicity, klingel_wave
+from models.rail.laid_profiles import Profiles
+from models.rail.rolling_radius_table import RollingRadiusTable, rolling_radii_of
+from validation.common.rows import Observed, Row, System, not_run
+from validation.common.scenes import data_folder
+
+TITLE = "Equivalent conicity by EN 15302"
+SYSTEM: System = "contact"
+FOLDER, PROFILES = "en15302", ("E1", "E2", "E3", "E4")
+SPACING = 0.1
+"""mm between the rows of the standard's tables, which lie symmetrically."""
+LARGEST = 0.003
+"""Error asked for; the standard prints three digits."""
+ROUNDING = 1e-11
+Y = np.linspace(-8.0, 8.0, 161)
+"""mm"""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Closed forms and the standard's tables; in full also wheels of profiles that are not alike."""
+    rows = [*_closed_forms(), _cubic(), _refused()]
+    told: dict[str, Any] = {}
+    for name in PROFILES:
+        of_standard, saved = _standard(name)
+        rows += of_standard
+        told |= saved
+    if not quick:
+        rows += _mirrored_profiles()
+    return rows, {"standard": told}
+
+
+def _off(period: float, exact: float) -> float:
+    return abs(period / exact - 1.0)
+
+
+def _exact(id: str, quantity: str, off: float, why: str) -> Row:
+    return Observed(f"conicity.{id}", SYSTEM, quantity, off, "").at_most(ROUNDING, why, "closed form")
+
+
+def _closed_forms() -> list[Row]:
+    """Tables that are straight between their rows: what is left is rounding."""
+    cone = max(abs(equivalent_conicity(Y, 0.1 * Y, a) / 0.05 - 1.0) for a in (0.1, 3.0, 8.0))
+    wave = klingel_wave(RollingRadiusTable(Y, 0.1 * Y + 1.0 * 0.1), 3.0)
+    tread = np.where(np.abs(Y) < 3.0, 0.05 * Y, np.sign(Y) * (0.15 + 0.8 * (np.abs(Y) - 3.0)))
+    bent = max(
+        _off(klingel_wave(RollingRadiusTable(Y, tread), a).period, two_slopes(0.05, 0.8, 3.0, a))
+        for a in (3.1, 5.0, 7.9)
+    )
+    jump = klingel_wave(RollingRadiusTable(np.array([-5.0, 0.0, 0.0, 5.0]), np.array([-0.3, -0.3, 0.3, 0.3])), 2.0)
+    left, right = 0.1, 0.4
+    uneven = klingel_wave(RollingRadiusTable(Y, np.where(Y < 0.0, left * Y, right * Y)), 3.0)
+    halves = math.pi / math.sqrt(left) + math.pi / math.sqrt(right)
+    off_centre = 3.0 * (math.sqrt(right) - math.sqrt(left)) / (math.sqrt(right) + math.sqrt(left))
+    return [
+        _exact("cone", "cones of 1/20 at three amplitudes, relative error", cone, "the cone's tangent"),
+        _exact("offset", "the same with unequal radii", _off(wave.conicity, 0.05), "the offset moves the centre alone"),
+        _exact("offset.centre", "centre of that wave", abs(wave.centre + 1.0), "where both radii are equal, -1 mm"),
+        _exact("two_slopes", "period on tread and flange root, two slopes", bent, "two sines, matched at the bend"),
+        _exact("jump", "period with a jump in the middle", _off(jump.period, 4.0 * math.sqrt(4.0 / 0.3)), "parabolas"),
+        _exact("uneven", "period of a wheel steeper than the other", _off(uneven.period, halves), "two half sines"),
+        _exact("uneven.centre", "centre of that wave", abs(uneven.centre + off_centre), "equal potential at both ends"),
+    ]
+
+
+def two_slopes(inner: float, outer: float, bend: float, amplitude: float) -> float:
+    """Period where dr has the slope ``inner`` up to ``bend`` and ``outer`` beyond, at an amplitude beyond."""
+    rest = inner * bend / outer
+    deep, root = amplitude - bend + rest, math.sqrt(outer)
+    speed = root * math.sqrt(deep**2 - rest**2)
+    within = math.atan(math.sqrt(inner) * bend / speed) / math.sqrt(inner)
+    return 4.0 * (within + math.acos(rest / deep) / root)
+
+
+def _cubic() -> Row:
+    """A smooth dr on a table: an elliptic integral; what is left is the table's spacing, and falls with its square."""
+    a, b, amplitude = 0.1, 0.02, 4.0
+    stiff = a + b * amplitude**2
+    exact = 4.0 * float(ellipk(b * amplitude**2 / (2.0 * stiff))) / math.sqrt(stiff)
+    errors = []
+    for rows in (161, 321):
+        y = np.linspace(-8.0, 8.0, rows)
+        errors.append(_off(klingel_wave(RollingRadiusTable(y, a * y + b * y**3), amplitude).period, exact))
+    order = math.log2(errors[0] / errors[1])
+    why = "complete elliptic integral; lines between rows are off by the square of their distance"
+    observed = Observed("conicity.cubic", SYSTEM, "order of the error in the spacing, dr = a y + b y^3", order, "")
+    return observed.within(2.0, 0.1, why, "closed form")
+
+
+def _refused() -> Row:
+    """Tables without a wave."""
+    refused = 0
+    for y, dr, amplitude in ((Y, -Y, 3.0), (Y, 0.1 * Y + 1.0, 3.0), (Y, 0.1 * Y, 8.1), (Y, 0.1 * (Y + 6.0), 3.0)):
+        try:
+            equivalent_conicity(y, dr, amplitude)
+        except InputError:
+            refused += 1
+    why = "wrong sign, no zero, beyond the table on both sides and on one: no number may come out"
+    return Observed(
+        "conicity.refused", SYSTEM, "tables without a wave that are refused, of 4", float(refused), ""
+    ).within(4.0, 0.0, why, "none")
+
+
+def _standard(name: str) -> tuple[list[Row], dict[str, Any]]:
+    """Rows on one of the standard's reference profiles; what is drawn."""
+    quantities = (f"{name}: amplitudes outside of the standard's limits", f"{name}: largest error")
+    data = data_folder()
+    table_file = None if data is None else data / FOLDER / f"dr_ce_{name}.dat"
+    if table_file is None or not table_file.is_file():
+        reason = "TWINRIG_DATA names no folder with the standard's tables"
+        ids = (f"conicity.{name}.outside", f"conicity.{name}.error")
+        return [not_run(id, SYSTEM, quantity, reason) for id, quantity in zip(ids, quantities, strict=True)], {}
+    dr = np.array(table_file.read_text().split(), float)
+    y = SPACING * (np.arange(dr.size) - (dr.size - 1) / 2.0)
+    limits = np.loadtxt(table_file.with_name(f"ben_{name}.dat"))
+    limits = limits[limits[:, 0] <= y[-1] + 1e-9]  # beyond, the table says nothing
+    amplitudes, printed, upper, lower = limits[:, :4].T
+    waves = [klingel_wave(RollingRadiusTable(y, dr), a) for a in amplitudes]
+    seen = np.array([wave.conicity for wave in waves])
+    harmonic = [_harmonic(y, dr, wave) for wave in waves]
+    outside = float(((seen < lower) | (seen > upper)).sum())
+    why = f"limits of EN 15302 at {len(amplitudes)} amplitudes, to the end of the table"
+    rows = [
+        Observed(f"conicity.{name}.outside", SYSTEM, quantities[0], outside, "").at_most(0.0, why, "published"),
+        Observed(f"conicity.{name}.error", SYSTEM, quantities[1], float(np.abs(seen - printed).max()), "").at_most(
+            LARGEST, "printed to three digits; the bound asked for", "published"
+        ),
+        Observed(
+            f"conicity.{name}.harmonic",
+            SYSTEM,
+            f"{name}: largest error of the first harmonic",
+            float(np.abs(np.array(harmonic) - printed).max()),
+            "",
+        ).beside(0.0, "another definition, for comparison"),
+    ]
+    saved = {"amplitude": amplitudes, "upper": upper, "lower": lower, "seen": seen, "harmonic": harmonic}
+    return rows, {name: {key: np.asarray(values).tolist() for key, values in saved.items()}}
+
+
+def _harmonic(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:
+    return harmonic_linearised_conicity(y, dr, wave.amplitude * (1.0 - 1e-9), wave.centre)
+
+
+def _mirrored_profiles() -> list[Row]:
+    """Wheels of 920 and 918 mm on their rails, and the same exchanged."""
+    profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)
+    large, small = profiles.side(0.460), profiles.side(0.459)
+    there, back = (
+        klingel_wave(rolling_radii_of(right, left, y), 3e-3) for right, left in ((large, small), (small, large))
+    )
+    why = "exchanged wheels are the mirror image; touching places are found to 1e-13 rad of roll"
+    off = abs(back.conicity / there.conicity - 1.0)
+    centre = abs(back.centre + there.centre) * 1e3
+    return [
+        Observed("conicity.mirror", SYSTEM, "S1002 of 920 and 918 mm: difference if exchanged", off, "").at_most(
+            1e-6, why, "none"
+        ),
+        Observed("conicity.mirror.centre", SYSTEM, "sum of both centres", centre, "mm").at_most(1e-6, why, "none"),
+    ]
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Both conicities of the standard's profiles within its limits."""
+    from models.drawing.figures import BLUE, VERMILION, heading, legend_below, panels
+
+    standard = data["standard"]
+    if not standard:
+        return []
+    figure, axes = panels(len(standard), 2, 2.6)
+    for axis, (name, of) in zip(axes, standard.items(), strict=True):
+        axis.fill_between(of["amplitude"], of["lower"], of["upper"], color="0.85", label="limits of EN 15302")
+        axis.plot(of["amplitude"], of["seen"], color=BLUE, label="Klingel's wave")
+        axis.plot(of["amplitude"], of["harmonic"], "--", color=VERMILION, label="first harmonic")
+        axis.set(title=name, xlabel="amplitude [mm]", ylabel="equivalent conicity")
+    legend_below(figure, axes[0])
+    heading(figure, "Equivalent conicity of the standard's reference profiles")
+    return [("Equivalent conicity over the amplitude, within the limits of EN 15302.", figure)]
