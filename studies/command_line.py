@@ -311,12 +311,9 @@ def twin(
     The file as MuJoCo parsed it is held to the same model built in Exudyn, in MuJoCo and by plain equations, at random
     states. Of two files the elements that make them move differently are named. Ends with code 1 if anything differs.
     """
-    from studies.command.twin import examine, kinds, lines
+    from studies.command.twin import check_asked, examine, kinds, lines
 
-    if len(files) > 2:
-        raise InputError("FILES", "", len(files), "files: one, or two to be compared")
-    if page is not None and page.exists():
-        raise InputError("--page", "", str(page), "is there already, and nothing is overwritten: name another file")
+    check_asked(files, page)
     with waiting("building the model"):
         twins = examine(files, kinds(without), states, march)
     print("\n".join(lines(twins)))

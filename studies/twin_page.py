@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from models.core.errors import InputError
 from models.core.whole_files import write_whole
 from models.own_model.elements import Element, elements
 from studies.command.twin import Twins, verdict
@@ -18,9 +17,7 @@ TEMPLATE = "twin.html.jinja"
 
 
 def write(twins: Twins, path: Path) -> Path:
-    """Write the page, whole or not at all; returns its path. InputError where it is there already."""
-    if path.exists():
-        raise InputError("--page", "", str(path), "is there already, and nothing is overwritten: name another file")
+    """Write the page, whole or not at all; returns its path."""
     write_whole(path, page(twins))
     return path
 

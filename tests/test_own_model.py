@@ -18,7 +18,7 @@ from models.own_model.explain import compare, culprits
 from models.own_model.file import OwnFile, read
 from models.own_model.path import paths
 from models.own_model.urdf import misread
-from tests.own_models import ARM_URDF, CART, JOINTED, chain
+from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
@@ -31,7 +31,7 @@ def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...]
     return read(_file(folder, text, name), without)
 
 
-@pytest.mark.parametrize("text", [JOINTED, CART, chain(8)], ids=["jointed", "cart", "chain"])
+@pytest.mark.parametrize("text", [JOINTED, CART, chain(8), tree(9, 4)], ids=["jointed", "cart", "chain", "tree"])
 def test_every_build_moves_as_the_file_does(tmp_path, text):
     for row in certificate(_read(tmp_path, text).own, 20):
         assert max(row.mass, row.force, row.acceleration) < 1e-11, row  # rounding by a condition of about 100
@@ -76,40 +76,6 @@ def test_an_element_that_a_build_lacks_is_named(tmp_path, monkeypatch, kind):
     assert [(element.kind, element.owner) for element, _ in culprits(file.own, "plain", 5)] == [(kind, owner)]
 
 
-PLANTED = [
-    ("hinge", 'damping=".3"', 'damping=".31"', "damping", "joint 'hinge'", "0.3 N m s/rad"),
-    ("hinge", 'armature=".02"', 'armature=".03"', "armature", "joint 'hinge'", "0.02 kg m^2"),
-    ("hinge", 'armature=".02"', "", "armature", "joint 'hinge'", "none in b.xml"),
-    ("hinge", 'stiffness="2"', 'stiffness="2.1"', "stiffness", "joint 'hinge'", "2 N m/rad"),
-    ("hinge", 'springref="10"', 'springref="11"', "spring reference", "joint 'hinge'", "0.0872665 rad"),
-    ("hinge", 'axis="1 2 3"', 'axis="1 2 3.1"', "axis", "joint 'hinge'", "0.267261"),
-    ("hinge", 'pos=".1 0 .2"', 'pos=".1 0 .21"', "anchor", "joint 'hinge'", "0.21"),
-    ("hinge", 'mass="2"', 'mass="2.2"', "mass", "body 'arm'", "2.2 kg"),
-    ("arm", 'pos=".3 .1 .1"', 'pos=".3 .1 .12"', "centre of mass", "body 'arm'", "0.12"),
-    ("arm", 'fullinertia=".3 .4 .5 .02', 'fullinertia=".3 .4 .5 .03', "inertia", "body 'arm'", "0.03"),
-    ("slide", 'damping="2"', 'damping="2.5"', "damping", "joint 'slide'", "2 N s/m"),
-    ("slide", 'stiffness="30"', 'stiffness="31"', "stiffness", "joint 'slide'", "30 N/m"),
-    ("slide", 'axis="0 1 1"', 'axis="0 1 1.1"', "axis", "joint 'slide'", "0.707107"),
-    ("twist", 'axis="0 0 1"', 'axis="0 .1 1"', "axis", "joint 'twist'", "0.0995037"),
-    ("twist", 'pos="0 .1 0"', 'pos=".05 .1 0"', "anchor", "joint 'twist'", "0.05"),
-    ("twist", 'mass="1.5"', 'mass="1.6"', "mass", "body 'slider'", "1.6 kg"),
-    ("twist", 'diaginertia=".1 .12 .15"', 'diaginertia=".1 .12 .16"', "inertia", "body 'slider'", "0.16"),
-    ("bob", 'gravcomp=".5"', "", "gravity compensation", "body 'bob'", "none in b.xml"),
-    ("ball", 'pos=".1 .2 .3"', 'pos=".1 .2 .4"', "anchor", "joint 'ball'", "0.4"),
-    ("ball", 'quat=".9 .1 .3 .2"', 'quat=".9 .1 .3 .3"', "orientation of the inertia", "body 'bob'", "kg m^2"),
-    ("weight", 'mass=".2"', 'mass=".3"', "mass", "body 'weight'", "0.3 kg"),
-    ("root", 'mass="3"', 'mass="3.1"', "mass", "body 'free'", "3.1 kg"),
-    ("root", 'diaginertia=".2 .3 .4"', 'diaginertia=".2 .3 .41"', "inertia", "body 'free'", "0.41"),
-    ("spin", 'damping=".05"', "", "damping", "joint 'spin'", "none in b.xml"),
-    ("spin", 'axis="0 1 0"', 'axis="0 -1 0"', "axis", "joint 'spin'", "-1"),
-    ("belt", 'stiffness="3"', 'stiffness="4"', "stiffness", "tendon 'belt'", "4 N/m"),
-    ("belt", 'springlength=".1"', 'springlength=".2"', "spring length", "tendon 'belt'", "0.2 m"),
-    ("belt", 'coef="2"', 'coef="2.5"', "coefficients", "tendon 'belt'", "2.5"),
-    ("push", 'gear="3"', 'gear="4"', "gear", "actuator 'push'", "4"),
-    ("jointed", 'gravity="1 2 -9"', 'gravity="1 2 -9.1"', "gravity", "the model", "-9.1"),
-]
-
-
 @pytest.fixture(scope="module")
 def original(tmp_path_factory):
     return _read(tmp_path_factory.mktemp("original"), JOINTED)
@@ -117,9 +83,7 @@ def original(tmp_path_factory):
 
 @pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED)
 def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old, new, kind, owner, size):
-    start = JOINTED.index(f'"{name}"')
-    there = JOINTED.index(old, start)
-    other = _read(tmp_path, JOINTED[:there] + new + JOINTED[there + len(old) :], "b.xml")
+    other = _read(tmp_path, changed(JOINTED, name, old, new), "b.xml")
     comparison = compare(original.own, other.own, 3)
     assert not comparison.alike
     first = comparison.influential[0]

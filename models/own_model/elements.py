@@ -162,9 +162,9 @@ def _read_axis(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
     """The six entries xx, yy, zz, xy, xz, yz of the tensor in the body's axes."""
-    axes = np.empty(9)
-    mujoco.mju_quat2Mat(axes, model.body_iquat[b])
-    axes = axes.reshape(3, 3)
+    numbers = np.empty(9)
+    mujoco.mju_quat2Mat(numbers, model.body_iquat[b])
+    axes = numbers.reshape(3, 3)
     tensor = axes * model.body_inertia[b] @ axes.T
     return np.array([*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]])
 

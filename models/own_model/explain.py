@@ -167,9 +167,9 @@ def _differences(first: OwnModel, second: OwnModel, trials: tuple[_Trial, _Trial
         if there is None or _says_nothing(there, one, other):
             continue
         influence = _influence(trials, key, one, other) if trials is not None else None
-        values = (None if each is None else each.value for each in (one, other))
+        first_value, second_value = (None if each is None else each.value for each in (one, other))
         kind = "orientation of the inertia" if _only_turned(key[0], one, other) else key[0]
-        rows.append(Difference(key[0], key[1], there.unit, *values, influence, kind))
+        rows.append(Difference(*key, there.unit, first_value, second_value, influence, kind))
     return rows
 
 

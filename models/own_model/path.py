@@ -5,7 +5,9 @@ Builds have the same coordinates, so they agree to rounding as long as the motio
 same tableau is another approximation of the same motion, and its distance is of the order of the step's error.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -67,7 +69,7 @@ def paths(own: OwnModel, step: float | None = None) -> PathReport:
     steps, (q,), (v,) = round(DURATION / step), *random_states(own.model, 1)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
-        _march(build, lambda build=build: _model(own, build).march(q, v, steps, step), built, failed)  # type: ignore[misc]
+        _march(build, partial(_by_build, own, build, (q, v), (steps, step)), built, failed)
     _march(FILE, lambda: _file_path(own, q, v, steps, step), built, failed)
     first = built.pop(ENGINES[0], None)
     if first is None:
@@ -79,7 +81,7 @@ def paths(own: OwnModel, step: float | None = None) -> PathReport:
     return PathReport(step, (rows - 1) * step, distances, failed, bool(own.coordinates.turnings), energy)
 
 
-def _march(name: str, run, built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
+def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
     """Keep a path, or why there is none."""
     try:
         path = run()
@@ -90,6 +92,11 @@ def _march(name: str, run, built: dict[str, np.ndarray], failed: dict[str, str])
         built[name] = path
     else:
         failed[name] = "the motion blows up at this step"
+
+
+def _by_build(own: OwnModel, build: str, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float]) -> np.ndarray:
+    """States (steps + 1, 2 n) of a build from coordinates and rates, by so many steps of so many seconds."""
+    return _model(own, build).march(*start, *grid)
 
 
 def _model(own: OwnModel, build: str) -> FreeModel:

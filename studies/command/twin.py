@@ -55,6 +55,18 @@ class Twins:
         return files and (self.comparison is None or self.comparison.alike)
 
 
+def check_asked(files: Sequence[Path], page: Path | None) -> None:
+    """InputError for too many files, and for a page that cannot be written."""
+    if len(files) > 2:
+        raise InputError("FILES", "", len(files), "files: one, or two to be compared")
+    if page is None:
+        return
+    if page.exists():
+        raise InputError("--page", "", str(page), "is there already, and nothing is overwritten: name another file")
+    if not page.parent.is_dir():
+        raise InputError("--page", "", str(page), "lies in a folder that does not exist")
+
+
 def kinds(text: str) -> tuple[str, ...]:
     """Kinds of content in an option: names between commas."""
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
