@@ -50,6 +50,13 @@ def test_files_of_other_joints_are_told_apart(asked):
     assert code == 1 and "joint 'x' of cart.xml has no partner" in said
 
 
+def test_the_price_names_a_setting_of_every_engine_and_what_its_default_loses(asked):
+    code, said, _ = asked("cart.xml", "--states", "2", "--no-paths", "--tolerance", "1e-4", "--quantity", "tilt")
+    assert code == 0 and "tilt within 0.0001 rad over 1 s" in said
+    assert "MuJoCo's default, Euler, 2 ms" in said and "Exudyn's default, GeneralizedAlpha, 5 ms" in said
+    assert re.search(r"in the engine\n +(exudyn\.DynamicSolverType|<option integrator)", said)
+
+
 @pytest.mark.parametrize(
     "words,said",
     [
@@ -58,6 +65,8 @@ def test_files_of_other_joints_are_told_apart(asked):
         (("cart.xml", "--states", "0"), "--states = 0: must be 1 or more"),
         (("cart.xml", "arm.urdf", "other.xml"), "one, or two to be compared"),
         (("cart.xml", "--page", "no/page.html"), "no/page.html"),
+        (("cart.xml", "--tolerance", "-1", "--states", "1", "--no-paths"), "--tolerance = -1.0: must be a finite"),
+        (("cart.xml", "--tolerance", "1", "--quantity", "tild", "--states", "1", "--no-paths"), "did you mean 'tilt'"),
     ],
 )
 def test_mistakes_are_one_message(asked, words, said):

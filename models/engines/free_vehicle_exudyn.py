@@ -67,9 +67,9 @@ class FreeExudyn(FreeModel):
         start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
 
-    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) by Exudyn's RK44; RunFailed where it stops."""
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
         start(self.mbs, q, v)
-        if note := solve(self.mbs, Settings("RK44", step, steps * step)):
+        if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))
         return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for (sensor,) in self._sensors])

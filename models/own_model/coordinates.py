@@ -55,6 +55,13 @@ class Coordinates:
             else:
                 self._plain.append((first, place))
 
+    def positions(self, states: np.ndarray) -> np.ndarray:
+        """Coordinates (m, n) of MuJoCo's states (m, nq + n); what turns without limit is not a number."""
+        out = np.full((len(states), self.size), np.nan)
+        for coordinate, place in self._plain:
+            out[:, coordinate] = states[:, place] - self._zero[place]
+        return out
+
     def to_mujoco(self, q: np.ndarray, v: np.ndarray) -> MujocoState:
         """MuJoCo's state at coordinates and rates (n,)."""
         qpos, jacobian, rest = self._zero.copy(), np.eye(self.size), np.zeros(self.size)

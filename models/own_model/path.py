@@ -14,6 +14,7 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
+from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.own_model.builds import PLAIN, plain_tree
 from models.own_model.reading import OwnModel, controls
@@ -70,7 +71,7 @@ def paths(own: OwnModel, step: float | None = None) -> PathReport:
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
         _march(build, partial(_by_build, own, build, (q, v), (steps, step)), built, failed)
-    _march(FILE, lambda: _file_path(own, q, v, steps, step), built, failed)
+    _march(FILE, lambda: file_path(own, (q, v), (steps, step)), built, failed)
     first = built.pop(ENGINES[0], None)
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(own.coordinates.turnings), None)
@@ -105,12 +106,15 @@ def _model(own: OwnModel, build: str) -> FreeModel:
     return Plain(PLAIN, plain_tree(own).acceleration, own.size)
 
 
-def _file_path(own: OwnModel, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-    """MuJoCo's own states (steps + 1, nq + n) by its RK4."""
-    model, data = own.model, mujoco.MjData(own.model)
+def file_path(
+    own: OwnModel, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float], integrator: str = "RK4"
+) -> np.ndarray:
+    """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), by so many steps of
+    so many seconds."""
+    (steps, step), model, data = grid, own.model, mujoco.MjData(own.model)
     before = model.opt.timestep, model.opt.integrator
-    model.opt.timestep, model.opt.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
-    state = own.coordinates.to_mujoco(q, v)
+    model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
+    state = own.coordinates.to_mujoco(*start)
     held = np.tile(controls(model), (steps, 1)) if model.nu else np.empty((steps, 0))
     try:
         return march(model, data, np.concatenate((state.qpos, state.qvel)), held)

@@ -1,7 +1,8 @@
 """``twinrig twin``: a user's own model in every build, or two files beside one another."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
@@ -13,17 +14,37 @@ from models.own_model.path import PathReport, paths
 from models.own_model.states import COUNT
 from models.own_model.urdf import Misread, misread
 
+Tell = Callable[[str, float], None]
+"""Told what is done now, and which part of all (0 to 1)."""
+
+
+def _silent(what: str, share: float) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """states : random ones, at which accelerations are compared; paths : whether they are compared, too; tolerance
+    (rad, m), quantity : of the price, None for none and for all joints."""
+
+    states: int = COUNT
+    paths: bool = True
+    tolerance: float | None = None
+    quantity: str | None = None
+
 
 @dataclass(frozen=True, eq=False)
 class Examined:
     """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
-    MuJoCo's parser made something else of a URDF; paths, None where they were not asked for."""
+    MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
+    lines on what accuracy costs."""
 
     file: OwnFile
     agreements: tuple[Agreement, ...]
     explained: dict[str, list[tuple[Element, float]]]
     misread: tuple[Misread, ...]
     path: PathReport | None
+    price: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -72,13 +93,19 @@ def kinds(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
-def examine(files: Sequence[Path], without: Sequence[str], states: int = COUNT, march: bool = True) -> Twins:
-    """Certify each file, and compare two; InputError for what cannot be read or built."""
-    if states < 1:
-        raise InputError("--states", "", states, "must be 1 or more")
-    examined = [_examined(read(path, without), states, march) for path in files]
+def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell: Tell = _silent) -> Twins:
+    """Certify each file, and compare two; InputError for what cannot be read or built.
+
+    tell : told what is done now, and which part of all.
+    """
+    if wanted.states < 1:
+        raise InputError("--states", "", wanted.states, "must be 1 or more")
+    read_files = [read(path, without) for path in files]
+    parts = len(files) + (len(files) > 1)
+    examined = [_examined(file, wanted, partial(_told, tell, i, parts)) for i, file in enumerate(read_files)]
     if len(examined) < 2:
         return Twins(tuple(examined), None)
+    tell("comparing the files", len(files) / parts)
     first, second = (each.file.own for each in examined)
     names = [each.name for each in examined]
     if names[0] == names[1]:
@@ -86,11 +113,26 @@ def examine(files: Sequence[Path], without: Sequence[str], states: int = COUNT, 
     return Twins(tuple(examined), compare(replace(first, name=names[0]), replace(second, name=names[1])))
 
 
-def _examined(file: OwnFile, states: int, march: bool) -> Examined:
-    agreements = certificate(file.own, states)
+def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
+    """Tell the share of one file as one of all."""
+    tell(what, (number + share) / parts)
+
+
+def _examined(file: OwnFile, wanted: Wanted, tell: Tell) -> Examined:
+    """One file: the certificate is a third of the work, paths another one, the price the last."""
+    agreements = certificate(file.own, wanted.states, lambda share: tell("comparing accelerations", share / 3))
     explained = {each.build: culprits(file.own, each.build) for each in agreements if not each.alike}
     lost = misread(file) if file.document.kind == "URDF" else []
-    return Examined(file, agreements, explained, tuple(lost), paths(file.own) if march else None)
+    tell("marching", 1 / 3)
+    report = paths(file.own) if wanted.paths else None
+    price: tuple[str, ...] = ()
+    if wanted.tolerance is not None:
+        from models.advice.price.text import lines as price_lines
+        from models.own_model.price import priced
+
+        tell("pricing", 2 / 3)
+        price = tuple(price_lines(priced(file.own, wanted.tolerance, wanted.quantity)))
+    return Examined(file, agreements, explained, tuple(lost), report, price)
 
 
 def lines(twins: Twins) -> list[str]:
@@ -132,7 +174,8 @@ def _file_lines(each: Examined) -> list[str]:
     if each.file.limited:
         rows.append(f"  limits off, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
     rows += [f"  {note}" for note in each.file.notes]
-    return rows + ([f"  {line}" for line in each.path.lines()] if each.path is not None else [])
+    rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
+    return rows + [f"  {line}".rstrip() for line in each.price]
 
 
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
