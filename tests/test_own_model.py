@@ -99,6 +99,20 @@ def test_difference_without_influence_is_listed_as_such(tmp_path, original):
     assert [(each.kind, each.owner) for each in comparison.differences] == [("control range", "actuator 'push'")]
 
 
+def test_a_difference_in_what_is_off_is_listed_as_not_compared(tmp_path):
+    rubbed = CART.replace('name="x"', 'name="x" frictionloss="2" range="-1 1"')
+    first = _read(tmp_path, rubbed, "a.xml", ("friction_loss",))
+    second = _read(
+        tmp_path,
+        rubbed.replace('frictionloss="2" range="-1 1"', 'frictionloss="3" range="-2 1"'),
+        "b.xml",
+        ("friction_loss",),
+    )
+    comparison = compare(first.own, second.own, 3)
+    assert comparison.alike and comparison.silent == ()
+    assert {each.kind for each in comparison.not_compared} == {"friction loss", "range"}
+
+
 def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, original):
     text = JOINTED.replace("</actuator>", '<position name="hold" joint="hinge" kp="4"/></actuator>')
     comparison = compare(original.own, _read(tmp_path, text, "b.xml").own, 3)

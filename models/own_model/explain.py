@@ -21,13 +21,15 @@ from models.own_model.states import random_states
 
 STATES = 20
 """States at which elements are tried."""
+OFF = ("friction loss", "range")
+"""Kinds of elements that are off in both files (see ``content``): a difference in them is listed, and not compared."""
 STILL = 1e-13
 """Relative change of accelerations below which an element has no influence."""
 Key = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Difference:
     """An element that differs: what it is, its values in both files (None: it has none), its unit, and its influence,
     the largest relative change of accelerations when it alone is as in the other file (None where it has no try);
@@ -64,8 +66,19 @@ class Comparison:
 
     @property
     def influential(self) -> tuple[Difference, ...]:
-        """Differences that change accelerations."""
-        return tuple(each for each in self.differences if each.influence is None or each.influence > STILL)
+        """Differences that change accelerations, or could not be tried."""
+        tried = (each for each in self.differences if each.kind not in OFF)
+        return tuple(each for each in tried if each.influence is None or each.influence > STILL)
+
+    @property
+    def not_compared(self) -> tuple[Difference, ...]:
+        """Differences in what is off in both files."""
+        return tuple(each for each in self.differences if each.kind in OFF)
+
+    @property
+    def silent(self) -> tuple[Difference, ...]:
+        """Differences that change no acceleration."""
+        return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
 
 def compare(first: OwnModel, second: OwnModel, count: int = STATES) -> Comparison:

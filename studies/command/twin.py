@@ -190,5 +190,5 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
-    silent = [each for each in comparison.differences if each not in influential]
-    return rows + [f"  without influence: {each.sentence(names)}" for each in silent]
+    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
+    return rows + [f"  not compared, since it is off: {each.sentence(names)}" for each in comparison.not_compared]
