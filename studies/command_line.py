@@ -345,6 +345,39 @@ def export(
 
 
 @app.command()
+def twin(
+    files: Annotated[list[Path], typer.Argument(help="One model, MJCF or URDF, or two to be compared.")],
+    without: Annotated[
+        str, typer.Option(metavar="KINDS", help="Leave out what has no equal, e.g. contact,friction_loss.")
+    ] = "",
+    states: Annotated[int, typer.Option(help="Random states at which accelerations are compared.")] = 100,
+    page: Annotated[Path | None, typer.Option(help="Write one HTML file with all of it there.")] = None,
+    march: Annotated[bool, typer.Option("--paths/--no-paths", help="Compare paths over 1 s, too.")] = True,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Find the engine, integrator and step that hold this error, rad or m.")
+    ] = None,
+    quantity: Annotated[str | None, typer.Option(help="Joint that the tolerance is of; all joints if none.")] = None,
+) -> None:
+    """Build a model of your own in every engine, and prove it equal or tell where it differs.
+
+    The file as MuJoCo parsed it is held to the same model built in Exudyn, in MuJoCo and by plain equations, at random
+    states. Of two files the elements that make them move differently are named. Ends with code 1 if anything differs.
+    """
+    from studies.command.twin import Wanted, check_asked, examine, kinds, lines
+
+    check_asked(files, page)
+    with waiting("building the model") as tell:
+        twins = examine(files, kinds(without), Wanted(states, march, tolerance, quantity), tell)
+    print("\n".join(lines(twins)))
+    if page is not None:
+        from studies.twin_page import write
+
+        print(f"page: {write(twins, page)}")
+    if not twins.alike:
+        raise typer.Exit(1)
+
+
+@app.command()
 def validate(
     quick: Annotated[bool, typer.Option("--quick", help="The named short subset, in about a minute.")] = False,
     against: Annotated[

@@ -13,7 +13,7 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.exudyn_system import KINDS, items, lists
-from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.free_vehicle import anchor, frames, joints
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, steiner
 from models.vehicles.spatial_linear import Preloads
 
@@ -34,7 +34,7 @@ class Build:
     """Exudyn's system while it is put together.
 
     links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
-    coordinate; markers by body and point.
+    coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
     """
 
     vehicle: SpatialVehicle
@@ -44,6 +44,7 @@ class Build:
     links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
     places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
     markers: dict[tuple[str | None, Vector, bool], Any] = field(default_factory=dict)
+    frames: dict[str, np.ndarray] = field(default_factory=dict)
     callbacks: int = 0
 
     def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
@@ -79,8 +80,10 @@ class Build:
 
     def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
         """A vector (3,) of the design position in the axes that Exudyn gives a body."""
-        if body is None or self.links[body][1] is not None:
+        if body is None:
             return vector
+        if self.links[body][1] is not None:
+            return self.frames[body].T @ vector
         return np.array(SLIDES[self.vehicle.body(body).freedoms[0]]).T @ vector
 
     def coordinate(self, node: Any, index: int) -> Any:
@@ -131,6 +134,8 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
     part = replace(built.vehicle, bodies=tuple(bodies))
     rows, places, ends = joints(part), part.coordinates(), {body.name: anchor(part, body.name) for body in bodies}
     links, zero = [Link() for _ in places], [0.0] * len(places)
+    own, below = frames(part), rows[:, 1].astype(int)
+    base = np.array([own[i] if i >= 0 else np.eye(3) for i in below])
     for body in bodies:
         last, origin = ends[body.name]
         links[last].load(body, np.subtract(body.position, origin))
@@ -147,15 +152,16 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
             nodeNumber=node,
             gravity=[0, 0, -built.vehicle.gravity],
             jointTypes=[JOINTS[freedom] for _, freedom in places],
-            linkParents=rows[:, 1].astype(int).tolist(),
-            jointTransformations=lists.Matrix3DList([np.eye(3)] * len(links)),
-            jointOffsets=lists.Vector3DList(list(rows[:, 2:])),
-            linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
-            linkCOMs=lists.Vector3DList([link.centre for link in links]),
+            linkParents=below.tolist(),
+            jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(own, base, strict=True)]),
+            jointOffsets=lists.Vector3DList([b.T @ arm for arm, b in zip(rows[:, 2:], base, strict=True)]),
+            linkInertiasCOM=lists.Matrix3DList([a.T @ link.inertia @ a for a, link in zip(own, links, strict=True)]),
+            linkCOMs=lists.Vector3DList([a.T @ link.centre for a, link in zip(own, links, strict=True)]),
             linkMasses=[link.mass for link in links],
         )
     )
     built.links |= {name: (tree, *end) for name, end in ends.items()}
+    built.frames |= {name: own[end[0]] for name, end in ends.items()}
     built.places |= {place: (node, i) for i, place in enumerate(places)}
 
 

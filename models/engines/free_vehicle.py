@@ -32,7 +32,8 @@ ENGINES = ("exudyn", "mujoco")
 class Driven:
     """vehicle : its bodies right before those that ride on them ; gravity (3,) in m/s^2.
 
-    numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces; block :
+    numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
+    engine has all of them as its own, and calls nothing back; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
     parts, ground_springs : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
     """
@@ -49,6 +50,11 @@ class Driven:
     def size(self) -> int:
         """Number of coordinates of the driven vehicle."""
         return len(self.vehicle.coordinates())
+
+    @property
+    def has_kernel(self) -> bool:
+        """Whether compiled forces act beside the engine's own."""
+        return self.kernel is not None
 
 
 class FreeModel(ABC):

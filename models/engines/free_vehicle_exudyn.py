@@ -10,7 +10,8 @@ from models.engines.assembly import Settings
 from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.native_exudyn import add_ground_spring, add_parts, built_elements
+from models.engines.native_exudyn import add_ground_spring, add_parts, add_rotors, built_elements
+from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
 
@@ -35,10 +36,12 @@ class FreeExudyn(FreeModel):
         self.tree = built.links[bodies[0].name][0]
         self._block = np.concatenate((np.zeros(3 * self.size), driven.numbers))
         mbs.SetObjectParameter(self.tree, "gravity", driven.gravity.tolist())
-        forces = packed_forces(self.size, self._block, driven.block)
-        mbs.SetObjectParameter(self.tree, "forceUserFunction", forces)
+        if driven.has_kernel:
+            forces = packed_forces(self.size, self._block, driven.block)
+            mbs.SetObjectParameter(self.tree, "forceUserFunction", forces)
         node = next(iter(built.places.values()))[0]
         add_parts(built, node, driven.parts)
+        add_rotors(built, node, rotors(driven.vehicle))
         for spring in driven.ground_springs:
             add_ground_spring(built, spring)
         self._sensors = recorders(mbs, [node])
@@ -53,16 +56,20 @@ class FreeExudyn(FreeModel):
         """What was built: degrees of freedom, native items, callbacks."""
         data = self.mbs.systemData
         native = data.NumberOfObjects() + data.NumberOfLoads()
-        return {"degrees of freedom": self.size, "native items": native, "callbacks": 1}
+        return {"degrees of freedom": self.size, "native items": native, "callbacks": int(self.driven.has_kernel)}
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from Exudyn's own residual and mass matrix."""
-        start(self.mbs, q, v)
-        return np.linalg.solve(*mass_and_force(self.mbs, time))
+        return np.linalg.solve(*self.mass_and_force(time, q, v))
 
-    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) by Exudyn's RK44; RunFailed where it stops."""
+    def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Exudyn's own mass matrix (n, n) and residual (n,)."""
         start(self.mbs, q, v)
-        if note := solve(self.mbs, Settings("RK44", step, steps * step)):
+        return mass_and_force(self.mbs, time)
+
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
+        start(self.mbs, q, v)
+        if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))
         return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for (sensor,) in self._sensors])

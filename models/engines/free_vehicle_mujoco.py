@@ -15,7 +15,16 @@ from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
-from models.engines.native_mujoco import add_ground_spring, add_parts, built_elements, ends, set_laws
+from models.engines.native_mujoco import (
+    add_ground_spring,
+    add_parts,
+    add_rotors,
+    built_elements,
+    ends,
+    set_laws,
+    set_rotors,
+)
+from models.engines.native_parts import rotors
 from models.vehicles.spatial import SpatialVehicle
 
 
@@ -41,6 +50,7 @@ def specified(driven: Driven) -> mujoco.MjSpec:
     """Bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills."""
     spec = spec_of(driven.vehicle, 1e-3, _merged(driven))
     add_parts(spec, driven.vehicle, driven.parts)
+    add_rotors(spec, driven.vehicle, rotors(driven.vehicle))
     for spring in driven.ground_springs:
         add_ground_spring(spec, driven.vehicle, spring)
     spec.option.gravity = driven.gravity
@@ -62,6 +72,7 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
         raise ValueError("the bodies are not in the order of a walk through their tree")
     weigh(model, places, driven.vehicle.bodies)
     set_laws(model, driven.parts)
+    set_rotors(model, rotors(driven.vehicle))
     return model
 
 
@@ -85,7 +96,7 @@ class FreeMujoco(FreeModel):
         self.driven, self.size, self.settings = driven, driven.size, settings
         self.model = compiled_model(driven)
         self.data = mujoco.MjData(self.model)
-        self.law = kernel_law(driven.kernel)
+        self.law = kernel_law(driven.kernel) if driven.has_kernel else None
         self._marcher = Marcher(self.model)
         check(self.model, self.data)
 
@@ -109,7 +120,7 @@ class FreeMujoco(FreeModel):
         """What was built: degrees of freedom, native items, callbacks."""
         m = self.model
         native = m.nbody - 1 + m.njnt + m.ntendon + m.nu
-        return {"degrees of freedom": m.nv, "native items": native, "callbacks": 1}
+        return {"degrees of freedom": m.nv, "native items": native, "callbacks": int(self.driven.has_kernel)}
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by ``mj_forward``."""
@@ -117,6 +128,13 @@ class FreeMujoco(FreeModel):
         with installed(self.law):
             mujoco.mj_forward(self.model, self.data)
         return self.data.qacc.copy()
+
+    def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """MuJoCo's own mass matrix (n, n), and the forces (n,) that it holds to move it."""
+        self.acceleration(time, q, v)
+        mass = np.empty((self.size, self.size))
+        mujoco.mj_fullM(self.model, self.data, mass)
+        return mass, self.data.qfrc_smooth.copy()
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""

@@ -48,7 +48,7 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
             built.add_joint(
                 name=f"{numbers[part.name]} {freedom}",
                 type=mujoco.mjtJoint.mjJNT_HINGE if freedom.startswith("r") else mujoco.mjtJoint.mjJNT_SLIDE,
-                axis=AXES[freedom],
+                axis=part.direction(freedom),
                 pos=np.subtract(part.position, body.position),
             )
     return spec

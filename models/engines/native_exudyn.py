@@ -23,8 +23,8 @@ from models.vehicles.free_vehicle import anchor, joints
 Axial = tuple[Element, AxialTravel]
 MASS = 1e-15
 """kg and kg m^2 of a link of a second tree: Exudyn divides by them, and the vehicle must not feel them."""
-LAW, NEXT = "native law: ", "; "
-"""What a name of an object begins with, and what stands between the names of several elements in it."""
+LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
+"""What names of objects begin with, and what stands between the names of several elements in it."""
 
 
 def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
@@ -37,6 +37,23 @@ def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
             axial.append((part.element, part.travel))
     for group in _at_one_place(axial):
         trees.add(group)
+
+
+def add_rotors(built: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+    """Inertias of what turns with a sum of coordinates alone, as one mass matrix beside the tree's."""
+    size = built.size(node)
+    mass = np.zeros((size, size))
+    for _, travel, inertia in rotors:
+        row = np.zeros(size)
+        row[list(travel.coordinates)] = travel.factors
+        mass += inertia * np.outer(row, row)
+    if rotors:
+        names = ROTORS + NEXT.join(_plain(name) for name, _, _ in rotors)
+        nothing = np.zeros((size, size))
+        matrices = {"massMatrix": mass, "stiffnessMatrix": nothing, "dampingMatrix": nothing}
+        built.mbs.AddObject(
+            items.ObjectGenericODE2(name=names, nodeNumbers=[node], forceVector=np.zeros(size), **matrices)
+        )
 
 
 def add_ground_spring(built: Build, spring: GroundSpring) -> None:
@@ -109,6 +126,8 @@ class _Coordinates:
             return self._add_matrix(element, travel)
         if not travel.coordinates:
             return
+        if element.held and not element.stiffness:
+            self._add_loads(element, travel)
         first, *others = [self._marker(i) for i in travel.coordinates]
         factor, *rest = travel.factors
         other, against = (others[0], -rest[0]) if others else (self._still(), 1.0)
@@ -122,6 +141,12 @@ class _Coordinates:
                 **_gains(element),
             )
         )
+
+    def _add_loads(self, element: Element, travel: CoordinateTravel) -> None:
+        """A constant force, which no spring has."""
+        for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
+            load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.held)
+            self.built.mbs.AddLoad(load)
 
     def _add_matrix(self, element: Element, travel: CoordinateTravel) -> None:
         row = np.zeros(self.built.size(self.node))

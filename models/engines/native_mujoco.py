@@ -21,6 +21,8 @@ from models.vehicles.spatial import Curve, SpatialVehicle
 
 ENDLESS = 1e300
 """N: a force range that cuts nothing off."""
+ROTOR = "rotor "
+"""What the name of a tendon begins with that has inertia alone."""
 BREAK = ": "
 """Between the number of a tendon or an actuator and its element's name."""
 
@@ -60,6 +62,24 @@ def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[Nati
         for k, _ in enumerate(affine_forces(part)):
             actuator = spec.add_actuator(name=f"{i}.{k}{BREAK}{part.element.name}", **of)
             actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+
+
+def add_rotors(
+    spec: mujoco.MjSpec, vehicle: SpatialVehicle, rotors: Sequence[tuple[str, CoordinateTravel, float]]
+) -> None:
+    """Tendons for inertias along sums of coordinates; ``set_rotors`` fills them."""
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
+    for i, (name, travel, _) in enumerate(rotors):
+        tendon = spec.add_tendon(name=f"{ROTOR}{i}{BREAK}{name}")
+        for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
+            tendon.wrap_joint(joints[coordinate], factor)
+
+
+def set_rotors(model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+    """Write the inertias into the compiled model."""
+    for i, (name, _, inertia) in enumerate(rotors):
+        model.tendon_armature[model.tendon(f"{ROTOR}{i}{BREAK}{name}").id] = inertia
 
 
 def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from models.vehicles.cut_vehicle import CutVehicle, Element
-from models.vehicles.spatial import FREEDOMS, SpatialVehicle, Vector
+from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Vector
 
 CURVES = ("mujoco",)
 """Engines whose own elements can have a force that is piecewise linear in travel or rate."""
@@ -120,6 +120,35 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
         element = replace(element, friction=0.0)
     acts = element.stiffness or element.damping or element.travel_force or element.rate_force
     return element if acts else None, left if why else None, why
+
+
+def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
+    """The joint elements of a vehicle that have a force, as every engine has them; their inertia is left to it."""
+    return tuple(
+        NativePart(_joint_force(element), CoordinateTravel(_numbers(vehicle, element), element.factors))
+        for element in vehicle.joint_elements
+        if element.stiffness or element.damping or element.held
+    )
+
+
+def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]:
+    """Name, travel and inertia (kg, kg m^2) of the joint elements that have one."""
+    return [
+        (element.name, CoordinateTravel(_numbers(vehicle, element), element.factors), element.inertia)
+        for element in vehicle.joint_elements
+        if element.inertia
+    ]
+
+
+def _numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple[int, ...]:
+    places = {place: i for i, place in enumerate(vehicle.coordinates())}
+    return tuple(places[place] for place in element.coordinates)
+
+
+def _joint_force(element: JointElement) -> Element:
+    """The law of a joint element; it has no points."""
+    still, gains = np.zeros(3), (element.stiffness, element.damping, element.held)
+    return Element(element.name, "", "", still, still, still, *gains, frame="")
 
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:

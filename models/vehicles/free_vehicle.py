@@ -117,6 +117,12 @@ def joints(vehicle: SpatialVehicle) -> np.ndarray:
     return np.array(rows)
 
 
+def frames(vehicle: SpatialVehicle) -> np.ndarray:
+    """(n, 3, 3) of every coordinate: the axes of its body's freedoms in the design position, as columns."""
+    axes = [vehicle.body(name).axes for name, _ in vehicle.coordinates()]
+    return np.array(axes, float).reshape(-1, 3, 3).transpose(0, 2, 1)
+
+
 def _swaying(bar: AntiRollBar) -> AntiRollBar:
     return replace(bar, body=SWAY)
 

@@ -22,6 +22,8 @@ Freedom = Literal["x", "y", "z", "rx", "ry", "rz"]
 
 FREEDOMS: tuple[Freedom, ...] = ("x", "y", "z", "rx", "ry", "rz")
 """Order in which the freedoms of a body are applied and counted."""
+PARALLEL: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Directions of the freedoms of a body unless it says otherwise: along the vehicle's axes."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ class Body:
 
     c its centre, R its rotation, with the coordinates of ``freedoms`` (in the order of FREEDOMS) and zero for every
     other one: translation along the parent's axes, then turning about its own x, then new y, then new z.
+
+    axes : right-handed directions that stand for x, y and z in all six freedoms, unit vectors in the design position,
+    rows of the matrix; with A their transpose, c = c_parent + R_parent (... + A (x, y, z)) and R = R_parent A Rx Ry Rz
+    A^T. All else of the body stays parallel to the vehicle's axes. Other than PARALLEL, ``models.own_model`` alone
+    has them.
     """
 
     name: str
@@ -43,6 +50,29 @@ class Body:
     freedoms: tuple[Freedom, ...]
     inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     parent: str | None = None
+    axes: tuple[Vector, Vector, Vector] = PARALLEL
+
+    def direction(self, freedom: Freedom) -> Vector:
+        """Unit vector (3,) along or about which a freedom moves the body, in the design position."""
+        return self.axes[FREEDOMS.index(freedom) % 3]
+
+
+@dataclass(frozen=True)
+class JointElement:
+    """Spring, damper, constant force and geared rotor along a sum of coordinates, d = sum of factor q.
+
+    F = held + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body, freedom).
+    held (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what turns with d
+    alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` alone has them.
+    """
+
+    name: str
+    coordinates: tuple[tuple[str, Freedom], ...]
+    factors: tuple[float, ...]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    held: float = 0.0
+    inertia: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -268,6 +298,7 @@ class SpatialVehicle:
     ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
     of the axles from the front. ``limits`` : what a reduced vehicle has not, for closed forms of ride alone.
+    ``joint_elements`` : what acts along coordinates themselves.
     """
 
     name: str
@@ -281,6 +312,7 @@ class SpatialVehicle:
     outputs: tuple[SpatialOutput, ...] = ()
     gravity: float = 0.0
     limits: Limits = NONE
+    joint_elements: tuple[JointElement, ...] = ()
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
         """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""

@@ -11,6 +11,7 @@ from models.core.errors import InputError
 from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import (
     FREEDOMS,
+    PARALLEL,
     AntiRollBar,
     Body,
     Limits,
@@ -44,6 +45,7 @@ class Kinematics:
     """
 
     def __init__(self, vehicle: SpatialVehicle) -> None:
+        _check_parallel(vehicle)
         self._bodies = {body.name: body for body in vehicle.bodies}
         self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
         self.size = len(self._index)
@@ -106,6 +108,16 @@ class Kinematics:
         rider = self._bodies[body]
         coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
         return self._motions(rider.parent) + coordinates
+
+
+def _check_parallel(vehicle: SpatialVehicle) -> None:
+    """InputError for what the linear equations do not have."""
+    turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
+    if turned is not None:
+        raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")
+    if vehicle.joint_elements:
+        place = f"joint_elements[{vehicle.joint_elements[0].name}]"
+        raise InputError(vehicle.name, place, None, "is for models read from MJCF and URDF alone")
 
 
 def linearise(

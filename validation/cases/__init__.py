@@ -74,6 +74,7 @@ CASES = (
     "braking_suspension",
     "braking_relaxation",
     "braking_reference",
+    "twin_files",
     "measured_formats",
     "measured_virtual",
     "measured_long",

@@ -140,7 +140,8 @@ def _into_the_scene(recommendation: Recommendation) -> list[str]:
     best = recommendation.winners.get(("", "seconds"))
     if best is None:
         return []
-    return ["", "  in the scene", *(f"    {line}" for line in recommendation.scene.lines(best.tried.setting))]
+    head = getattr(recommendation.scene, "where", "in the scene")
+    return ["", f"  {head}", *(f"    {line}" for line in recommendation.scene.lines(best.tried.setting))]
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:

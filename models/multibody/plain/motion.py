@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.vehicles.spatial import FREEDOMS, SpatialVehicle, Vector
+from models.vehicles.spatial import FREEDOMS, PARALLEL, Freedom, SpatialVehicle, Vector
 
 GROUND = 0
 """Row of the space among the bodies."""
@@ -23,14 +23,14 @@ PLACE, RATE, REST, FIRST = range(4)
 """Rows of a body's matrices: T, T', T'' without q'', then dT/dq of every coordinate."""
 
 
-def generator(freedom: str) -> np.ndarray:
-    """G (4, 4) of a freedom: a shift along, or a turn about, an axis."""
+def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
+    """G (4, 4) of a freedom: a shift along, or a turn about, one of the axes (rows)."""
     kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
+    x, y, z = axes[kind % 3]
     if kind < 3:
-        matrix[kind, 3] = 1.0
+        matrix[:3, 3] = x, y, z
     else:
-        first, second = (kind - 2) % 3, (kind - 1) % 3
-        matrix[second, first], matrix[first, second] = 1.0, -1.0
+        matrix[:3, :3] = (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
     return matrix
 
 
@@ -86,7 +86,7 @@ class Bodies:
         self._arms = [self._arm(vehicle, body.name) for body in vehicle.bodies]
         coordinates = [[i for i, (name, _) in enumerate(self.places) if name == body.name] for body in vehicle.bodies]
         self._coordinates = coordinates
-        self._generators = np.array([generator(freedom) for _, freedom in self.places])
+        self._generators = np.array([generator(f, vehicle.body(name).axes) for name, f in self.places])
         self._squares = self._generators @ self._generators
         self._turns = np.array([freedom.startswith("r") for _, freedom in self.places])
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])

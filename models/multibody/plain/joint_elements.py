@@ -1,0 +1,49 @@
+"""A tree of bodies under weights, loads and what acts along its coordinates: mass matrix and forces in plain numpy.
+
+Nothing here is shared with an engine or with the compiled kernels: bodies move by products of matrices (``motion``).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models.multibody.plain.motion import FIRST, Bodies
+from models.vehicles.spatial import SpatialVehicle, Vector
+
+Load = tuple[str, Vector, np.ndarray]
+"""A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
+
+
+class PlainTree:
+    """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
+
+    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, loads: Sequence[Load] = ()) -> None:
+        self.bodies, self.gravity = Bodies(vehicle), gravity
+        self.size, elements = self.bodies.size, vehicle.joint_elements
+        self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
+        self._points = self.bodies.points([(body, point) for body, point, _ in loads])
+        self._rows = np.zeros((len(elements), self.size))
+        for row, element in zip(self._rows, elements, strict=True):
+            for place, factor in zip(element.coordinates, element.factors, strict=True):
+                row[self.bodies.index(*place)] += factor
+        numbers = [(e.stiffness, e.damping, e.held, e.inertia) for e in elements]
+        self._stiffness, self._damping, self._held, self._inertia = np.array(numbers).reshape(-1, 4).T
+
+    def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mass matrix (n, n) and forces (n,), less what inertia asks without q'', at coordinates and rates (n,)."""
+        motion = self.bodies.move(q, v)
+        mass, force = self.bodies.inertia(motion, self.gravity)
+        along = self._held + self._stiffness * (self._rows @ q) + self._damping * (self._rows @ v)
+        force -= self._rows.T @ along
+        if len(self._loads):
+            force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
+        return mass + self._rows.T * self._inertia @ self._rows, force
+
+    def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Forces (n,) without those of inertia: their power with the rates is the rate of the kinetic energy."""
+        _, inertia = self.bodies.inertia(self.bodies.move(q, v), np.zeros(3))
+        return self.mass_and_force(0.0, q, v)[1] - inertia
+
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at coordinates and rates (n,)."""
+        return np.linalg.solve(*self.mass_and_force(time, q, v))

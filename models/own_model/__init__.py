@@ -1,0 +1,10 @@
+"""A user's own model, read from MJCF or URDF, built in every engine and held to the file as MuJoCo parsed it.
+
+A file becomes the description of ``models.vehicles.spatial``: a body without mass for every joint, along whose axis it
+moves, and a body with the mass behind the last of them. From there on it is any free vehicle: the builders in
+``models.engines`` and the plain equations make it. What is new here is reading, comparing and explaining.
+
+xml_guard : what a file may ask of the parser; content : what has no equal here; reading, coordinates : from MuJoCo's
+compiled model to the description and back; certificate : mass, forces, accelerations at random states; elements,
+explain : the numbers of a file by name, and which of them make a difference; urdf : a URDF read without MuJoCo.
+"""

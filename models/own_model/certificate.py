@@ -1,0 +1,95 @@
+"""Whether builds move alike: mass matrix, forces and accelerations at random states.
+
+Accelerations are compared in the coordinates of the description, each state's difference by the largest acceleration of
+that state; masses and forces by their largest entries. What a badly conditioned mass matrix makes of rounding is
+counted: the bound is 1e-10, or 100 times the rounding of that matrix's condition where this is more, and then said.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.own_model.builds import BUILDS, Equations, Moved, as_parsed, equations
+from models.own_model.reading import OwnModel
+from models.own_model.states import COUNT, random_states
+
+ALIKE = 1e-10
+"""Relative difference up to which accelerations are the same."""
+ROUNDING = 100.0 * float(np.finfo(float).eps)
+SMALL = 1e-6
+"""m/s^2, rad/s^2: what accelerations are compared with where none is larger."""
+QUIET = 1e-3
+"""Share of the largest acceleration of all states, or of gravity, that counts where a state has less: what is there is
+rounding alone, of weights that joints bear."""
+Told = Callable[[float], object]
+"""Told the share that is done."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
+
+    worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
+    rad/s^2; bound : what acceleration may differ by.
+    """
+
+    build: str
+    mass: float
+    force: float
+    acceleration: float
+    worst: str
+    difference: float
+    size: float
+    bound: float
+
+    @property
+    def alike(self) -> bool:
+        """Whether accelerations are the same."""
+        return self.acceleration <= self.bound
+
+
+def certificate(own: OwnModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
+    """Every build of the description beside the file's own model."""
+    states = list(zip(*random_states(own.model, count), strict=True))
+    expected = moved_at(as_parsed(own), states)
+    rows = list[Agreement]()
+    for i, build in enumerate(BUILDS):
+        rows.append(agreement(build, expected, moved_at(equations(own, build), states), own))
+        told((i + 1) / len(BUILDS))
+    return tuple(rows)
+
+
+def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
+    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any."""
+    try:
+        return [move(q, v) for q, v in states]
+    except np.linalg.LinAlgError:
+        raise RunFailed("twin", "the mass matrix is singular: something without inertia can move") from None
+
+
+def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], own: OwnModel) -> Agreement:
+    """Largest differences over all states of a model."""
+    mass = max(_share(a.mass, b.mass) for a, b in zip(expected, seen, strict=True))
+    force = max(_share(a.force, b.force) for a, b in zip(expected, seen, strict=True))
+    largest = max(float(np.abs(a.acceleration).max()) for a in expected)
+    least = QUIET * max(largest, float(np.linalg.norm(own.driven.gravity)))
+    shares = [_share(a.acceleration, b.acceleration, least) for a, b in zip(expected, seen, strict=True)]
+    at = int(np.nanargmax(shares)) if np.isfinite(shares).any() else 0
+    apart = np.abs(seen[at].acceleration - expected[at].acceleration)
+    i = int(apart.argmax())
+    bound = max(ALIKE, ROUNDING * max(_condition(a.mass) for a in expected))
+    size = float(np.abs(expected[at].acceleration[i]))
+    worst = max(shares) if np.isfinite(shares).all() else np.inf
+    return Agreement(build, mass, force, worst, own.names[i], float(apart[i]), size, bound)
+
+
+def _share(expected: np.ndarray, seen: np.ndarray, least: float = 0.0) -> float:
+    return float(np.abs(seen - expected).max() / max(SMALL, least, np.abs(expected).max()))
+
+
+def _condition(mass: np.ndarray) -> float:
+    """Of a mass matrix scaled to a unit diagonal."""
+    scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), np.finfo(float).tiny))
+    return float(np.linalg.cond(mass * np.outer(scale, scale)))

@@ -1,0 +1,259 @@
+"""What a file holds that has no equal in the equations of a tree: refused by name and line, or left out when asked to.
+
+Limits of joints are the exception: as long as no coordinate leaves its range they do nothing, so states are drawn
+inside the ranges, limits are switched off in the file's own model, and that is said.
+"""
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.own_model.coordinates import BALL, FREE
+from models.own_model.reading import is_fixed, label
+from models.own_model.xml_guard import Document
+
+DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
+PLAIN_ACTUATORS = ("motor", "position", "velocity", "general", "damper")
+STATEFUL_ACTUATORS = ("intvelocity", "cylinder", "muscle", "adhesion", "dcmotor", "pid")
+TAGS = {
+    "joint": ("joint", "freejoint"),
+    "tendon": ("fixed", "spatial"),
+    "body": ("body", "link"),
+    "geom": ("geom",),
+    "actuator": (*PLAIN_ACTUATORS, *STATEFUL_ACTUATORS),
+    "equality": ("connect", "weld", "joint", "tendon", "flex"),
+}
+"""Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
+JOINT_TARGETS = (int(TRN.mjTRN_JOINT), int(TRN.mjTRN_JOINTINPARENT))
+AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
+AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
+SHOWN = 3
+"""Names in a message."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """kind : as ``--without`` names it; names : of what it is, with "FILE:LINE" where known; why : no equal."""
+
+    kind: str
+    names: tuple[str, ...]
+    why: str
+
+    def line(self) -> str:
+        """One line on it."""
+        more = f" and {len(self.names) - SHOWN} more" if len(self.names) > SHOWN else ""
+        return f"{self.kind}: {', '.join(self.names[:SHOWN])}{more}: {self.why}"
+
+
+def contents(model: mujoco.MjModel, document: Document) -> list[Content]:
+    """All that has no equal, a row for each kind that the model has."""
+    rows = list[Content]()
+    for kind, (listed, why, _) in KINDS.items():
+        if names := [_with_line(model, document, *each) for each in listed(model)]:
+            rows.append(Content(kind, tuple(names), why))
+    return rows
+
+
+def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
+    """Change the model so that it has none of ``without``; what was left out. InputError for what else has no equal."""
+    for kind in without:
+        if kind not in KINDS:
+            raise InputError("--without", "", kind, "no such content", tuple(KINDS))
+    there = contents(model, document)
+    for row in there:
+        if row.kind not in without:
+            allowed = f"has no equal in the other builds; leave it out with `--without {row.kind}`"
+            all_kinds = ",".join(dict.fromkeys((*without, *(each.kind for each in there))))
+            more = f"; all that this file needs: `--without {all_kinds}`" if len(there) > 1 else ""
+            raise InputError(document.path.name, "", None, f"{row.line()}. It {allowed}{more}")
+    for row in there:
+        KINDS[row.kind][2](model)
+    model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
+    return there
+
+
+def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
+    if number == NAMELESS:
+        return what
+    name = getattr(model, what)(number).name
+    line = document.line(TAGS.get(what, ()), name) if name else ""
+    return f"{label(model, what, number)} ({line})" if line else label(model, what, number)
+
+
+Listed = Iterator[tuple[str, int]]
+"""What MuJoCo calls a thing, and its number there."""
+NAMELESS = -1
+
+
+def _touching(model: mujoco.MjModel) -> Listed:
+    """Geoms that could touch another one, and pairs."""
+    if model.opt.disableflags & int(DSBL.mjDSBL_CONTACT):
+        return
+    weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
+    of = weld[model.geom_bodyid]
+    parents = above[of]
+    for g in range(model.ngeom):
+        fits = (model.geom_contype[g] & model.geom_conaffinity) | (model.geom_conaffinity[g] & model.geom_contype)
+        kin = (of != 0) & (of[g] != 0) & ((parents == of[g]) | (parents[g] == of))
+        if (fits.astype(bool) & (of != of[g]) & ~kin).any():
+            yield "geom", g
+    for p in range(model.npair):
+        yield "pair", p
+
+
+def _rubbing(model: mujoco.MjModel) -> Listed:
+    if model.opt.disableflags & int(DSBL.mjDSBL_FRICTIONLOSS):
+        return
+    for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
+        yield "joint", int(j)
+    for t in np.flatnonzero(model.tendon_frictionloss > 0.0):
+        yield "tendon", int(t)
+
+
+def _equalities(model: mujoco.MjModel) -> Listed:
+    if not model.opt.disableflags & int(DSBL.mjDSBL_EQUALITY):
+        for e in np.flatnonzero(model.eq_active0):
+            yield "equality", int(e)
+
+
+def _odd_actuators(model: mujoco.MjModel) -> Listed:
+    """Those with a state, along a way through space, or that are no affine law."""
+    for i in range(model.nu):
+        target = int(model.actuator_trnid[i, 0])
+        kind = int(model.actuator_trntype[i])
+        along_joint = kind in JOINT_TARGETS and int(model.jnt_type[target]) not in (BALL, FREE)
+        along_tendon = kind == TRN.mjTRN_TENDON and is_fixed(model, target)
+        straight = int(model.actuator_gaintype[i]) in AFFINE_GAINS and int(model.actuator_biastype[i]) in AFFINE_BIASES
+        more = model.actuator_damping[i] or model.actuator_armature[i] or model.actuator_dampingpoly[i].any()
+        stateless = model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE and not model.actuator_delay[i]
+        if not ((along_joint or along_tendon) and straight and stateless) or more:
+            yield "actuator", i
+
+
+def _bounded(model: mujoco.MjModel) -> Listed:
+    if not model.nu:
+        return
+    for i in np.flatnonzero(model.actuator_forcelimited):
+        yield "actuator", int(i)
+    for j in np.flatnonzero(model.jnt_actfrclimited):
+        yield "joint", int(j)
+    for t in np.flatnonzero(model.tendon_actfrclimited):
+        yield "tendon", int(t)
+
+
+def _spatial_tendons(model: mujoco.MjModel) -> Listed:
+    for t in range(model.ntendon):
+        forces = model.tendon_stiffness[t] or model.tendon_damping[t] or model.tendon_armature[t]
+        slack = model.tendon_stiffness[t] and np.ptp(model.tendon_lengthspring[t])
+        if (forces and not is_fixed(model, t)) or slack:
+            yield "tendon", t
+
+
+def _turning_laws(model: mujoco.MjModel) -> Listed:
+    """Springs, dampers and rotors about all axes at once."""
+    for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
+        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
+        rotor = model.dof_armature[first] and model.jnt_type[j] == BALL
+        if model.jnt_stiffness[j] or model.dof_damping[first] or rotor:
+            yield "joint", int(j)
+
+
+def _bent_laws(model: mujoco.MjModel) -> Listed:
+    for j in range(model.njnt):
+        bent = model.jnt_stiffnesspoly[j].any() or model.dof_dampingpoly[model.jnt_dofadr[j]].any()
+        if bent or (model.nplastic and model.jnt_plasticadr[j] >= 0):
+            yield "joint", j
+    for t in range(model.ntendon):
+        bent = model.tendon_stiffnesspoly[t].any() or model.tendon_dampingpoly[t].any()
+        if bent or (model.nplastic and model.tendon_plasticadr[t] >= 0):
+            yield "tendon", t
+
+
+def _medium(model: mujoco.MjModel) -> Listed:
+    if model.opt.density or model.opt.viscosity:
+        yield "density and viscosity", NAMELESS
+
+
+def _flexes(model: mujoco.MjModel) -> Listed:
+    for i in range(model.nflex):
+        yield "flex", i
+
+
+def _forget_contacts(model: mujoco.MjModel) -> None:
+    model.opt.disableflags |= int(DSBL.mjDSBL_CONTACT)
+
+
+def _forget_rubbing(model: mujoco.MjModel) -> None:
+    model.opt.disableflags |= int(DSBL.mjDSBL_FRICTIONLOSS)
+
+
+def _forget_equalities(model: mujoco.MjModel) -> None:
+    model.opt.disableflags |= int(DSBL.mjDSBL_EQUALITY)
+
+
+def _forget_actuators(model: mujoco.MjModel) -> None:
+    """The odd ones push no more; a delayed or stateful one, too, has neither gain nor bias."""
+    for i in [i for _, i in _odd_actuators(model)]:
+        model.actuator_gaintype[i], model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
+        model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
+        model.actuator_damping[i] = model.actuator_armature[i] = 0.0
+        model.actuator_dampingpoly[i] = 0.0
+
+
+def _forget_bounds(model: mujoco.MjModel) -> None:
+    model.actuator_forcelimited[:] = model.jnt_actfrclimited[:] = model.tendon_actfrclimited[:] = 0
+
+
+def _forget_tendons(model: mujoco.MjModel) -> None:
+    for t in [t for _, t in _spatial_tendons(model)]:
+        model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_armature[t] = 0.0
+
+
+def _forget_turning(model: mujoco.MjModel) -> None:
+    for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
+        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
+        model.dof_damping[first : first + 3] = model.jnt_stiffness[j] = 0.0
+        if model.jnt_type[j] == BALL:
+            model.dof_armature[first : first + 3] = 0.0
+
+
+def _forget_bends(model: mujoco.MjModel) -> None:
+    for numbers in ("jnt_stiffnesspoly", "dof_dampingpoly", "tendon_stiffnesspoly", "tendon_dampingpoly"):
+        getattr(model, numbers)[:] = 0.0
+    model.jnt_springyield[:] = model.tendon_springyield[:] = 0.0
+
+
+def _forget_medium(model: mujoco.MjModel) -> None:
+    model.opt.density = model.opt.viscosity = 0.0
+
+
+def _keep_flexes(model: mujoco.MjModel) -> None:
+    raise InputError("", "flex", None, "deformable bodies cannot be left out: their vertices are bodies of the model")
+
+
+KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
+    "contact": (_touching, "bodies that may touch", _forget_contacts),
+    "friction_loss": (_rubbing, "dry friction is a soft constraint in MuJoCo, with no law of its own", _forget_rubbing),
+    "equality": (_equalities, "a soft constraint in MuJoCo", _forget_equalities),
+    "actuator": (
+        _odd_actuators,
+        "a state, a delay, a muscle, a rotor of its own, or a target other than a joint or a fixed tendon",
+        _forget_actuators,
+    ),
+    "force_range": (_bounded, "a force that is cut off at a bound", _forget_bounds),
+    "tendon": (_spatial_tendons, "a spring with a way through space or with slack", _forget_tendons),
+    "turning_law": (_turning_laws, "a spring, damper or rotor about all axes of a ball or free joint", _forget_turning),
+    "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
+    "fluid": (_medium, "forces of a medium", _forget_medium),
+    "flex": (_flexes, "a deformable body", _keep_flexes),
+}
+"""Kinds of content without an equal: what of it a model has, why it has none, and how it is left out."""
+
+
+def ranges(model: mujoco.MjModel) -> list[str]:
+    """Joints and tendons whose limits were switched off."""
+    joints = [label(model, "joint", int(j)) for j in np.flatnonzero(model.jnt_limited)]
+    return joints + [label(model, "tendon", int(t)) for t in np.flatnonzero(model.tendon_limited)]

@@ -1,0 +1,90 @@
+"""Between the coordinates of a description and those of MuJoCo.
+
+Hinges and slides are the same in both but for the zero: here it is the design position, MuJoCo's ``qpos0``. Turning
+without a limit (free and ball joints) has the angles rx, ry, rz here, R = Rx Ry Rz, and a quaternion with angular
+velocities along the body's axes in MuJoCo. With v the rates here, MuJoCo's are J(q) v, its accelerations J a + J' v.
+The angles are singular where ry is a quarter turn: states are drawn away from there.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+SLIDE, BALL, FREE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "BALL", "FREE"))
+
+
+class MujocoState(NamedTuple):
+    """qpos (nq,), qvel (n,), J (n, n) and J' v (n,) at one state."""
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    jacobian: np.ndarray
+    rest: np.ndarray
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Three angles: their first coordinate, the quaternion's place in qpos, the axes (3, 3) of the body's frame in the
+    design position as columns, and whether the quaternion says how the body lies in space (free) or turned (ball)."""
+
+    first: int
+    place: int
+    design: np.ndarray
+    free: bool
+
+
+class Coordinates:
+    """Those of one model; the order is MuJoCo's of its degrees of freedom."""
+
+    def __init__(self, model: mujoco.MjModel, design: mujoco.MjData) -> None:
+        """design : data of the model in the design position, with kinematics computed."""
+        self.size = int(model.nv)
+        self._zero = np.array(model.qpos0)
+        self._plain = list[tuple[int, int]]()
+        self.turnings = list[Turning]()
+        for j in range(model.njnt):
+            kind, place, first = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
+            axes = design.xmat[model.jnt_bodyid[j]].reshape(3, 3).copy()
+            if kind == FREE:
+                self._plain += [(first + i, place + i) for i in range(3)]
+                self.turnings.append(Turning(first + 3, place + 3, axes, True))
+            elif kind == BALL:
+                self.turnings.append(Turning(first, place, axes, False))
+            else:
+                self._plain.append((first, place))
+
+    def positions(self, states: np.ndarray) -> np.ndarray:
+        """Coordinates (m, n) of MuJoCo's states (m, nq + n); what turns without limit is not a number."""
+        out = np.full((len(states), self.size), np.nan)
+        for coordinate, place in self._plain:
+            out[:, coordinate] = states[:, place] - self._zero[place]
+        return out
+
+    def to_mujoco(self, q: np.ndarray, v: np.ndarray) -> MujocoState:
+        """MuJoCo's state at coordinates and rates (n,)."""
+        qpos, jacobian, rest = self._zero.copy(), np.eye(self.size), np.zeros(self.size)
+        for coordinate, place in self._plain:
+            qpos[place] += q[coordinate]
+        for turning in self.turnings:
+            at = slice(turning.first, turning.first + 3)
+            rotation, rates, bias = turned(q[at], v[at])
+            lies = rotation @ turning.design if turning.free else turning.design.T @ rotation @ turning.design
+            mujoco.mju_mat2Quat(qpos[turning.place : turning.place + 4], np.ascontiguousarray(lies).ravel())
+            jacobian[at, at], rest[at] = turning.design.T @ rates, turning.design.T @ bias
+        return MujocoState(qpos, jacobian @ v, jacobian, rest)
+
+
+def turned(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """R = Rx Ry Rz (3, 3), G (3, 3) of the angular velocity G rates in turned axes, and G' rates (3,)."""
+    (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)
+    first = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
+    second = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))
+    third = np.array(((cc, -sc, 0.0), (sc, cc, 0.0), (0.0, 0.0, 1.0)))
+    gains = np.array(((cb * cc, sc, 0.0), (-cb * sc, cc, 0.0), (sb, 0.0, 1.0)))
+    a, b, c = rates
+    change = np.array(
+        ((-sb * cc * b - cb * sc * c, cc * c, 0.0), (sb * sc * b - cb * cc * c, -sc * c, 0.0), (cb * b, 0.0, 0.0))
+    )
+    return first @ second @ third, gains, change @ np.array((a, b, c))

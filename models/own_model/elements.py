@@ -1,0 +1,232 @@
+"""The numbers of a compiled model by name: what is compared between two files, and left out to find what matters.
+
+An element is one property of one thing: "armature of joint 'hip'". Values are those of MuJoCo's compiled model, in SI
+units; an inertia is the tensor in the axes of its body, whichever principal axes a file has.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from models.own_model.coordinates import BALL, FREE, SLIDE
+from models.own_model.reading import label
+
+SAME = 1e-12
+"""Relative difference up to which two values of an element are equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,)."""
+
+    kind: str
+    owner: str
+    unit: str
+    value: np.ndarray
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What it is."""
+        return self.kind, self.owner
+
+    def same(self, other: "Element") -> bool:
+        """Whether both have the same value."""
+        if self.value.shape != other.value.shape:
+            return False
+        size = max(np.abs(self.value).max(initial=0.0), np.abs(other.value).max(initial=0.0))
+        return bool(np.abs(self.value - other.value).max(initial=0.0) <= SAME * size)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A property of all things of one sort: how it is read and written."""
+
+    sort: str
+    kind: str
+    unit: str
+    read: Callable[[mujoco.MjModel, int], np.ndarray]
+    write: Callable[[mujoco.MjModel, int, np.ndarray], None]
+
+
+def elements(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
+    """All elements of a model, in the order of the model."""
+    return {each.key: each for each in _listed(model)}
+
+
+def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
+    """Write an element's value into a model for ``described``; KeyError where it has no such element."""
+    kind, number = _place(model, key)
+    kind.write(model, number, value)
+    model.body_sameframe[:] = 0
+
+
+def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
+    """Take an element out of a model where it can be without; whether it could."""
+    kind, number = _place(model, key)
+    if kind.kind not in DROPPED:
+        return False
+    kind.write(model, number, np.zeros_like(kind.read(model, number)))
+    return True
+
+
+def _listed(model: mujoco.MjModel) -> Iterator[Element]:
+    for kind in KINDS:
+        for number in range(_count(model, kind.sort)):
+            value = np.atleast_1d(np.array(kind.read(model, number), float))
+            if value.size:
+                yield Element(kind.kind, _owner(model, kind, number), _unit(model, kind, number), value)
+
+
+def _place(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
+    for kind in KINDS:
+        if kind.kind == key[0]:
+            for number in range(_count(model, kind.sort)):
+                if _owner(model, kind, number) == key[1]:
+                    return kind, number
+    raise KeyError(key)
+
+
+def _count(model: mujoco.MjModel, sort: str) -> int:
+    return {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon, "actuator": model.nu, "model": 1}[sort]
+
+
+def _owner(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+    return "the model" if kind.sort == "model" else label(model, kind.sort, number)
+
+
+def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+    """Units of turning where two are given, of shifting on a slide."""
+    turning, _, shifting = kind.unit.partition(" | ")
+    slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE, FREE)
+    return shifting if shifting and slides else turning
+
+
+def _body(field: str) -> tuple[Callable, Callable]:
+    return _field(field, lambda model, b: b)
+
+
+def _field(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
+    """Reader and writer of numbers of a compiled model."""
+
+    def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
+        numbers = getattr(model, field)
+        numbers[at(model, number)] = np.reshape(value, np.shape(numbers[at(model, number)]))
+
+    return lambda model, number: np.ravel(getattr(model, field)[at(model, number)]).copy(), write
+
+
+def _of_joint(field: str) -> tuple[Callable, Callable]:
+    return _field(field, lambda model, j: j)
+
+
+def _of_freedoms(field: str) -> tuple[Callable, Callable]:
+    """Numbers of the first freedoms of a joint, which are the same for all of a kind."""
+
+    def places(model: mujoco.MjModel, j: int) -> slice:
+        first = int(model.jnt_dofadr[j])
+        return slice(first, first + {FREE: 6, BALL: 3}.get(int(model.jnt_type[j]), 1))
+
+    return _field(field, places)
+
+
+def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
+    """Where a joint's spring is at rest, from the design position; nothing where there is no spring."""
+    at = int(model.jnt_qposadr[j])
+    several = int(model.jnt_type[j]) in (BALL, FREE)
+    return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]
+
+
+def _write_spring(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
+    at = int(model.jnt_qposadr[j])
+    if value.size:
+        model.qpos_spring[at] = model.qpos0[at] + value[0]
+
+
+def _read_zero(model: mujoco.MjModel, j: int) -> np.ndarray:
+    """What the file calls the design position of a hinge or slide."""
+    at = int(model.jnt_qposadr[j])
+    return np.zeros(0) if int(model.jnt_type[j]) in (BALL, FREE) else model.qpos0[at : at + 1].copy()
+
+
+def _write_zero(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
+    at = int(model.jnt_qposadr[j])
+    model.qpos_spring[at] += value[0] - model.qpos0[at]
+    model.qpos0[at] = value[0]
+
+
+def _read_axis(model: mujoco.MjModel, j: int) -> np.ndarray:
+    return np.zeros(0) if int(model.jnt_type[j]) in (BALL, FREE) else model.jnt_axis[j].copy()
+
+
+def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
+    """The six entries xx, yy, zz, xy, xz, yz of the tensor in the body's axes."""
+    numbers = np.empty(9)
+    mujoco.mju_quat2Mat(numbers, model.body_iquat[b])
+    axes = numbers.reshape(3, 3)
+    tensor = axes * model.body_inertia[b] @ axes.T
+    return np.array([*tensor.diagonal(), tensor[0, 1], tensor[0, 2], tensor[1, 2]])
+
+
+def tensor_of(entries: np.ndarray) -> np.ndarray:
+    """(3, 3) of the six entries of an inertia."""
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+
+
+def _write_inertia(model: mujoco.MjModel, b: int, value: np.ndarray) -> None:
+    moments, axes = np.linalg.eigh(tensor_of(value))
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    model.body_inertia[b] = moments
+    mujoco.mju_mat2Quat(model.body_iquat[b], np.ascontiguousarray(axes).ravel())
+
+
+def _read_gravity(model: mujoco.MjModel, _: int) -> np.ndarray:
+    return np.array(model.opt.gravity)
+
+
+def _write_gravity(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
+    model.opt.gravity[:] = value
+
+
+def _of_actuator(field: str, count: int) -> tuple[Callable, Callable]:
+    return _field(field, lambda model, i: (i, slice(count)))
+
+
+def _coefficients() -> tuple[Callable, Callable]:
+    def places(model: mujoco.MjModel, t: int) -> slice:
+        return slice(int(model.tendon_adr[t]), int(model.tendon_adr[t] + model.tendon_num[t]))
+
+    return _field("wrap_prm", places)
+
+
+KINDS = (
+    _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
+    _Kind("body", "mass", "kg", *_body("body_mass")),
+    _Kind("body", "centre of mass", "m", *_body("body_ipos")),
+    _Kind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
+    _Kind("body", "place", "m", *_body("body_pos")),
+    _Kind("body", "orientation", "quaternion", *_body("body_quat")),
+    _Kind("body", "gravity compensation", "", *_body("body_gravcomp")),
+    _Kind("joint", "axis", "", _read_axis, _of_joint("jnt_axis")[1]),
+    _Kind("joint", "anchor", "m", *_of_joint("jnt_pos")),
+    _Kind("joint", "zero", "rad | m", _read_zero, _write_zero),
+    _Kind("joint", "stiffness", "N m/rad | N/m", *_of_joint("jnt_stiffness")),
+    _Kind("joint", "spring reference", "rad | m", _read_spring, _write_spring),
+    _Kind("joint", "damping", "N m s/rad | N s/m", *_of_freedoms("dof_damping")),
+    _Kind("joint", "armature", "kg m^2 | kg", *_of_freedoms("dof_armature")),
+    _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
+    _Kind("joint", "range", "rad | m", *_of_joint("jnt_range")),
+    _Kind("tendon", "coefficients", "", *_coefficients()),
+    _Kind("tendon", "stiffness", "N/m", *_field("tendon_stiffness", lambda model, t: t)),
+    _Kind("tendon", "damping", "N s/m", *_field("tendon_damping", lambda model, t: t)),
+    _Kind("tendon", "spring length", "m", *_field("tendon_lengthspring", lambda model, t: t)),
+    _Kind("tendon", "armature", "kg", *_field("tendon_armature", lambda model, t: t)),
+    _Kind("actuator", "gear", "", *_of_actuator("actuator_gear", 1)),
+    _Kind("actuator", "gain", "", *_of_actuator("actuator_gainprm", 3)),
+    _Kind("actuator", "bias", "", *_of_actuator("actuator_biasprm", 3)),
+    _Kind("actuator", "control range", "", *_field("actuator_ctrlrange", lambda model, i: i)),
+)
+DROPPED = ("gravity", "gravity compensation", "stiffness", "damping", "armature", "friction loss", "gain", "bias")
+"""Kinds that a model can be without, as zero."""

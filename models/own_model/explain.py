@@ -1,0 +1,235 @@
+"""Which elements of two files make their accelerations differ, by building with each of them as the other file has it.
+
+The builds are the plain equations of the description, which the certificate holds to both files. First all elements
+that differ are taken over together: what is left then has no element. Then each alone: what it changes is its
+influence, and elements that change nothing are listed as without influence.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.own_model.builds import PLAIN, Moved, as_parsed, equations
+from models.own_model.certificate import Agreement, agreement, moved_at
+from models.own_model.elements import Element, drop, elements, put, tensor_of
+from models.own_model.reading import OwnModel, coordinate_names, described
+from models.own_model.states import random_states
+
+STATES = 20
+"""States at which elements are tried."""
+OFF = ("friction loss", "range")
+"""Kinds of elements that are off in both files (see ``content``): a difference in them is listed, and not compared."""
+STILL = 1e-13
+"""Relative change of accelerations below which an element has no influence."""
+Key = tuple[str, str]
+States = list[tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """An element that differs: what it is, its values in both files (None: it has none), its unit, and its influence,
+    the largest relative change of accelerations when it alone is as in the other file (None where it has no try);
+    said : its kind in words, where that says more."""
+
+    kind: str
+    owner: str
+    unit: str
+    first: np.ndarray | None
+    second: np.ndarray | None
+    influence: float | None
+    said: str = ""
+
+    def sentence(self, files: Sequence[str]) -> str:
+        """ "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
+        first, second = (_shown(value, self.unit) for value in (self.first, self.second))
+        return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two files: how far their accelerations are apart, elements that differ with the most influential first, how far
+    they are apart when all of these are taken over, and what has no partner in the other file."""
+
+    apart: Agreement | None
+    differences: tuple[Difference, ...]
+    unexplained: float
+    unmatched: tuple[str, ...]
+
+    @property
+    def alike(self) -> bool:
+        """Whether both move alike."""
+        return self.apart is not None and self.apart.alike
+
+    @property
+    def influential(self) -> tuple[Difference, ...]:
+        """Differences that change accelerations, or could not be tried."""
+        tried = (each for each in self.differences if each.kind not in OFF)
+        return tuple(each for each in tried if each.influence is None or each.influence > STILL)
+
+    @property
+    def not_compared(self) -> tuple[Difference, ...]:
+        """Differences in what is off in both files."""
+        return tuple(each for each in self.differences if each.kind in OFF)
+
+    @property
+    def silent(self) -> tuple[Difference, ...]:
+        """Differences that change no acceleration."""
+        return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
+
+
+def compare(first: OwnModel, second: OwnModel, count: int = STATES) -> Comparison:
+    """Two files at states within the ranges of the first."""
+    unmatched = _unmatched(first, second)
+    if unmatched:
+        return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
+    order = [second.names.index(name) for name in first.names]
+    states = list(zip(*random_states(first.model, count), strict=True))
+    own = moved_at(as_parsed(first), states)
+    other = [_permuted(each, order) for each in moved_at(as_parsed(second), _in_order(states, order))]
+    apart = agreement("the second file", own, other, first)
+    base = moved_at(equations(first, PLAIN), states)
+    trial = _Trial(first, states, base)
+    back = _Trial(second, _in_order(states, order), moved_at(equations(second, PLAIN), _in_order(states, order)))
+    differences = sorted(_differences(first, second, (trial, back)), key=_importance)
+    moved = trial.moved(trial.with_all(elements(second.model), differences))
+    alone = [(each.kind, each.owner) for each in differences if each.first is None]
+    rest = back.moved(back.without(alone))
+    left = agreement("", [_permuted(each, order) for each in rest], moved, first)
+    return Comparison(apart, tuple(differences), left.acceleration, ())
+
+
+def _importance(difference: Difference) -> float:
+    """Sorts the most influential first, and before them what could not be tried."""
+    return -np.inf if difference.influence is None else -difference.influence
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """The first file with elements as the second has them."""
+
+    own: OwnModel
+    states: States
+    base: list[Moved]
+
+    def influence(self, model: mujoco.MjModel) -> float | None:
+        """Largest relative change of accelerations by a changed model; None where it cannot be built."""
+        try:
+            return agreement("", self.base, self.moved(model), self.own).acceleration
+        except RunFailed:
+            return None
+
+    def with_all(self, values: dict[Key, Element], differences: Sequence[Difference]) -> mujoco.MjModel:
+        """The file with all elements that it has as the other has them."""
+        model = copy(self.own.model)
+        for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
+            key = (each.kind, each.owner)
+            if each.first is not None:
+                put(model, key, values[key].value if key in values else np.zeros_like(each.first))
+        return model
+
+    def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
+        """The file with another value of one element."""
+        model = copy(self.own.model)
+        put(model, key, value)
+        return model
+
+    def without(self, keys: Sequence[Key]) -> mujoco.MjModel:
+        """The file without those elements that it can be without."""
+        model = copy(self.own.model)
+        for key in keys:
+            drop(model, key)
+        return model
+
+    def moved(self, model: mujoco.MjModel) -> list[Moved]:
+        """What a changed model does at the states."""
+        return moved_at(equations(described(model, self.own.name), PLAIN), self.states)
+
+
+def _in_order(states: States, order: list[int]) -> States:
+    """States of the first file as coordinates of the second."""
+    places = np.argsort(order)
+    return [(q[places], v[places]) for q, v in states]
+
+
+def _permuted(moved: Moved, order: list[int]) -> Moved:
+    """What the second file does, in the order of the first."""
+    return Moved(moved.mass[np.ix_(order, order)], moved.force[order], moved.acceleration[order])
+
+
+def _unmatched(first: OwnModel, second: OwnModel) -> list[str]:
+    """Coordinates of one file that the other does not have."""
+    names = [(own.name, coordinate_names(own.model)) for own in (first, second)]
+    rows = list[str]()
+    for (file, own), (_, others) in (names, names[::-1]):
+        rows += [f"{name} of {file} has no partner" for name in own if name not in others]
+    return rows
+
+
+def _differences(first: OwnModel, second: OwnModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
+    """Elements that differ; trials : of the first and of the second file, None where there are no common states."""
+    rows, own, others = list[Difference](), elements(first.model), elements(second.model)
+    for key in dict.fromkeys((*own, *others)):
+        one, other = own.get(key), others.get(key)
+        if one is not None and other is not None and one.same(other):
+            continue
+        there = one if one is not None else other
+        if there is None or _says_nothing(there, one, other):
+            continue
+        influence = _influence(trials, key, one, other) if trials is not None else None
+        first_value, second_value = (None if each is None else each.value for each in (one, other))
+        kind = "orientation of the inertia" if _only_turned(key[0], one, other) else key[0]
+        rows.append(Difference(*key, there.unit, first_value, second_value, influence, kind))
+    return rows
+
+
+def _influence(trials: tuple[_Trial, _Trial], key: Key, one: Element | None, other: Element | None) -> float | None:
+    """By taking the other's value over, or by leaving the element out of the second file, which alone has it."""
+    first, second = trials
+    if one is None:
+        return second.influence(second.without([key]))
+    value = np.zeros_like(one.value) if other is None else other.value
+    return first.influence(first.with_one(key, value)) if value.shape == one.value.shape else None
+
+
+def _only_turned(kind: str, one: Element | None, other: Element | None) -> bool:
+    """Whether two inertias have the same principal moments."""
+    if kind != "inertia" or one is None or other is None:
+        return False
+    first, second = (np.linalg.eigvalsh(tensor_of(each.value)) for each in (one, other))
+    return bool(np.abs(first - second).max() <= 1e-9 * first.max())
+
+
+def _says_nothing(there: Element, one: Element | None, other: Element | None) -> bool:
+    """Whether an element that one file lacks is zero in the other."""
+    return (one is None or other is None) and not there.value.any()
+
+
+def _shown(value: np.ndarray | None, unit: str) -> str:
+    """A value with its unit, "none" for zero or nothing."""
+    if value is None or not np.any(value):
+        return "none"
+    numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
+    text = ", ".join(f"{number:.6g}" for number in numbers)
+    return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
+
+
+def culprits(own: OwnModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
+    """Elements without which a build moves as the file's own model does, when both are built without each of them.
+
+    With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
+    """
+    states = list(zip(*random_states(own.model, count), strict=True))
+    rows = list[tuple[Element, float]]()
+    for key, element in elements(own.model).items():
+        model = copy(own.model)
+        if not element.value.any() or not drop(model, key):
+            continue
+        less = described(model, own.name)
+        seen = agreement(build, moved_at(as_parsed(less), states), moved_at(equations(less, build), states), own)
+        if seen.alike:
+            rows.append((element, seen.acceleration))
+    return sorted(rows, key=lambda row: row[1])

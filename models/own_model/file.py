@@ -1,0 +1,77 @@
+"""A file of a user as a compiled model of MuJoCo's own parser, and as the description of it."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.engines.mujoco_quiet import quiet
+from models.own_model.content import Content, check_and_leave_out, ranges
+from models.own_model.reading import OwnModel, described
+from models.own_model.xml_guard import Document, guarded
+
+
+@dataclass(frozen=True, eq=False)
+class OwnFile:
+    """A file that was read.
+
+    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out; limited :
+    joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes : sentences on
+    what reading passed over.
+    """
+
+    document: Document
+    own: OwnModel
+    left_out: tuple[Content, ...]
+    limited: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read(path: Path, without: Collection[str] = ()) -> OwnFile:
+    """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``."""
+    document = guarded(path)
+    model, notes = _compiled(document)
+    _check_sane(model, path.name)
+    left_out = check_and_leave_out(model, document, without)
+    own = described(model, path.stem)
+    return OwnFile(document, own, tuple(left_out), tuple(ranges(model)), tuple(notes))
+
+
+def _compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
+    """By MuJoCo's own parser; InputError with its words, and notes."""
+    path, notes = document.path, list[str]()
+    try:
+        with quiet():
+            if document.kind == "URDF":
+                text, dropped = _without_shapes(path)
+                if dropped:
+                    notes.append(f"{dropped} shapes of links with masses of their own were not read")
+                return mujoco.MjModel.from_xml_string(text), notes
+            return mujoco.MjModel.from_xml_path(str(path)), notes
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(path.name, "", None, f"MuJoCo's parser refuses it: {reason}") from None
+
+
+def _without_shapes(path: Path) -> tuple[str, int]:
+    """Text of a URDF, without the shapes that nothing but contact would need: their files are often elsewhere."""
+    root, dropped = ElementTree.fromstring(path.read_bytes()), 0
+    for link in root.iter("link"):
+        massive = link.find("inertial") is not None
+        for shape in [each for each in link if each.tag == "visual" or (massive and each.tag == "collision")]:
+            link.remove(shape)
+            dropped += shape.tag == "collision"
+    return ElementTree.tostring(root, encoding="unicode"), dropped
+
+
+def _check_sane(model: mujoco.MjModel, name: str) -> None:
+    """InputError where nothing moves, or a number that moves something is not finite."""
+    if not model.nv:
+        raise InputError(name, "", None, "nothing in it can move: it has no joint")
+    for numbers in ("body_mass", "body_inertia", "body_pos", "body_quat", "qpos0", "dof_damping", "dof_armature"):
+        if not np.isfinite(getattr(model, numbers)).all():
+            raise InputError(name, numbers, None, "must be finite numbers")

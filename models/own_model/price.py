@@ -1,0 +1,168 @@
+"""What accuracy costs in a user's own model: which engine, integrator and step hold a coordinate to a tolerance.
+
+The search is that of ``models.advice.price``. Exudyn marches the description, MuJoCo the file's own model, so that what
+its integrators do with joint damping is what the user would have. Coordinates are those of hinges, slides and the
+places of free bodies, from the design position.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.advice.price import Answer, Ladder
+from models.advice.price.meshed import chosen
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import Recommendation, recommend
+from models.core.errors import InputError, RunFailed
+from models.engines.catalogue import CATALOGUE
+from models.own_model.builds import plain_tree
+from models.own_model.path import DURATION, LARGEST, file_path
+from models.own_model.reading import OwnModel
+from models.own_model.states import random_states
+
+ALL = "all"
+"""The quantity of all coordinates together."""
+PER_SECOND = (40, 50, 80, 100, 160, 200, 250, 400, 500, 800, 1000, 1600, 2000, 4000, 8000, 16000, 32000)
+STEPS = tuple(1.0 / n for n in PER_SECOND)
+"""s: tried by every method."""
+METHODS = {
+    "exudyn": ("RK44", "RK33", "ExplicitMidpoint", "ExplicitEuler", "GeneralizedAlpha", "TrapezoidalIndex2"),
+    "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
+}
+STAGES = {"RK44": 4, "RK4": 4, "RK33": 3, "ExplicitMidpoint": 2}
+EXACT, TIGHT = "DOP853", 1e-10
+"""Method of another family about the plain equations, and its relative tolerance."""
+USUAL_STEP = 5e-3
+"""s: taken for Exudyn's default method, which has none of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class PricedModel:
+    """See ``models.advice.price.OwnScene``: 1 s from a random state, as the paths of the certificate."""
+
+    own: OwnModel
+    quantity: str
+    where = "in the engine"
+    whole = first = DURATION
+    cell = 0.0
+    counted = "force calls"
+
+    @property
+    def title(self) -> str:
+        """Name of the model."""
+        return self.own.name
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Coordinates that the quantity is."""
+        places = named_coordinates(self.own)
+        return [i for name, i in places.items() if self.quantity in (ALL, name)]
+
+    @property
+    def unit(self) -> str:
+        """rad, m, or both."""
+        kinds = {unit_of(self.own, i) for i in self.columns}
+        return kinds.pop() if len(kinds) == 1 else "rad or m"
+
+    @property
+    def note(self) -> str:
+        """What the run is."""
+        return "from the random state of the paths; MuJoCo marches the file's own model, Exudyn the description"
+
+    def ladders(self) -> list[Ladder]:
+        """Every method; MuJoCo's default step is the file's."""
+        return [
+            Ladder(engine, method, STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method))
+            for engine, methods in METHODS.items()
+            for method in methods
+        ]
+
+    def _default(self, engine: str, method: str) -> float:
+        defaults = {("mujoco", "Euler"): float(self.own.model.opt.timestep), ("exudyn", "GeneralizedAlpha"): USUAL_STEP}
+        wanted = defaults.get((engine, method), 0.0)
+        return min(STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
+
+    def reference(self) -> Ladder:
+        """MuJoCo's RK4, which is the fastest, with halved steps."""
+        return Ladder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
+
+    def second(self, last: Setting) -> Setting | None:
+        """A Runge-Kutta method of order 8 about the plain equations."""
+        return Setting("reference", EXACT, last.value, 0)
+
+    def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
+        """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
+        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.own.model, 1)
+        path = self._path(setting, (q, v), steps)
+        if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
+            raise RunFailed(setting.engine, "the motion blows up at this step")
+        calls = steps * STAGES.get(setting.method, 1)
+        return setting.value * np.arange(steps + 1), path, calls
+
+    def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
+        """Values (steps + 1, k) of the quantity."""
+        own, step = self.own, setting.value
+        if setting.engine == "mujoco":
+            states = file_path(own, start, (steps, step), setting.method)
+            return own.coordinates.positions(states)[:, self.columns]
+        if setting.engine == "exudyn":
+            from models.engines.free_vehicle_exudyn import FreeExudyn
+
+            path: np.ndarray = FreeExudyn(own.driven).march(*start, steps, step, setting.method)[:, self.columns]
+            return path
+        return self._exact(start, steps, step)
+
+    def _exact(self, start: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
+        tree, n = plain_tree(self.own), self.own.size
+
+        def rates(t: float, state: np.ndarray) -> np.ndarray:
+            return np.concatenate((state[n:], tree.acceleration(t, state[:n], state[n:])))
+
+        times = step * np.arange(steps + 1)
+        span, rows = (0.0, float(times[-1])), times[:: max(1, steps // 200)]
+        done = solve_ivp(rates, span, np.concatenate(start), EXACT, rows, dense_output=True, rtol=TIGHT, atol=TIGHT)
+        if not done.success:
+            raise RunFailed("reference", done.message)
+        states: np.ndarray = done.sol(times).T
+        return states[:, self.columns]
+
+    def answer(self, solution: Any) -> Answer:
+        """The quantity with the force calls that it took."""
+        times, values, calls = solution
+        return Answer(times, values, {"force calls": calls})
+
+    def lines(self, setting: Setting) -> list[str]:
+        """The setting as an engine is told it."""
+        if setting.engine == "mujoco":
+            return [f'<option integrator="{setting.method}" timestep="{setting.value:g}"/>']
+        return [f"exudyn.DynamicSolverType.{setting.method}, steps of {setting.value:g} s"]
+
+
+def priced(own: OwnModel, tolerance: float, quantity: str | None) -> Recommendation:
+    """The cheapest settings of a model; InputError for what cannot be asked."""
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
+    places = named_coordinates(own)
+    if not places:
+        raise InputError(own.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
+    return recommend(PricedModel(own, chosen(quantity or ALL, {ALL: None, **places})), tolerance)
+
+
+def named_coordinates(own: OwnModel) -> dict[str, int]:
+    """Coordinates that MuJoCo has, too, by the names of their joints."""
+    names, angles = own.names, {turning.first + i for turning in own.coordinates.turnings for i in range(3)}
+    return {_bare(name): i for i, name in enumerate(names) if i not in angles}
+
+
+def _bare(name: str) -> str:
+    """A joint's name without what it is, as a user types it."""
+    return name.removeprefix("joint ").replace("'", "")
+
+
+def unit_of(own: OwnModel, coordinate: int) -> str:
+    """ "rad" or "m"."""
+    _, freedom = own.driven.vehicle.coordinates()[coordinate]
+    return "rad" if freedom.startswith("r") else "m"

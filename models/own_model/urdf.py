@@ -1,0 +1,188 @@
+"""A URDF read without MuJoCo, and held to what MuJoCo's parser made of it: masses, inertias, origins and axes.
+
+Links that are fixed to one another are one body in MuJoCo: masses, centres and inertias are summed over them. All is
+compared in the design position, in the axes of space. After the specification of URDF (ROS): rpy turns about the fixed
+x, then y, then z; an axis is (1, 0, 0) where none is given; an inertia is in the axes of its own origin.
+"""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.own_model.file import OwnFile
+from models.own_model.reading import label
+from models.vehicles.spatial import steiner
+
+SAME = 1e-6
+"""Relative: MuJoCo's parser keeps all digits, yet principal axes cost some."""
+MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+
+
+@dataclass(frozen=True)
+class Misread:
+    """What MuJoCo's parser made something else of: kind, owner, unit, the file's value, and the parser's."""
+
+    kind: str
+    owner: str
+    unit: str
+    in_file: np.ndarray
+    parsed: np.ndarray
+
+    def sentence(self) -> str:
+        """In words."""
+        said = [", ".join(f"{number:.6g}" for number in np.ravel(each)) for each in (self.in_file, self.parsed)]
+        return f"{self.kind} of {self.owner}: ({said[0]}) {self.unit} in the file, ({said[1]}) as MuJoCo parsed it"
+
+
+@dataclass
+class _Link:
+    """A link in the design position: its place and axes, the moving link that it is fixed to, and its joint."""
+
+    place: np.ndarray
+    axes: np.ndarray
+    group: str
+
+
+@dataclass
+class _Mass:
+    """Mass (kg), centre (m) and inertia about it (kg m^2), in space."""
+
+    mass: float = 0.0
+    centre: np.ndarray | None = None
+    inertia: np.ndarray | None = None
+
+    def add(self, mass: float, centre: np.ndarray, inertia: np.ndarray) -> None:
+        """Another one, fixed to this one."""
+        if self.centre is None or self.inertia is None:
+            self.mass, self.centre, self.inertia = mass, centre, inertia
+            return
+        total = self.mass + mass
+        middle = (self.mass * self.centre + mass * centre) / total if total else centre
+        moved = steiner(self.mass, self.centre - middle) + steiner(mass, centre - middle)
+        self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
+
+
+def misread(file: OwnFile) -> list[Misread]:
+    """Numbers of a URDF that MuJoCo's compiled model has otherwise, each with both values."""
+    root = ElementTree.fromstring(file.document.path.read_bytes())
+    model, design = file.own.model, mujoco.MjData(file.own.model)
+    design.qpos[:] = model.qpos0
+    mujoco.mj_kinematics(model, design)
+    links, joints = _placed(root, file.document.path.name)
+    rows = list[Misread]()
+    for name, expected in _masses(root, links, file.document.path.name).items():
+        rows += _compared_mass(model, design, name, expected)
+    for name, (anchor, axis) in joints.items():
+        rows += _compared_joint(model, design, name, anchor, axis)
+    return rows
+
+
+def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expected: _Mass) -> list[Misread]:
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    if body <= 0 or expected.centre is None or expected.inertia is None:
+        return []
+    axes, owner = design.ximat[body].reshape(3, 3), label(model, "body", body)
+    tensor = axes * model.body_inertia[body] @ axes.T
+    pairs = (
+        ("mass", "kg", np.array([expected.mass]), np.array([model.body_mass[body]])),
+        ("centre of mass", "m", expected.centre, design.xipos[body]),
+        ("inertia", "kg m^2", expected.inertia, tensor),
+    )
+    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _same(a, b, kind)]
+
+
+def _compared_joint(
+    model: mujoco.MjModel, design: mujoco.MjData, name: str, anchor: np.ndarray, axis: np.ndarray
+) -> list[Misread]:
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint < 0:
+        return []
+    owner = label(model, "joint", joint)
+    pairs = (("axis", "", axis, design.xaxis[joint]), ("anchor", "m", anchor, design.xanchor[joint]))
+    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _same(a, b, kind)]
+
+
+def _same(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
+    least = 1.0 if kind in ("axis", "anchor", "centre of mass") else 0.0
+    size = max(np.abs(expected).max(), np.abs(parsed).max(), least)
+    return bool(np.abs(expected - parsed).max() <= SAME * size)
+
+
+def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """Links by name in the design position, and anchors and axes in space of the hinges and slides by name."""
+    joints = list(root.iter("joint"))
+    children = {_end(joint, "child") for joint in joints}
+    links = {
+        name: _Link(np.zeros(3), np.eye(3), name)
+        for name in (link.get("name", "") for link in root.iter("link"))
+        if name not in children
+    }
+    axes, waiting = dict[str, tuple[np.ndarray, np.ndarray]](), joints
+    while waiting:
+        ready = [joint for joint in waiting if _end(joint, "parent") in links]
+        if not ready:
+            return links, axes  # a loop, which MuJoCo's parser has refused
+        for joint in ready:
+            above, child = links[_end(joint, "parent")], _end(joint, "child")
+            shift, turn = _origin(joint, file)
+            moves = joint.get("type") in MOVING
+            link = _Link(above.place + above.axes @ shift, above.axes @ turn, child if moves else above.group)
+            links[child] = link
+            if joint.get("type") in MOVING[:3]:
+                axis = _numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), file)
+                axes[joint.get("name", "")] = link.place, link.axes @ (axis / np.linalg.norm(axis))
+        waiting = [joint for joint in waiting if joint not in ready]
+    return links, axes
+
+
+def _masses(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
+    """Mass, centre and inertia of all links that are fixed to one another, by the one that moves."""
+    sums = dict[str, _Mass]()
+    for element in root.iter("link"):
+        inertial, link = element.find("inertial"), links.get(element.get("name", ""))
+        if inertial is None or link is None:
+            continue
+        shift, turn = _origin(inertial, file)
+        mass = float(_numbers(inertial.find("mass"), "value", (0.0,), file)[0])
+        tensor, axes = _tensor(inertial.find("inertia"), file), link.axes @ turn
+        sums.setdefault(link.group, _Mass()).add(mass, link.place + link.axes @ shift, axes @ tensor @ axes.T)
+    return sums
+
+
+def _tensor(element: ElementTree.Element | None, file: str) -> np.ndarray:
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    xx, xy, xz, yy, yz, zz = (float(_numbers(element, name, (0.0,), file)[0]) for name in names)
+    return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+
+
+def _end(joint: ElementTree.Element, which: str) -> str:
+    end = joint.find(which)
+    return "" if end is None else end.get("link", "")
+
+
+def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
+    """Shift (3,) and rotation (3, 3) of an <origin>."""
+    origin = element.find("origin")
+    roll, pitch, yaw = _numbers(origin, "rpy", (0.0, 0.0, 0.0), file)
+    (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
+    x = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
+    y = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))
+    z = np.array(((cc, -sc, 0.0), (sc, cc, 0.0), (0.0, 0.0, 1.0)))
+    return _numbers(origin, "xyz", (0.0, 0.0, 0.0), file), z @ y @ x
+
+
+def _numbers(element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str) -> np.ndarray:
+    """Numbers of an attribute; InputError where they are none, or not as many as wanted."""
+    text = None if element is None else element.get(name)
+    if text is None:
+        return np.array(default)
+    try:
+        numbers = np.array([float(part) for part in text.split()])
+    except ValueError:
+        raise InputError(file, name, text, "must be numbers") from None
+    if len(numbers) != len(default):
+        raise InputError(file, name, text, f"must be {len(default)} numbers")
+    return numbers

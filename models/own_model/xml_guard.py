@@ -1,0 +1,150 @@
+"""What a file of a model may ask of the parser, looked at before MuJoCo sees it; nothing in a file is executed.
+
+Refused, with the line: what is no XML, document types and entities, plugins, includes and attached models outside the
+file's folder, and counts that no machine could hold.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+from models.core.errors import InputError
+
+LARGEST = 20_000_000
+"""Bytes of a file."""
+DEEPEST = 8
+"""Includes within includes."""
+MOST = 2000
+"""Copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an attack."""
+ROOTS = {"mujoco": "MJCF", "mujocoinclude": "MJCF", "robot": "URDF"}
+PLUGINS = ("plugin", "extension")
+
+
+@dataclass(frozen=True)
+class XmlElement:
+    """tag, attributes, and where it stands: file, line, and the tags around it, outermost first."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: str
+    line: int
+    around: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their order."""
+
+    path: Path
+    kind: str
+    elements: tuple[XmlElement, ...]
+
+    def line(self, tags: tuple[str, ...], name: str) -> str:
+        """ "FILE:LINE" of the first element with one of the tags and the name; "" where there is none."""
+        for element in self.elements:
+            if element.tag in tags and element.attributes.get("name") == name:
+                return f"{element.file}:{element.line}"
+        return ""
+
+
+@dataclass
+class _Reader:
+    path: Path
+    elements: list[XmlElement] = field(default_factory=list)
+    around: list[str] = field(default_factory=list)
+
+    def read(self, content: bytes) -> list[XmlElement]:
+        parser = self._parser = expat.ParserCreate()
+        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+        parser.StartDoctypeDeclHandler = self._refuse_types
+        try:
+            parser.Parse(content, True)
+        except expat.ExpatError as error:
+            what = expat.ErrorString(error.code)
+            raise InputError(self.path.name, f"line {error.lineno}", None, f"is no well-formed XML: {what}") from None
+        except (ValueError, LookupError) as error:
+            raise InputError(self.path.name, f"line {parser.CurrentLineNumber}", None, f"is no XML: {error}") from None
+        return self.elements
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        line = self._parser.CurrentLineNumber
+        self.elements.append(XmlElement(tag, attributes, self.path.name, line, tuple(self.around)))
+        self.around.append(tag)
+
+    def _end(self, tag: str) -> None:
+        self.around.pop()
+
+    def _refuse_types(self, *_: Any) -> None:
+        place = f"line {self._parser.CurrentLineNumber}"
+        raise InputError(self.path.name, place, "DOCTYPE", "document types and entities are not read")
+
+
+def guarded(path: Path) -> Document:
+    """The file's elements; InputError for what must not reach the parser."""
+    folder, elements = path.resolve().parent, list[XmlElement]()
+    _read(path, folder, elements, 0)
+    root = elements[0].tag
+    if root not in ROOTS:
+        allowed = "must be <mujoco> (MJCF) or <robot> (URDF)"
+        raise InputError(path.name, f"line {elements[0].line}", f"<{root}>", allowed)
+    return Document(path, ROOTS[root], tuple(elements))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(str(path), "", path.stat().st_size, f"bytes: a model may have {LARGEST} at the most")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), "", None, f"cannot be read: {error.strerror or error}") from None
+
+
+def _read(path: Path, folder: Path, elements: list[XmlElement], depth: int) -> None:
+    for element in _Reader(path).read(_content(path)):
+        elements.append(element)
+        place = f"line {element.line}"
+        if element.tag in PLUGINS or "plugin" in element.attributes:
+            raise InputError(path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
+        if element.tag in ("include", "model") and "file" in element.attributes:
+            _include(path, folder, element, elements, depth)
+        _check_counts(path, element, place)
+
+
+def _include(path: Path, folder: Path, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
+    """Read what an element includes, unless it lies outside."""
+    name, place = element.attributes["file"], f"line {element.line}"
+    target = (path.resolve().parent / name).resolve()
+    if not target.is_relative_to(folder):
+        raise InputError(path.name, place, name, f"<{element.tag}> must name a file in the folder of the model")
+    if depth >= DEEPEST:
+        raise InputError(path.name, place, name, f"includes go {DEEPEST} deep at the most")
+    _read(target, folder, elements, depth + 1)
+
+
+def _check_counts(path: Path, element: XmlElement, place: str) -> None:
+    if element.tag not in ("replicate", "composite", "flexcomp", "size"):
+        return
+    if element.tag == "size":
+        for name in ("memory", "nstack", "njmax", "nconmax", "nuserdata"):
+            if name in element.attributes and not _modest(element.attributes[name]):
+                raise InputError(path.name, place, element.attributes[name], f"<size> asks for too much {name}")
+        return
+    product = 1.0
+    for text in element.attributes.get("count", "1").split():
+        try:
+            product *= max(1.0, abs(float(text)))
+        except ValueError:
+            raise InputError(path.name, place, text, "count must be whole numbers") from None
+    if not product <= MOST:
+        raise InputError(path.name, place, element.attributes["count"], f"asks for more than {MOST} copies")
+
+
+def _modest(text: str) -> bool:
+    """Whether an amount of memory, as MuJoCo writes it (100M), is below 4 GB."""
+    units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
+    number, unit = (text[:-1], units[text[-1:].upper()]) if text[-1:].upper() in units else (text, 1)
+    try:
+        return float(number) * unit <= 4 * 2**30
+    except ValueError:
+        return True  # MuJoCo's parser says what is wrong with it

@@ -1,0 +1,194 @@
+"""``twinrig twin``: a user's own model in every build, or two files beside one another."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from models.core.errors import InputError
+from models.own_model.certificate import Agreement, certificate
+from models.own_model.elements import Element
+from models.own_model.explain import Comparison, compare, culprits
+from models.own_model.file import OwnFile, read
+from models.own_model.path import PathReport, paths
+from models.own_model.states import COUNT
+from models.own_model.urdf import Misread, misread
+
+Tell = Callable[[str, float], None]
+"""Told what is done now, and which part of all (0 to 1)."""
+
+
+def _silent(what: str, share: float) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """states : random ones, at which accelerations are compared; paths : whether they are compared, too; tolerance
+    (rad, m), quantity : of the price, None for none and for all joints."""
+
+    states: int = COUNT
+    paths: bool = True
+    tolerance: float | None = None
+    quantity: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
+    MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
+    lines on what accuracy costs."""
+
+    file: OwnFile
+    agreements: tuple[Agreement, ...]
+    explained: dict[str, list[tuple[Element, float]]]
+    misread: tuple[Misread, ...]
+    path: PathReport | None
+    price: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+        return self.file.document.path.name
+
+    @property
+    def certified(self) -> bool:
+        """Whether all builds move as the file does, and the parser lost nothing."""
+        return all(each.alike for each in self.agreements) and not self.misread
+
+
+@dataclass(frozen=True, eq=False)
+class Twins:
+    """What the command found: one file or two, and their comparison."""
+
+    examined: tuple[Examined, ...]
+    comparison: Comparison | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the files."""
+        return tuple(each.name for each in self.examined)
+
+    @property
+    def alike(self) -> bool:
+        """Whether nothing differs."""
+        files = all(each.certified for each in self.examined)
+        return files and (self.comparison is None or self.comparison.alike)
+
+
+def check_asked(files: Sequence[Path], page: Path | None) -> None:
+    """InputError for too many files, and for a page that cannot be written."""
+    if len(files) > 2:
+        raise InputError("FILES", "", len(files), "files: one, or two to be compared")
+    if page is None:
+        return
+    if page.exists():
+        raise InputError("--page", "", str(page), "is there already, and nothing is overwritten: name another file")
+    if not page.parent.is_dir():
+        raise InputError("--page", "", str(page), "lies in a folder that does not exist")
+
+
+def kinds(text: str) -> tuple[str, ...]:
+    """Kinds of content in an option: names between commas."""
+    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+
+
+def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell: Tell = _silent) -> Twins:
+    """Certify each file, and compare two; InputError for what cannot be read or built.
+
+    tell : told what is done now, and which part of all.
+    """
+    if wanted.states < 1:
+        raise InputError("--states", "", wanted.states, "must be 1 or more")
+    read_files = [read(path, without) for path in files]
+    parts = len(files) + (len(files) > 1)
+    examined = [_examined(file, wanted, partial(_told, tell, i, parts)) for i, file in enumerate(read_files)]
+    if len(examined) < 2:
+        return Twins(tuple(examined), None)
+    tell("comparing the files", len(files) / parts)
+    first, second = (each.file.own for each in examined)
+    names = [each.name for each in examined]
+    if names[0] == names[1]:
+        names = [str(path) for path in files]
+    return Twins(tuple(examined), compare(replace(first, name=names[0]), replace(second, name=names[1])))
+
+
+def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
+    """Tell the share of one file as one of all."""
+    tell(what, (number + share) / parts)
+
+
+def _examined(file: OwnFile, wanted: Wanted, tell: Tell) -> Examined:
+    """One file: the certificate is a third of the work, paths another one, the price the last."""
+    agreements = certificate(file.own, wanted.states, lambda share: tell("comparing accelerations", share / 3))
+    explained = {each.build: culprits(file.own, each.build) for each in agreements if not each.alike}
+    lost = misread(file) if file.document.kind == "URDF" else []
+    tell("marching", 1 / 3)
+    report = paths(file.own) if wanted.paths else None
+    price: tuple[str, ...] = ()
+    if wanted.tolerance is not None:
+        from models.advice.price.text import lines as price_lines
+        from models.own_model.price import priced
+
+        tell("pricing", 2 / 3)
+        price = tuple(price_lines(priced(file.own, wanted.tolerance, wanted.quantity)))
+    return Examined(file, agreements, explained, tuple(lost), report, price)
+
+
+def lines(twins: Twins) -> list[str]:
+    """What the terminal shows."""
+    rows = list[str]()
+    for each in twins.examined:
+        rows += _file_lines(each)
+    return rows + (_comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else [])
+
+
+def verdict(each: Examined) -> str:
+    """One sentence on a file."""
+    worst = max(row.acceleration for row in each.agreements)
+    if each.misread:
+        return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
+    if each.certified:
+        return f"every build moves as the file does: accelerations differ by {worst:.1e} at the most"
+    builds = ", ".join(row.build for row in each.agreements if not row.alike)
+    return f"differs in {builds}: accelerations by {worst:.1e}"
+
+
+def _file_lines(each: Examined) -> list[str]:
+    model, own = each.file.own.model, each.file.own
+    rows = [
+        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {own.size} coordinates, "
+        f"{model.ntendon} tendons, {model.nu} actuators",
+        f"  {verdict(each)}",
+    ]
+    for row in each.agreements:
+        rows.append(
+            f"    {row.build:7s} mass {row.mass:.1e}  forces {row.force:.1e}  accelerations {row.acceleration:.1e}"
+            f"{'' if row.alike else f'  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}'}"
+        )
+    for build, elements in each.explained.items():
+        said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
+        rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
+    rows += [f"  {lost.sentence()}" for lost in each.misread]
+    rows += [f"  left out: {content.line()}" for content in each.file.left_out]
+    if each.file.limited:
+        rows.append(f"  limits off, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
+    rows += [f"  {note}" for note in each.file.notes]
+    rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
+    return rows + [f"  {line}".rstrip() for line in each.price]
+
+
+def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
+    if comparison.apart is None:
+        rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
+        return rows + [f"  {each.sentence(names)}" for each in comparison.differences]
+    apart, influential = comparison.apart, comparison.influential
+    head = "both files move alike" if comparison.alike else "the files do not move alike"
+    rows = [f"{head}: accelerations differ by {apart.acceleration:.1e}, most at {apart.worst}"]
+    for each in influential:
+        size = "cannot be tried" if each.influence is None else f"changes accelerations by {each.influence:.1e}"
+        rows.append(f"  {each.sentence(names)} ({size})")
+    if not comparison.alike:
+        rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
+    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
+    return rows + [f"  not compared, since it is off: {each.sentence(names)}" for each in comparison.not_compared]

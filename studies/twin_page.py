@@ -1,0 +1,60 @@
+"""The page of a user's own model: one HTML file with everything in it, to be mailed; its words are in the template."""
+
+import platform
+import sys
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.whole_files import write_whole
+from models.own_model.elements import Element, elements
+from studies.command.twin import Twins, verdict
+
+TEMPLATE = "twin.html.jinja"
+
+
+def write(twins: Twins, path: Path) -> Path:
+    """Write the page, whole or not at all; returns its path."""
+    write_whole(path, page(twins))
+    return path
+
+
+def page(twins: Twins) -> str:
+    """The page as text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"short": lambda number: f"{number:.1e}", "g": lambda number: f"{number:.6g}"}
+    return environment.get_template(TEMPLATE).render(
+        twins=twins,
+        title=" and ".join(twins.names),
+        verdicts=[verdict(each) for each in twins.examined],
+        tables=[_rows(list(elements(each.file.own.model).values())) for each in twins.examined],
+        hashes=[sha256(each.file.document.path.read_bytes()).hexdigest() for each in twins.examined],
+        command=" ".join(sys.argv),
+        versions={name: version(name) for name in ("twinrig", "mujoco", "exudyn", "numpy")},
+        python=platform.python_version(),
+    )
+
+
+def _rows(listed: list[Element]) -> list[dict[str, Any]]:
+    """Elements that are not zero, with their values as text."""
+    return [
+        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": _text(each.value)}
+        for each in listed
+        if each.value.any()
+    ]
+
+
+def _text(value: np.ndarray) -> str:
+    numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
+    return ", ".join(f"{number:.6g}" for number in numbers)

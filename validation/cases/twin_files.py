@@ -1,0 +1,94 @@
+"""Models in MJCF and URDF: every build beside the file as MuJoCo parsed it, and planted differences of two files."""
+
+from importlib import import_module
+from pathlib import Path
+
+from models.core.systems import SYSTEMS, load
+from models.own_model.certificate import Agreement, certificate
+from models.own_model.content import KINDS
+from models.own_model.explain import compare
+from models.own_model.file import OwnFile, read
+from models.own_model.path import ALIKE, paths
+from validation.common.rows import CaseAnswer, Observed, Row, System
+from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
+
+TITLE = "A user's own model: MJCF and URDF in every build"
+SYSTEM: System = "rolling-vehicle"
+STATES, QUICK_STATES = 100, 5
+SCENES = Path(__file__).parents[2] / "studies" / "scenes"
+EXPORTED = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
+"""Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
+OUTSIDE = tuple(kind for kind in KINDS if kind not in ("flex", "turning_law"))
+"""Content that is left out of exported vehicles: springs along axes of bodies are actuators at sites there."""
+
+
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """Quick: three models, five states, six planted differences; in full 20 models, eight of them exported, all 30."""
+    texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF}
+    if not quick:
+        texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
+        texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
+    rows = [_agreement(name, _read(folder, name, text), quick) for name, text in texts.items()]
+    rows += [] if quick else [_agreement(name, _exported(folder, name), quick) for name in EXPORTED]
+    return [*rows, *_path(folder), _planted(folder, quick)], {}
+
+
+def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> OwnFile:
+    path = folder / f"{name}{'.urdf' if '<robot' in text else '.xml'}"
+    path.write_text(text, encoding="utf-8")
+    return read(path, without)
+
+
+def _exported(folder: Path, name: str) -> OwnFile:
+    scene = load(SCENES / f"{name}.toml")
+    answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
+    return _read(folder, f"exported_{name}", answer.text, OUTSIDE)
+
+
+def _agreement(name: str, file: OwnFile, quick: bool) -> Row:
+    """The worst of all builds."""
+    agreements = certificate(file.own, QUICK_STATES if quick else STATES)
+    worst: Agreement = max(agreements, key=lambda each: each.acceleration)
+    return Observed(
+        f"twin_files.{name}",
+        SYSTEM,
+        f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
+        f"{file.own.size} coordinates, {name}",
+        worst.acceleration,
+        "of the largest",
+    ).at_most(worst.bound, "rounding, by the condition of the mass matrix; 1e-10 or more", "native")
+
+
+def _path(folder: Path) -> list[Row]:
+    """Paths over 1 s of the cart, and the balance of energy and work."""
+    report = paths(_read(folder, "cart", CART).own)
+    return [
+        Observed(
+            "twin_files.path",
+            SYSTEM,
+            "largest difference of the states of all builds over 1 s, same tableau and step, cart",
+            max(report.distances.values()),
+            "of the largest",
+        ).at_most(ALIKE, "rounding; a disturbance of 1e-14 stays below it", "native"),
+        Observed(
+            "twin_files.energy",
+            SYSTEM,
+            "kinetic energy less the work of all forces over 1 s, cart",
+            report.energy if report.energy is not None else float("nan"),
+            "of the largest",
+        ).at_most(1e-9, "error of Runge-Kutta 4 and of Simpson's rule at steps of 2 ms", "closed form"),
+    ]
+
+
+def _planted(folder: Path, quick: bool) -> Row:
+    """How many of the planted differences are named first, with their size."""
+    first, named = _read(folder, "original", JOINTED).own, 0
+    chosen = PLANTED[::5] if quick else PLANTED
+    for name, old, new, kind, owner, size in chosen:
+        second = _read(folder, "planted", changed(JOINTED, name, old, new)).own
+        influential = compare(first, second, 3).influential
+        said = influential[0].sentence(("original", "planted")) if influential else ""
+        named += said.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in said
+    quantity = f"planted differences of one number, of {len(chosen)}, whose element and size are named first"
+    why = "all of them change accelerations"
+    return Observed("twin_files.planted", SYSTEM, quantity, named, "differences").within(len(chosen), 0, why, "none")
