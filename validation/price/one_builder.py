@@ -23,7 +23,16 @@ from models.engines.protocol import build as in_plane
 from models.engines.spatial_protocol import INTEGRATORS
 from models.engines.spatial_protocol import build as in_space
 from models.machine.timing import interleave, paired_ratio
-from models.multibody.cut_kernel import AXIS_JOINT, CHASSIS, ONE, POINT_ONE, TWO, joint_forces, parts, set_joint_forces
+from models.multibody.cut_kernel import (
+    AXIS_JOINT,
+    CHASSIS,
+    FIRST_BODY,
+    FIRST_POINT,
+    SECOND_BODY,
+    joint_forces,
+    parts,
+    set_joint_forces,
+)
 from models.multibody.cut_table import Drive, table
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as pitch_plane_scene
@@ -109,14 +118,17 @@ def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
 
 def _numbers(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     """The table of the compiled forces: every axis is fixed in space, and tyres begin on the ground."""
-    springs = [_element(s.name, s.one, str(s.two), s, s.point_one, s.point_two, s.axis) for s in vehicle.springs]
+    springs = [
+        _element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
+        for s in vehicle.springs
+    ]
     tyres = [_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
     whole = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
     numbers = table(whole, Drive(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
     for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):
-        row[ONE], row[POINT_ONE:TWO] = -1.0, tyre.point
+        row[FIRST_BODY], row[FIRST_POINT:SECOND_BODY] = -1.0, tyre.point
     return numbers
 
 
