@@ -29,7 +29,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     """Do all of it; the page is written even where errors in the recording stop the run."""
     from studies.recording_page import write
 
-    result = run_scene(scene, engines[-1], folder, progress, whole=True, error=scene.error)
+    result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
     exam: Examination = result.detail
     result.save(folder / "recording.nc")
     page = write(exam, folder / "recording.html", result)

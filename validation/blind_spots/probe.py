@@ -79,11 +79,11 @@ class Told:
             file.write(json.dumps(line) + "\n")
 
 
-def run_case(name: str, commands: Told) -> None:
+def run_case(name: str, recorder: Told) -> None:
     """Measure the quick share of a case; a case that breaks has one row, which failed."""
     from validation.common.rows import rested
 
-    commands.begin()
+    recorder.begin()
     try:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -93,9 +93,9 @@ def run_case(name: str, commands: Told) -> None:
         ]
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
-        commands.refused |= is_of_numba(error)
+        recorder.refused |= is_of_numba(error)
     failed = [(line["id"], line["independence"]) for line in lines if line["status"] == "failed"]
-    commands.end({"case": name, "rows": lines}, failed)
+    recorder.end({"case": name, "rows": lines}, failed)
 
 
 def is_of_numba(error: BaseException) -> bool:
@@ -106,8 +106,8 @@ def is_of_numba(error: BaseException) -> bool:
 class Watching:
     """Plug-in of pytest: tells how each test ended."""
 
-    def __init__(self, commands: Told) -> None:
-        self.told, self.failed = commands, False
+    def __init__(self, recorder: Told) -> None:
+        self.told, self.failed = recorder, False
         self.session: pytest.Session | None = None
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
