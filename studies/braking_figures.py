@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.brake.plane_chain import Point, place_of
+from models.brake.plane_chain import ChainPoint, place_of
 from models.brake.plane_vehicle import Plane
 from models.core.told import Results
 from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, PINK, SKY, SMALL, VERMILION, WIDE, heading, save
@@ -119,7 +119,7 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
 
 def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
     """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
-    return np.array([place_of(Point(unit, x, y), positions, plane.reach) for x, y in corners])
+    return np.array([place_of(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
 def _box(front: float, rear: float) -> np.ndarray:

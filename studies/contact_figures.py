@@ -28,7 +28,7 @@ from models.drawing.figures import (
     save,
 )
 from models.systems.contact.scene import Sweep
-from models.systems.contact.work_precision import TARGETS, Point
+from models.systems.contact.work_precision import TARGETS, TheoryPoint
 
 MILLI, MEGA = 1e3, 1e-6
 STICK, SLIP = "#cfe3f2", "#f6c9a8"
@@ -176,7 +176,7 @@ def price_figure(price: Result, title: str) -> Figure:
     """
     widths = (1.3, 1.0, 1.0)
     figure, axes = plt.subplots(1, 3, figsize=(WIDE, 4.6), sharey=True, width_ratios=widths)
-    points: list[Point] = price.detail
+    points: list[TheoryPoint] = price.detail
     for name in STYLES:
         line = [point for point in points if point.name == name]
         if line:
@@ -200,7 +200,7 @@ def price_figure(price: Result, title: str) -> Figure:
     return figure
 
 
-def _priced(axis: Any, name: str, line: list[Point], along: list[float], bar: bool = False) -> None:
+def _priced(axis: Any, name: str, line: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
     """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
     colour, marker = STYLES[name]
     mean, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))

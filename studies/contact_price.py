@@ -13,7 +13,7 @@ from models.core.whole_files import write_whole
 from models.machine.seconds import cost
 from models.systems.contact.run import built_of
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.work_precision import Point, cheapest_lines, priced
+from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -65,7 +65,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table(points: list[Point], count: int, uncertain: float) -> list[str]:
+def _table(points: list[TheoryPoint], count: int, uncertain: float) -> list[str]:
     """All points, then the cheapest for each target."""
     return [
         f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "

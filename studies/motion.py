@@ -29,8 +29,8 @@ from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
     LIMIT,
     CutOffs,
-    Motion,
     Quality,
+    RecoveredMotion,
     Start,
     check_cut_off,
     motion,
@@ -72,7 +72,7 @@ class Source:
     truth: dict[str, np.ndarray] = field(default_factory=dict)
     gyro: np.ndarray | None = None
     quality: Quality | None = None
-    ways: dict[str, Motion] = field(default_factory=dict)
+    ways: dict[str, RecoveredMotion] = field(default_factory=dict)
     run: Result | None = None
 
     @property
@@ -196,7 +196,7 @@ def _recover(source: Source, array: SensorArray, options: Options, p: Parameters
     source.ways["high-passed"] = moved(array, readings, cut_offs=cut_offs)
 
 
-def _values(motion: Motion) -> dict[str, np.ndarray]:
+def _values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
     """Pitch (rad), pitch rate (rad/s) and heave (m, down) of a recovered motion."""
     return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
 

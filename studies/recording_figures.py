@@ -10,7 +10,7 @@ import numpy as np
 from models.core.finding import Finding
 from models.drawing.figures import BLUE, MEASURED, PALE, TRUTH, TURNS, VERMILION, WIDE, YELLOW, heading, plt, save
 from models.fatigue.counting import Counted
-from models.measured.checks.agreement import Fault, Group
+from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNITS, Signal
 from models.systems.measured.run import FREE, Examination
@@ -112,7 +112,7 @@ def _means(evidence: Evidence, path: Path) -> Path:
     return _titled(drawn, "Mean vertical forces", path, axis)
 
 
-def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
+def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     """Figure of a channel's reading divided by its true value, over frequency: a delay is a slope of the phase, a
     factor a level."""
     agreement = evidence.agreement
@@ -120,7 +120,7 @@ def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
         agreement = agreement.without(before)
     among = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
-    group = Group(fault.name, among is agreement.inputs, tuple(among.index(s) for s in fault.signals))
+    group = SignalGroup(fault.name, among is agreement.inputs, tuple(among.index(s) for s in fault.signals))
     line, size = ((agreement.weights * part).sum(axis=1) for part in agreement.share(group))
     f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
@@ -143,7 +143,7 @@ def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     return _titled(drawn, title, path, axes[0], "outside lower center")
 
 
-def _exchange(evidence: Evidence, fault: Fault, path: Path) -> Path:
+def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     """Unexplained shares of every reading, as mapped and exchanged."""
     agreement = evidence.agreement
     assert agreement is not None

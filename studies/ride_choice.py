@@ -9,7 +9,7 @@ import numpy as np
 
 from models.advice.choice.systems.ride import opened
 from models.advice.ride_choice.activity import activity
-from models.advice.ride_choice.choose import Choice, Chooser
+from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.in_time import Samples
 from models.advice.ride_choice.reduced_files import SCENE, write
 from models.core.errors import InputError
@@ -104,7 +104,7 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
     return Alone(effect, chooser.predicted(single), chooser.confirm(single), illegal(single))
 
 
-def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
+def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
     """Saved answer of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted,
@@ -133,7 +133,7 @@ def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> d
 def _save(
     scene: RideScene,
     alone: list[Alone],
-    choice: Choice,
+    choice: RideChoice,
     watts: dict[str, float],
     results: dict[str, Result],
     folder: Path,
@@ -173,7 +173,7 @@ def _save(
 def choice_figure(
     scene: RideScene,
     alone: list[Alone],
-    choice: Choice,
+    choice: RideChoice,
     watts: dict[str, float],
     results: dict[str, Result],
     path: Path,
@@ -225,7 +225,7 @@ def percent(value: float) -> str:
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
-def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[Effect, float]) -> list[str]:
+def _table(scene: RideScene, choice: RideChoice, alone: list[Alone], further: dict[Effect, float]) -> list[str]:
     """The choice in words."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
@@ -253,7 +253,7 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines
 
 
-def saving(choice: Choice, tolerance: str) -> list[str]:
+def saving(choice: RideChoice, tolerance: str) -> list[str]:
     """Steps and calls at equal accuracy, in words."""
     before, after = choice.before, choice.after
     lines = [

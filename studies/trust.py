@@ -27,7 +27,16 @@ from models.ensemble.statistics import ERRORS_95, quantile
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene, assemble, changed
-from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding, small_errors
+from models.systems.pitch_plane.trust import (
+    ANGLE,
+    GrowthCurve,
+    growth,
+    interpolation,
+    model,
+    noise,
+    rounding,
+    small_errors,
+)
 from models.systems.pitch_plane.virtual_measurement import check_road, check_steps, follower, measure, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -112,9 +121,9 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result
     return follower(scene, folder)({}, {}), measured, largest
 
 
-def _error(run: Result, pitch: np.ndarray) -> Curve:
+def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
     """Pitch error of a run beside another one's pitch, so that each source of error is seen alone."""
-    return Curve(run.times, np.abs(run["pitch"] - pitch))
+    return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
 
 
 def _ensemble(base: Scene, quiet: Result, deviation: float, options: Options, engine: str) -> dict[str, np.ndarray]:
@@ -164,7 +173,7 @@ NAMES = {
 
 
 def _rows(
-    curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options
+    curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
     """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
     rows = list[Row]()
@@ -180,7 +189,7 @@ def _rows(
 
 
 def _text(
-    rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, Curve]
+    rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """The table as lines of text, and what a longer run would take."""
     lines = [
@@ -210,7 +219,9 @@ def _measured(row: Row) -> str:
     return _when(row["measured"])
 
 
-def _remedies(options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, Curve]) -> list[str]:
+def _remedies(
+    options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
+) -> list[str]:
     """Sampling rate and noise for the wanted time, by the growth rate from the time that is predicted."""
     forces = assemble(base).input
     assert forces is not None and forces.period is not None
@@ -229,7 +240,7 @@ def _remedies(options: Options, deviation: float, rate: float, base: Scene, curv
     return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
 
 
-def _excess(curve: Curve, options: Options, rate: float) -> float:
+def _excess(curve: GrowthCurve, options: Options, rate: float) -> float:
     """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end on by the law of noise.
 
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
@@ -243,8 +254,8 @@ def _excess(curve: Curve, options: Options, rate: float) -> float:
 
 
 def _figure(
-    curves: dict[str, Curve],
-    runs: dict[str, Curve],
+    curves: dict[str, GrowthCurve],
+    runs: dict[str, GrowthCurve],
     spread: dict[str, np.ndarray],
     options: Options,
     results: Results,

@@ -11,7 +11,7 @@ from models.core.result import Result, joined
 from models.core.tables import write_table
 from models.core.told import gathered
 from models.rail.energy import ledger
-from models.rail.equations import Path as Motion
+from models.rail.equations import WheelsetPath as Motion
 from models.rail.equations import Y
 from models.rail.limit_cycle import maxima
 from models.rail.linear import critical_or_why, kinematic_wavelength, klingel

@@ -9,7 +9,7 @@ import numpy as np
 from models.core.result import Result
 from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, plt, save
 from models.rail.equations import YAW, Y
-from models.rail.equations import Path as Motion
+from models.rail.equations import WheelsetPath as Motion
 from models.rail.limit_cycle import Orbit
 from models.rail.linear import klingel
 from models.rail.wheelset import Wheelset

@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.rail.wheel_forces import Room, rails_of, room_for
+from models.rail.wheel_forces import Workspace, rails_of, room_for
 from models.rail.wheelset import CHOSEN
 from validation.absence.machinery import arrays, ratio_of_wheelsets, rows
 
@@ -13,7 +13,7 @@ def test_loops_of_bare_scenes_make_no_arrays():
 
 def test_an_array_that_is_made_is_counted():
     profile = rails_of(CHOSEN).profile
-    assert arrays(lambda: [room_for(profile) for _ in range(10)]) >= 10 * len(Room._fields)  # each call has six
+    assert arrays(lambda: [room_for(profile) for _ in range(10)]) >= 10 * len(Workspace._fields)  # each call has six
 
 
 @pytest.mark.full

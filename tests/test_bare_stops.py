@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.brake.controller import AllApplied, Command
-from models.brake.port.ask import Asked
+from models.brake.port.ask import CheckedController
 from models.systems.braking.procedures import ready
 from validation.absence.braking import STOP
 from validation.absence.hand_built_braking import ratio_of_stops
@@ -14,7 +14,7 @@ from validation.absence.of_systems import bare
 def test_a_steady_controller_is_asked_once_and_drives_as_one_that_is_asked_in_every_sample():
     scene = bare("braking")
     vehicle, start = ready(scene, STOP)
-    once, always = (vehicle.run(own, start) for own in (AllApplied(4), Asked(AllApplied(4))))
+    once, always = (vehicle.run(own, start) for own in (AllApplied(4), CheckedController(AllApplied(4))))
     assert len(once.times) == len(always.times) > 200
     for name in ("times", "states", "turning", "pressures", "torques", "reports"):
         assert np.array_equal(getattr(once, name), getattr(always, name))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.brake.quarter import Path, Quarter, Stop
+from models.brake.quarter import Quarter, QuarterPath, QuarterStop
 from models.brake.relaxation import by_lagging_steps
 from models.brake.samples import by_steps
 from models.core.errors import InputError
@@ -42,16 +42,16 @@ def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
     ],
 )
 def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
-    path = Path(
+    path = QuarterPath(
         time=np.array([0.0, 0.5, 1.0, 1.5]),
         place=np.array([0.0, 4.0, 5.0, 5.0]),
         speed=np.array([10.0, 5.0, 0.0, 0.0]),
         turning=np.array([20.0, 9.0, 0.0, 0.0]),
         locked=np.zeros(4),
     )
-    assert case.faults_of(Stop(path, 2), 0.5, True) == []
+    assert case.faults_of(QuarterStop(path, 2), 0.5, True) == []
     getattr(path, part)[row] = value
-    assert said in case.faults_of(Stop(path, 2), 0.5, True)
+    assert said in case.faults_of(QuarterStop(path, 2), 0.5, True)
 
 
 def test_a_torque_that_drives_is_refused():

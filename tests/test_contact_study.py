@@ -19,7 +19,7 @@ from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, HEADER, answer
 from models.systems.contact.run import Built, contact
 from models.systems.contact.scene import Method, build
-from models.systems.contact.work_precision import Point, cheapest, exact
+from models.systems.contact.work_precision import TheoryPoint, cheapest, exact
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
@@ -294,9 +294,9 @@ def test_rows_are_counted_in_words_that_fit():
 
 def test_the_cheapest_is_the_fastest_that_meets_the_target():
     points = [
-        Point("slow", 9, (0.001,), 1.0, (0.9, 1.2)),
-        Point("fast", 9, (0.01,), 0.1, (0.1, 0.1)),
-        Point("rough", 9, (0.2,), 0.01, (0.01, 0.02)),
+        TheoryPoint("slow", 9, (0.001,), 1.0, (0.9, 1.2)),
+        TheoryPoint("fast", 9, (0.01,), 0.1, (0.1, 0.1)),
+        TheoryPoint("rough", 9, (0.2,), 0.01, (0.01, 0.02)),
     ]
     assert [
         getattr(cheapest(points, target, lambda one: one.mean), "name", None) for target in (0.5, 0.05, 0.005, 0.0001)

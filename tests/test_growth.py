@@ -15,7 +15,7 @@ from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.plan import describe, trust_line
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
-from models.systems.pitch_plane.tangent import Path, covariance, path_of, swing, tilted
+from models.systems.pitch_plane.tangent import TangentPath, covariance, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from studies.command.asked import SCENES
@@ -207,5 +207,5 @@ def test_study_on_a_file_of_ones_own(folder):
 
 def test_a_path_is_a_march_of_the_reference(folder):
     assembly = assemble(force_scene(folder, duration=2.0, step=1e-3))
-    found, _ = Path(assembly, assembly.input, 1, 2000).carry(np.zeros((1, 8)))
+    found, _ = TangentPath(assembly, assembly.input, 1, 2000).carry(np.zeros((1, 8)))
     assert np.abs(found - states(assembly)).max() < 1e-12

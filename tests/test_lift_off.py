@@ -14,7 +14,7 @@ from models.engines.catalogue import RECOMMENDED as INTEGRATORS
 from models.engines.protocol import build
 from models.engines.spatial_protocol import build as build_spatial
 from models.engines.spatial_reference import SpatialReference
-from models.ride.nonlinear_copies import March, copies_in_time
+from models.ride.nonlinear_copies import CopiesMarch, copies_in_time
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import statistically_linear
 from models.road.iso8608 import iso8608_road
@@ -260,7 +260,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     load = preloads(vehicle).tyres[vehicle.tyres[0].name]
     force = runs[0].of("tyre force front left")
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
-    march = March(vehicle, 20.0, road.step, 1)
+    march = CopiesMarch(vehicle, 20.0, road.step, 1)
     march.states = np.zeros((2 * len(vehicle.coordinates()), 1))  # the engines begin at rest in the design position
     march.over(road.table(runs[0].run.counts["steps"], 2)[:, :, None], 0)
     # a quarter car goes up and down alone, so that small motion is all that it has

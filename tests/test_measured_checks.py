@@ -10,13 +10,13 @@ import pytest
 from models.core.finding import Finding, gathered, queries
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.response import Response
+from models.measured.checks.response import SensorResponse
 from models.measured.checks.spectra import mean
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.signal import Place, Quantity, Signal
+from models.measured.signal import Quantity, Signal, TransducerPlace
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, told
 from models.systems.measured.inputs import Inputs
@@ -194,8 +194,8 @@ def test_slow_forces_on_a_free_vehicle_are_felt_as_force_by_mass(axis):
     # y too, where the vehicle rolls far and what a sensor feels of its weight takes the sideways acceleration back
     car, whole = r19(), rigid(r19())
     felt = Signal("a", "", "a", "acceleration", "body", "xyz"[axis], "body", 1, "m/s^2", 1.0)
-    place = Place("body", tuple(whole.centre))
-    response = Response(car, "hub").at(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
+    place = TransducerPlace("body", tuple(whole.centre))
+    response = SensorResponse(car, "hub").at(np.array([1e-2]), (felt,), (place,))[0, 0, axis::6]
     assert (response @ car.loads / car.loads.sum()).real == pytest.approx(1 / whole.mass, rel=1e-3)
 
 

@@ -10,7 +10,7 @@ from models.core.errors import InputError
 from models.measured.formats import csv as csv_format
 from models.measured.formats import csv_rows, mdf4, open_source, tdms, write
 from models.measured.formats.opened import Opened
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import ChannelGroup
 from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
@@ -31,7 +31,7 @@ def group(count=50, **changed):
         "count": count,
         "blocks": [table[i : i + 20] for i in range(0, count, 20)],
     }
-    return Group(**own | changed)
+    return ChannelGroup(**own | changed)
 
 
 def odd(module, name):

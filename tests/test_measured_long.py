@@ -18,9 +18,9 @@ from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.hand_on import hand_on
-from models.systems.measured.inputs import Grid, Inputs
+from models.systems.measured.inputs import Inputs, StepGrid
 from models.systems.measured.section_run import Checkpoint, Hold, SectionRun, run
-from models.systems.measured.sections import Point, Sections, points
+from models.systems.measured.sections import AccelerometerPoint, Sections, points
 from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
@@ -161,9 +161,9 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
     for step in (1e-3, 5e-4, 2e-3, 2.5e-4):
         count = round(49e-3 / step * 2) + 1 - (step == 2e-3)
         expected = Sampled(values, 1e-3, held=False).sample(0.0, step / 2, count)
-        assert Grid(step, 1e-3).rows(values, count) == pytest.approx(expected, abs=1e-12)
+        assert StepGrid(step, 1e-3).rows(values, count) == pytest.approx(expected, abs=1e-12)
     with pytest.raises(InputError, match="part or a multiple"):
-        Grid(3e-4, 1e-3).check()
+        StepGrid(3e-4, 1e-3).check()
     signals, true = pattern(case.REPEATED)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
@@ -235,7 +235,9 @@ def test_sections_are_named_and_their_files_are_not_overwritten(whole, tmp_path)
 def test_accelerometers_feel_gravity_and_motion(whole):
     own, outcome, _ = whole
     signals = tuple(replace(s, at="engine", gravity=False) for s in own.recording.find("acceleration", "acc fl"))
-    assert points(own.vehicle, signals, {}) == (Point("engine", "engine", (0.95, 0.0, 0.55), gravity=False),)
+    assert points(own.vehicle, signals, {}) == (
+        AccelerometerPoint("engine", "engine", (0.95, 0.0, 0.55), gravity=False),
+    )
     for name in ("acc fl_ax", "acc roof_az"):
         signal = next(s for s in own.recording.signals if s.name == name)
         answer = next(a for a in outcome.answers if a.measures(signal))

@@ -14,7 +14,7 @@ from models.measured.faults_of_measurement import Faults, check, measured
 from models.measured.gaps import filled
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.systems.measured.inputs import Grid, Inputs
+from models.systems.measured.inputs import Inputs, StepGrid
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as plane_run
 from models.systems.measured.section_run import DAMPING, Hold
@@ -140,7 +140,7 @@ def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:
 def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, tmp_path: Path) -> None:
     t = np.arange(-1.0, 12.0)[:, None]
     samples = 2.0 - t + 0.3 * t**2 - 0.05 * t**3
-    rows = Grid(1e-3, 2e-3).cubic(samples, 30)[:, 0]
+    rows = StepGrid(1e-3, 2e-3).cubic(samples, 30)[:, 0]
     fine = np.arange(30) / 4
     assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
     inputs = Inputs(recording(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from models.advice.price.meshed import Meshed, first_part
+from models.advice.price.meshed import MeshedScene, first_part
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, priced, recommend
 from models.advice.price.text import lines
@@ -73,7 +73,7 @@ def test_more_cells_come_nearer_and_are_counted():
 
 def test_steps_divide_what_is_searched():
     scene = own(PATHS)
-    assert isinstance(scene, Meshed) and first_part(3.0, 0.25) == 0.25
+    assert isinstance(scene, MeshedScene) and first_part(3.0, 0.25) == 0.25
     assert all(abs(scene.first / step - round(scene.first / step)) < 1e-9 for step in scene.steps.values())
 
 

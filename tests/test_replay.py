@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validation.replay import __main__ as replay
-from validation.replay.answers import Answer, answer, difference, load, save
+from validation.replay.answers import CommandAnswer, answer, difference, load, save
 from validation.replay.jobs import Job, jobs
 
 COMMAND = """#!{python}
@@ -57,11 +57,11 @@ def test_a_recording_that_was_begun_goes_on(tmp_path, capsys):
 
 
 def test_channels_that_vanish_move_or_are_renamed():
-    before = Answer([0], "", 1.0, {"a.nc: x": np.ones(3), "b.csv: y": np.ones(3)})
-    moved = Answer([0], "", 1.0, {"c.nc: x": np.ones(3)})
+    before = CommandAnswer([0], "", 1.0, {"a.nc: x": np.ones(3), "b.csv: y": np.ones(3)})
+    moved = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3)})
     told = difference(before, moved, 0.0, {})
     assert told.wrong == ["b.csv: y is gone"] and not told.other
-    named = Answer([0], "", 1.0, {"c.nc: x": np.ones(3), "c.nc: z": np.ones(3)})
+    named = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3), "c.nc: z": np.ones(3)})
     assert not difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
 
 
@@ -79,19 +79,19 @@ def test_channels_that_vanish_move_or_are_renamed():
 def test_every_bit_counts(tmp_path, now):
     """Signs of zeros, kinds of numbers, and what no number is, after a way through the files, too."""
     array = np.array([0.0, 1.0, np.inf, np.nan])
-    save(tmp_path, "a", Answer([0], "", 1.0, {"a.nc: x": array}))
+    save(tmp_path, "a", CommandAnswer([0], "", 1.0, {"a.nc: x": array}))
     kept = load(tmp_path, "a")
-    assert not difference(kept, Answer([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
-    assert difference(kept, Answer([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
+    assert not difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
+    assert difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
 
 
 def test_a_bound_is_of_the_largest_number_and_of_every_number():
     large = np.linspace(0.0, 1e3, 60_001)
     nudged = large.copy()
     nudged[12_345] += 1e-8
-    before, now = (Answer([0], "", 1.0, {"a.nc: x": values}) for values in (large, nudged))
+    before, now = (CommandAnswer([0], "", 1.0, {"a.nc: x": values}) for values in (large, nudged))
     assert difference(before, now, 1e-12, {}).wrong and not difference(before, now, 2e-11, {}).wrong
-    none = Answer([0], "", 1.0, {"a.nc: x": np.where(large == 0.0, np.nan, large)})
+    none = CommandAnswer([0], "", 1.0, {"a.nc: x": np.where(large == 0.0, np.nan, large)})
     assert difference(before, none, 1.0, {}).wrong and difference(none, before, 1.0, {}).wrong
 
 

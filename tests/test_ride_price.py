@@ -19,8 +19,10 @@ def test_all_rows_pass_and_table_and_figure_come_from_saved_data(measured):
 
 
 def test_a_route_that_loses_digits_fails_its_row(measured):
-    points = [ride.Point(**saved) for saved in measured[1]["points"]]
-    lossy = [ride.Point(**{**vars(p), "errors": {"tyre forces": 1e-8}}) if "Lyapunov" in p.name else p for p in points]
+    points = [ride.RoutePoint(**saved) for saved in measured[1]["points"]]
+    lossy = [
+        ride.RoutePoint(**{**vars(p), "errors": {"tyre forces": 1e-8}}) if "Lyapunov" in p.name else p for p in points
+    ]
     known = ride.Ride(None, {}, None, 1e-12)
     failed = [row.id for row in ride.judged(known, lossy) if row.status == "failed"]
     assert failed == ["price.ride.error.Lyapunov"]

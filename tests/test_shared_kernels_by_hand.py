@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial import polynomial
 
 from models.brake.brake import Brake, of_wheels
-from models.brake.controllers.five_phase_cycle import State, corner
+from models.brake.controllers.five_phase_cycle import WheelState, corner
 from models.core.piecewise import evaluate, interpolate
 from models.multibody.tree import add, cross, dot, plus, times
 from models.road.kernels import cubics_uniform
@@ -20,7 +20,7 @@ CLOSE = pytest.approx
 
 def rolling_at(pressure, torque):
     """A state of a wheel of which only its brake counts."""
-    return State(pressure, torque, 50.0, 0.0, 0.0)
+    return WheelState(pressure, torque, 50.0, 0.0, 0.0)
 
 
 def test_corners_of_the_brake_s_loop_lie_where_its_two_lines_meet_the_torque():

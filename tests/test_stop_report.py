@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.systems.braking.march import Path
+from models.systems.braking.march import BrakingPath
 from models.systems.braking.stop_report import Stop
 
 SPEED, RADIUS, SLIP, STEP = 15.0, 60.0, 0.04, 1e-3
@@ -17,7 +17,9 @@ def circle() -> Stop:
     places = np.stack([RADIUS * np.sin(course), RADIUS * (1.0 - np.cos(course)), course - SLIP], axis=1)
     rates = np.stack([SPEED * np.cos(course), SPEED * np.sin(course), np.full_like(times, SPEED / RADIUS)], axis=1)
     blank = np.zeros((len(times), 4))
-    return Stop(Path(times, np.stack([places, rates], axis=1), blank, blank, blank, np.zeros((2000, 4, 7)), False))
+    return Stop(
+        BrakingPath(times, np.stack([places, rates], axis=1), blank, blank, blank, np.zeros((2000, 4, 7)), False)
+    )
 
 
 def test_a_circle_to_the_left_has_its_signs_and_sizes(circle: Stop) -> None:

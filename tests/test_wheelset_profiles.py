@@ -14,7 +14,7 @@ from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.linear import klingel
 from models.rail.profile_contact import TOUCH, Pose, pressed
-from models.rail.profile_statics import held, steering_cones
+from models.rail.profile_statics import equilibrium, steering_cones
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import SCENE, placed_at
 
@@ -28,7 +28,7 @@ def against_table(shifts):
     """Forces within 2 % and places within 0.3 mm of the exact contact, wheel by wheel."""
     for shift in shifts:
         one = placed_at("A-1", shift)
-        found = held(ON_PROFILES.changed(load=2e4), shift)
+        found = equilibrium(ON_PROFILES.changed(load=2e4), shift)
         loads, places = found.loads.reshape(2, -1), found.touches["y"].reshape(2, -1)
         for k, wheel, side in ((0, one.right, 1), (1, one.left, -1)):
             whole = sum(place.normal for place in wheel)
@@ -40,7 +40,7 @@ def against_table(shifts):
 
 def test_two_patches_as_in_the_table():
     against_table([5e-3])
-    parts = held(ON_PROFILES.changed(load=2e4), 5e-3).loads[:2]
+    parts = equilibrium(ON_PROFILES.changed(load=2e4), 5e-3).loads[:2]
     assert 100.0 < parts.min() < 200.0  # 150 N; without the other patch's depression 500 N
 
 
@@ -53,13 +53,13 @@ def test_lateral_force_is_the_slope_of_the_energy():
     """What it takes to hold the smooth wheelset sideways, by the normals and by the energy of load and contacts."""
 
     def energy(shift):
-        one = held(ON_PROFILES, shift)
+        one = equilibrium(ON_PROFILES, shift)
         depth = np.maximum(one.touches["depth"], 0.0)
         return 0.4 * one.loads @ depth - ON_PROFILES.load * one.z
 
     h = 5e-5
     for shift in (3e-3, 6e-3, 9e-3):
-        one, before, after = (held(ON_PROFILES, shift + part * h) for part in (0.0, -1.0, 1.0))
+        one, before, after = (equilibrium(ON_PROFILES, shift + part * h) for part in (0.0, -1.0, 1.0))
         assert one.loads @ one.touches["n_z"] == pytest.approx(ON_PROFILES.load, rel=1e-8)
         across, down = -one.loads * one.touches["n_y"], -one.loads * one.touches["n_z"]
         moment = (one.touches["y"] * down - one.touches["z"] * across).sum()
@@ -179,6 +179,6 @@ def test_wave_is_that_of_the_cones_that_steer_alike():
 
 def test_what_is_no_profile_is_refused():
     with pytest.raises(InputError, match="built in"):
-        held(CHOSEN.changed(profiles=Profiles(wheel="S1003")), 0.0)
+        equilibrium(CHOSEN.changed(profiles=Profiles(wheel="S1003")), 0.0)
     with pytest.raises(InputError, match="cones"):
-        held(CHOSEN, 0.0)
+        equilibrium(CHOSEN, 0.0)

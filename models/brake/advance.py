@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from models.brake.plane_chain import Direction, Point, rows
-from models.brake.plane_records import Motion, Report, report_of
+from models.brake.plane_chain import ChainPoint, Direction, rows
+from models.brake.plane_records import PlaneMotion, Report, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
 from models.brake.surfaces import even, surfaces_of, under_wheels
@@ -79,7 +79,7 @@ def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
 
 @lean
 def advance(motion, torques, step, steer, vehicle):
-    """Move a ``Motion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
+    """Move a ``PlaneMotion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
 
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
@@ -111,7 +111,7 @@ BODIES = ("vehicle", "trailer")
 HINGES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
-def ending(status: int, plane: Plane, motion: Motion) -> str:
+def ending(status: int, plane: Plane, motion: PlaneMotion) -> str:
     """Why a sample ended a run that moved so in its last step."""
     if status == FOLDED:
         return _folded(plane, motion.state[0, 2:])
@@ -135,19 +135,18 @@ def _lifted(loads: np.ndarray) -> bool:
     return bool((up[0] or up[3]) and (up[1] or up[2]))
 
 
-def _acceleration(plane: Plane, first: int, motion: Motion) -> tuple[float, float]:
+def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
     """Acceleration of the body on four wheels, along and across it (m/s^2)."""
     accelerations = motion.accelerations
     k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
-    ahead, aside = rows(Point(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across)
+    ahead, aside = rows(ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across)
     return float(along @ accelerations + ahead), float(across @ accelerations + aside)
 
 
 def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
-    """Sentence on how a vehicle tips over, by moments about the wheels that stay on the road.
-
-    Statics of a body whose loads follow its accelerations."""
+    """Sentence on how a vehicle tips over, by moments about the wheels that stay on the road: statics of a body
+    whose loads follow its accelerations."""
     body, (ahead, aside) = BODIES[four.start // 4], rates
     static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
     if status == PITCHED:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from models.machine.compiled import inlined, lean
 
 
-class Point(NamedTuple):
+class ChainPoint(NamedTuple):
     """A point that is fixed to a unit: its number, and the place (m) in its axes."""
 
     unit: int
@@ -31,7 +31,7 @@ ALONG_X = Direction(1.0, 0.0)
 
 @lean
 def velocity(point, positions, rates, reach):
-    """Velocity (2) in the ground's axes of a ``Point``."""
+    """Velocity (2) in the ground's axes of a ``ChainPoint``."""
     k, x, y = point
     vx, vy = rates[0], rates[1]
     for j in range(reach.shape[1]):
@@ -45,7 +45,7 @@ def velocity(point, positions, rates, reach):
 
 @lean
 def place_of(point, positions, reach):
-    """Place (2) on the ground of a ``Point``."""
+    """Place (2) on the ground of a ``ChainPoint``."""
     k, x, y = point
     px, py = positions[0], positions[1]
     for j in range(reach.shape[1]):
@@ -78,7 +78,7 @@ def headings(positions, units):
 
 @inlined
 def rows(point, direction, units, rates, plane, along, across):
-    """Fill the two rows (n,) that give the velocity of a ``Point`` along a ``Direction`` and to the left of it;
+    """Fill the two rows (n,) that give the velocity of a ``ChainPoint`` along a ``Direction`` and to the left of it;
     ``units`` : see ``headings``.
 
     Its acceleration is the rows times those of the coordinates, plus the two terms returned (m/s^2); a force in these
@@ -107,7 +107,7 @@ def inertia(units, rates, plane, mass, right, along, across):
     size = coordinates(plane)
     mass[:], right[:] = 0.0, 0.0
     for k in range(len(plane.units)):
-        ahead, aside = rows(Point(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
+        ahead, aside = rows(ChainPoint(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
         for a in range(size):
             right[a] -= plane.masses[k] * (along[a] * ahead + across[a] * aside)
             for b in range(size):

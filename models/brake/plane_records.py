@@ -40,7 +40,7 @@ def report_of(rows):
     return Report(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
-class Motion(NamedTuple):
+class PlaneMotion(NamedTuple):
     """State of a vehicle in the plane, stepped in place.
 
     state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
@@ -53,9 +53,9 @@ class Motion(NamedTuple):
     report: np.ndarray
 
 
-def motion_of(state: np.ndarray, turning: np.ndarray) -> Motion:
+def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
     """The motion of a vehicle in the plane that has neither accelerations nor a report yet."""
-    return Motion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
+    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
 
 
 class Wheels(NamedTuple):

@@ -8,7 +8,17 @@ those of that speed.
 
 import math
 
-from models.brake.plane_chain import Direction, Point, coordinates, factor, headings, inertia, prescribed, rows, solve
+from models.brake.plane_chain import (
+    ChainPoint,
+    Direction,
+    coordinates,
+    factor,
+    headings,
+    inertia,
+    prescribed,
+    rows,
+    solve,
+)
 from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean
@@ -56,7 +66,7 @@ def settle(motion, steer, regular, starts, vehicle, frame):
         still[i] = plane.static[i]
         if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
             heading = Direction(units[g, 0], units[g, 1])
-            ahead, left = rows(Point(g, 0.0, 0.0), heading, units, rates, plane, along, aside)
+            ahead, left = rows(ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, along, aside)
             for a in range(coordinates(plane)):
                 frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
             still[i] += plane.by_x[i] * ahead + plane.by_y[i] * left
@@ -66,7 +76,7 @@ def settle(motion, steer, regular, starts, vehicle, frame):
             wheels.sine[i] = wheels.sine[i - 1] if same else math.sin(steer[i])
         c = units[k, 0] * wheels.cosine[i] - units[k, 1] * wheels.sine[i]
         s = units[k, 1] * wheels.cosine[i] + units[k, 0] * wheels.sine[i]
-        centre = Point(k, plane.place[i, 0], plane.place[i, 1])
+        centre = ChainPoint(k, plane.place[i, 0], plane.place[i, 1])
         ahead, _ = rows(centre, Direction(c, s), units, rates, plane, along, aside)
         u, v = times(along, rates), times(aside, rates)
         if starts:

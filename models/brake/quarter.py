@@ -23,7 +23,7 @@ REGULAR = 0.1
 """Speed (m/s) below which slip angles are those of this one: without a motion across there is none at all."""
 
 
-class Path(NamedTuple):
+class QuarterPath(NamedTuple):
     """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), place (m), speed (m/s), turning of
     the wheel (rad/s), and the time (s) within the step for which the wheel was locked."""
 
@@ -74,10 +74,10 @@ class Quarter(Strict):
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class QuarterStop:
     """Path from the start on, and the step (index) in which it came to rest, or -1."""
 
-    path: Path
+    path: QuarterPath
     rest: int
 
     @property
@@ -124,14 +124,14 @@ def braked(
     step: float,
     speed: float,
     turning: float | None = None,
-) -> Stop:
+) -> QuarterStop:
     """Motion along x from a speed (m/s) under torques (n + 1,) in N m at the ends of steps (s), linear in between.
 
     turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """
     if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
         raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
-    state, path = np.zeros((2, 3)), Path(*np.zeros((5, torques.size)))
+    state, path = np.zeros((2, 3)), QuarterPath(*np.zeros((5, torques.size)))
     state[1, 0] = speed
     spin = np.array([speed / quarter.radius if turning is None else turning])
     path.speed[0], path.turning[0] = speed, spin[0]
@@ -140,4 +140,4 @@ def braked(
     rest = march(motion_of(state, spin), ends, step, vehicle, path)
     if rest == -2 or not all(np.isfinite(part).all() for part in path):
         raise RunFailed("braking", "no loads were found", float(path.time.max()))
-    return Stop(path, rest)
+    return QuarterStop(path, rest)

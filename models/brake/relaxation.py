@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, NOT_FOUND, ended
-from models.brake.plane_chain import Point, velocity
+from models.brake.plane_chain import ChainPoint, velocity
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.samples import compiled
@@ -77,7 +77,7 @@ def lag_on(state, time, steer, vehicle, lag, lagging):
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
-        vx, vy = velocity(Point(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
+        vx, vy = velocity(ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
         c, s = math.cos(state[0, 2 + k] + steer[i]), math.sin(state[0, 2 + k] + steer[i])
         take_up(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
-from models.brake.plane_records import REPORTED, Motion
+from models.brake.plane_records import REPORTED, PlaneMotion
 from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
 from models.machine.compiled import lean, named, njit
@@ -23,7 +23,7 @@ class Row(NamedTuple):
     """A recorded row of a run and its parts, which are views of the row.
 
     time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
-    see ``Motion``.
+    see ``PlaneMotion``.
     """
 
     whole: np.ndarray
@@ -34,9 +34,9 @@ class Row(NamedTuple):
     torque: np.ndarray
     report: np.ndarray
 
-    def motion(self, accelerations: np.ndarray) -> Motion:
-        """``Motion`` of the vehicle at these accelerations (2 + U,)."""
-        return Motion(self.state, self.turning, accelerations, self.report)
+    def motion(self, accelerations: np.ndarray) -> PlaneMotion:
+        """``PlaneMotion`` of the vehicle at these accelerations (2 + U,)."""
+        return PlaneMotion(self.state, self.turning, accelerations, self.report)
 
 
 def row(coordinates: int, wheels: int) -> Row:

@@ -36,7 +36,7 @@ class Steering:
 
 
 @dataclass(frozen=True)
-class Response:
+class YawResponse:
     """time : from half of the steering to 0.9 of the steady yaw rate, s; overshoot : of the largest beyond the steady
     one, by it; steady : yaw rate, rad/s."""
 
@@ -45,7 +45,7 @@ class Response:
     steady: float
 
 
-def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> Response | None:
+def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
     """Step response of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it
     is not.
 
@@ -57,4 +57,4 @@ def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> Response 
     if np.ptp(end) > SETTLED * abs(steady) or steady == 0.0:
         return None
     share = yaw_rates / steady
-    return Response(crossing(times, -share, -REACHED) - half, float(max(share.max() - 1.0, 0.0)), steady)
+    return YawResponse(crossing(times, -share, -REACHED) - half, float(max(share.max() - 1.0, 0.0)), steady)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.plane_chain import Point, place_of, velocity
+from models.brake.plane_chain import ChainPoint, place_of, velocity
 from models.brake.plane_vehicle import Plane
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
@@ -125,7 +125,7 @@ def under_wheels(state, step, vehicle, surfaces):
             surfaces.share[i] = 0.0
         return
     for i in range(plane.unit.size):
-        centre = Point(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
+        centre = ChainPoint(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
         px, py = place_of(centre, state[0], plane.reach)
         vx, vy = velocity(centre, state[0], state[1], plane.reach)
         low, high = min(px, px + step * vx), max(px, px + step * vx)

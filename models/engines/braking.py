@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import FINE, advance
-from models.brake.plane_records import Motion, Report
+from models.brake.plane_records import PlaneMotion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.samples import moved
 from models.brake.surfaces import OnRoad
@@ -104,7 +104,7 @@ class Carried:
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
 
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
+        self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
         """Advance a braked vehicle as ``models.brake.advance.advance`` (with a ``Lag``, ``advance_lagging``) does, each
         step moved by the engine."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.brake.plane_records import KNOWN, Motion, Wheels, motion_of
+from models.brake.plane_records import KNOWN, PlaneMotion, Wheels, motion_of
 from models.brake.samples import moved
 from models.brake.sprung import Sprung
 from models.brake.sprung_step import (
@@ -113,7 +113,7 @@ class OnSprings:
 
     def advance(
         self,
-        motion: Motion,
+        motion: PlaneMotion,
         torques: np.ndarray,
         step: float,
         steer: np.ndarray,
@@ -137,7 +137,7 @@ class OnSprings:
         record: Any,
         sample: float,
         braking: Any,
-        motion: Motion,
+        motion: PlaneMotion,
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:

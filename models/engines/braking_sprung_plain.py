@@ -14,7 +14,7 @@ from models.brake.advance import AT_REST, FINE
 from models.brake.plain.pressure import Pressures
 from models.brake.plain.step import BLINK, OVER, UPRIGHT, Course, Moving, Steps
 from models.brake.plain.suspension import Suspension
-from models.brake.plane_records import Motion
+from models.brake.plane_records import PlaneMotion
 from models.brake.samples import Braking, Commands, Record
 from models.brake.sprung import Sprung
 from models.brake.surfaces import OnRoad
@@ -41,7 +41,7 @@ class PlainOnSprings:
 
     def advance(
         self,
-        motion: Motion,
+        motion: PlaneMotion,
         torques: np.ndarray,
         step: float,
         steer: np.ndarray,
@@ -67,7 +67,7 @@ class PlainOnSprings:
                 return AT_REST, time
         return FINE, time
 
-    def _moving(self, motion: Motion, lag: "Lagging | None") -> Moving:
+    def _moving(self, motion: PlaneMotion, lag: "Lagging | None") -> Moving:
         """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
         return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3], lag)
 
@@ -77,7 +77,7 @@ class PlainOnSprings:
         record: Record,
         sample: float,
         braking: Braking,
-        motion: Motion,
+        motion: PlaneMotion,
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:

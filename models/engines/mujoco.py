@@ -93,7 +93,7 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
 
 
 @dataclass
-class Drive:
+class ModelInput:
     """How a model's input acts: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
 
     Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
@@ -106,7 +106,7 @@ class Drive:
     tyres: tuple[float, ...] = ()
 
 
-def _drive(assembly: Assembly, settings: Settings) -> Drive:
+def _drive(assembly: Assembly, settings: Settings) -> ModelInput:
     """The input, and a law where the model's own items cannot do it: tables, turning forces, what goes slack."""
     signal, h, n = assembly.input, settings.step, settings.steps
     slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
@@ -114,7 +114,7 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
     held = signal.sample(0.0, h, n)[:, :2] if signal is not None and signal.held else None
     native = signal is None or (held is not None and assembly.mode == "force" and assembly.moment is None)
     if native and not slack:
-        return Drive(controls=held)
+        return ModelInput(controls=held)
     from models.engines.mujoco_callback import body_fixed_law, pushing_law, table_law
 
     pushing = tuple(
@@ -122,18 +122,18 @@ def _drive(assembly: Assembly, settings: Settings) -> Drive:
     )
     if pushing:
         road = np.zeros((1, 4)) if signal is None else signal.sample(0.0, h / 2, 2 * n + 1)
-        return Drive(road, law=pushing_law(), tyres=pushing)
+        return ModelInput(road, law=pushing_law(), tyres=pushing)
     if native or signal is None:
-        return Drive(None, held, None, table_law())
+        return ModelInput(None, held, None, table_law())
     inputs = signal.sample(0.0, h / 2, 2 * n + 1)
     moment = np.empty((2 * n + 1, 0)) if assembly.moment is None else assembly.moment.sample(0.0, h / 2, 2 * n + 1)
     if assembly.mode == "force-body":
         arms = np.array([axle.x for axle in assembly.vehicle.axles])
-        return Drive(np.hstack([inputs[:, : 0 if signal.held else 2], moment]), held, arms, body_fixed_law())
+        return ModelInput(np.hstack([inputs[:, : 0 if signal.held else 2], moment]), held, arms, body_fixed_law())
     forces = _generalised(assembly, inputs)
     if assembly.moment is not None:
         forces = np.column_stack([forces, np.zeros(len(forces)), moment])
-    return Drive(forces, held, None, table_law())
+    return ModelInput(forces, held, None, table_law())
 
 
 def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
@@ -170,7 +170,9 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     return forces[:, : 4 - count]
 
 
-def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: Collection[int] = ()) -> mujoco.MjModel:
+def _compiled(
+    assembly: Assembly, settings: Settings, drive: ModelInput, guided: Collection[int] = ()
+) -> mujoco.MjModel:
     """The model with its input table in its numeric data, behind what ``mujoco_callback`` reads before it."""
     spec = specification(assembly.vehicle, settings, guided)
     gear = 0.0 if drive.arms is not None else -1.0
@@ -264,7 +266,7 @@ class MujocoModel:
 
         Wheel forces and motors act on the wheels' heave only, so the rows of the chassis need neither.
         """
-        full = _compiled(self.assembly, self.settings, Drive())
+        full = _compiled(self.assembly, self.settings, ModelInput())
         data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
         accelerations = np.empty((len(times), 4))
         with installed(self.drive.law):

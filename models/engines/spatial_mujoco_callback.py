@@ -63,7 +63,7 @@ class Parts(NamedTuple):
     elements: Any
 
 
-class Motion(NamedTuple):
+class MujocoState(NamedTuple):
     """MuJoCo's kinematic state as pointers to its doubles: coordinates and rates of the joints; of each body its
     centre and rotation (rows); of each joint its anchor and axis in space."""
 
@@ -247,7 +247,7 @@ def spatial_law() -> Any:
         )
         for i in range(OF_ELEMENT * elements):
             work.elements[i] = 0.0
-        motion = Motion(
+        motion = MujocoState(
             array_at(data, position),
             array_at(data, velocity),
             array_at(data, xpos),

@@ -51,7 +51,7 @@ class Signal:
     check: bool = False
 
 
-class Place(NamedTuple):
+class TransducerPlace(NamedTuple):
     """Where a transducer sits: the body that carries it, and its position (m) in the vehicle's design axes."""
 
     body: str

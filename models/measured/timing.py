@@ -57,19 +57,19 @@ class Timing:
         return float(self.times[-1])
 
 
-def timing(times: np.ndarray, place: str, signals: tuple[str, ...] = ()) -> Timing:
+def timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
     """Timing of samples (n,) in the order of the file ``place``; InputError for fewer than two different times."""
     wrong = _no_times(times)
     if wrong.any():
-        kept, first = timing(times[~wrong], place, signals), int(np.argmax(wrong))
+        kept, first = timing(times[~wrong], place, signal_names), int(np.argmax(wrong))
         text = (
             f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
             f"{times[first]:.4g} s; they are left out."
         )
         order = np.flatnonzero(~wrong) if kept.order is None else np.flatnonzero(~wrong)[kept.order]
-        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(wrong)), "samples", signals)
+        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(wrong)), "samples", signal_names)
         return replace(kept, order=order, findings=(absurd, *kept.findings))
-    return _of_times(times, place, signals)
+    return _of_times(times, place, signal_names)
 
 
 def _no_times(times: np.ndarray) -> np.ndarray:
@@ -83,12 +83,14 @@ def _no_times(times: np.ndarray) -> np.ndarray:
     return ~finite | (far if length > 0 else False)
 
 
-def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing:
+def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
     """The timing of values that can be times."""
     findings, whole = list[Finding](), len(times)
 
     def say(check: str, weight: Weight, text: str, size: float, unit: str, at: Iterable[float]) -> None:
-        findings.append(Finding(check, weight, place, f"{place}: {text}.", size, unit, signals, tuple(map(float, at))))
+        findings.append(
+            Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, at)))
+        )
 
     keep, order = np.arange(whole), None
     steps = np.diff(times)

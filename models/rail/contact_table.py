@@ -47,7 +47,7 @@ CLIMBED = 2e-3
 
 
 @dataclass(frozen=True)
-class Place:
+class PatchReport:
     """One piece of a wheel's contact area: a patch, or several that have grown together.
 
     The left wheel as in a mirror, so that y and fy point away from the track's middle.
@@ -114,8 +114,8 @@ class Placed:
     yaw: float
     roll: float
     spin_speed: float
-    right: tuple[Place, ...]
-    left: tuple[Place, ...]
+    right: tuple[PatchReport, ...]
+    left: tuple[PatchReport, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +275,7 @@ class Contact:
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 
-    def _places(self, wheel: Carried) -> tuple[Place, ...]:
+    def _places(self, wheel: Carried) -> tuple[PatchReport, ...]:
         """The reports of a wheel's patches, those that carry something; patches that have grown together as one."""
         rows = [
             row
@@ -285,7 +285,7 @@ class Contact:
         pieces = dict.fromkeys(share.piece for *_, share in rows)
         return tuple(self._place(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
 
-    def _place(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> Place:
+    def _place(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> PatchReport:
         """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
@@ -301,7 +301,7 @@ class Contact:
         )
         boxes = np.array([share.box for *_, share in rows])
         length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
-        return Place(
+        return PatchReport(
             touch.x,
             touch.rail_y + top,
             y,

@@ -14,7 +14,20 @@ from functools import cached_property
 import numpy as np
 
 from models.contact.inputs import Array
-from models.rail.equations import ROLL, ROLL_RATE, SPIN, Y_RATE, YAW, YAW_RATE, Z_RATE, Body, Equations, Path, Y, Z
+from models.rail.equations import (
+    ROLL,
+    ROLL_RATE,
+    SPIN,
+    Y_RATE,
+    YAW,
+    YAW_RATE,
+    Z_RATE,
+    Body,
+    Equations,
+    WheelsetPath,
+    Y,
+    Z,
+)
 from models.rail.wheelset import GRAVITY
 
 
@@ -39,7 +52,7 @@ class Ledger:
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
-def ledger(equations: Equations, path: Path) -> Ledger:
+def ledger(equations: Equations, path: WheelsetPath) -> Ledger:
     """The ledger of a path by RK4, of any implementation, whose every step was kept."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)

@@ -197,7 +197,7 @@ def _march(state, parameters, steps, path, reports, room, stages):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Path(Trajectory):
+class WheelsetPath(Trajectory):
     """A run, states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, right first."""
 
     contacts: Array
@@ -319,7 +319,7 @@ class Equations:
         """Largest rate (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
-    def run(self, state: Array, duration: float, step: float, every: int = 1) -> Path:
+    def run(self, state: Array, duration: float, step: float, every: int = 1) -> WheelsetPath:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
@@ -328,7 +328,7 @@ class Equations:
         """
         count = self._steps(state, duration, step, every)
         states, contacts = self._marched(np.array(state, float), count, step, every)
-        path = Path(np.arange(len(states)) * step * every, states, contacts=contacts)
+        path = WheelsetPath(np.arange(len(states)) * step * every, states, contacts=contacts)
         self.check(path, step, every)
         return path
 
@@ -341,7 +341,7 @@ class Equations:
             raise RunFailed("wheelset", "leaves the track", done * step)
         return states, contacts
 
-    def check(self, path: Path, step: float, every: int) -> None:
+    def check(self, path: WheelsetPath, step: float, every: int) -> None:
         """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
         self.check_loads(path, step)
         if every == 1:
@@ -349,7 +349,7 @@ class Equations:
             inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
             check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
-    def check_loads(self, path: Path, step: float) -> None:
+    def check_loads(self, path: WheelsetPath, step: float) -> None:
         """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
         for k in sorted(set(path.contacts["load"].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())

@@ -21,7 +21,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
-from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
+from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, WheelsetPath, Y
 from models.rail.linear import critical_speed
 from models.rail.wheelset import Wheelset
 
@@ -104,7 +104,7 @@ class Orbit:
         """Whether neighbouring motions come nearer."""
         return self.multiplier < 1.0
 
-    def path(self) -> Path:
+    def path(self) -> WheelsetPath:
         """One period, start and end included."""
         return self.equations.run(self.state, self.period, self.period / self.steps)
 

@@ -70,8 +70,8 @@ semi-axes, penetration, power of the creep forces (W), angle of the rail's surfa
 centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and flange and
 of the contact's damping (W)."""
 MOTION = record("vx", "vy", "aside", "turn", "rate", "elastic", "push", "patch")
-"""Motion of a patch in contact: that of ``Motion``, elastic normal force (N), lateral force of a cone's flange (N),
-number of the patch."""
+"""Motion of a patch in contact: that of ``PatchMotion``, elastic normal force (N), lateral force of a cone's flange
+(N), number of the patch."""
 WHEELSET = np.dtype(
     (np.record, np.dtype([(name, np.float64, (3,)) for name in ("velocity", "turning", "force", "moment")], align=True))
 )
@@ -92,7 +92,7 @@ class Rails(NamedTuple):
     law: int
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
 
     wheelset : WHEELSET (1,); touches : TOUCH (patches,); of those in contact, first to last, contacts : CONTACT,
@@ -107,7 +107,7 @@ class Room(NamedTuple):
     forces: Array
 
 
-class Place(NamedTuple):
+class PatchPlace(NamedTuple):
     """Normal into the rail, and place from the wheelset's centre in the track's axes (m)."""
 
     n_y: float
@@ -117,7 +117,7 @@ class Place(NamedTuple):
     z: float
 
 
-class Motion(NamedTuple):
+class PatchMotion(NamedTuple):
     """Motion of a contact patch: slip along, velocity across the track, slip across (m/s), turning about the normal
     (1/s), speed of approach (m/s)."""
 
@@ -173,9 +173,9 @@ def patches(profile):
 
 @njit(cache=True, error_model="numpy")
 def room_for(profile):
-    """``Room`` for the contacts of a wheelset on these profiles."""
+    """``Workspace`` for the contacts of a wheelset on these profiles."""
     n = patches(profile)
-    return Room(
+    return Workspace(
         np.empty(1, WHEELSET),
         np.empty(n, TOUCH),
         np.empty(n, CONTACT),
@@ -279,9 +279,8 @@ def creep(contacts, slip, speed, rails, room):
 def wheel_forces(pose, rails, report, room):
     """Add what both rails do to the wheelset to its force and moment.
 
-    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Room``, its wheelset
-    given in, all else written over.
-    """
+    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Workspace``, its
+    wheelset given in, all else written over."""
     if rails.law == LINEAR and rails.profile.nodes.size == 0 and room.wheelset[0].velocity[0] >= REGULAR:
         _linear_cones(pose, rails.wheels[0], room.wheelset[0], report)
     else:
@@ -296,7 +295,7 @@ def _linear_cones(pose, wheels, wheelset, report):
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
-        place = Place(n_y, n_z, cx, cy, cz)
+        place = PatchPlace(n_y, n_z, cx, cy, cz)
         motion = _moving(place, velocity, turning)
         elastic, a, b = pressed(depth, _along(rolling, cone.conicity), 0.5 / cone.head, modulus)
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
@@ -329,7 +328,7 @@ def patch_by_patch(pose, rails, report, room):
         creeping = answer.fx, answer.fy, answer.mz
         _act(_place(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
-            motion = Motion(m.vx, m.vy, m.aside, m.turn, m.rate)
+            motion = PatchMotion(m.vx, m.vy, m.aside, m.turn, m.rate)
             _tell(_place(touch), motion, press, creeping, velocity[0], report[int(m.patch)])
 
 
@@ -347,18 +346,18 @@ def _flange(side, y, wheels):
 
 @inlined
 def _place(touch):
-    """``Place`` of a touch."""
-    return Place(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
+    """``PatchPlace`` of a touch."""
+    return PatchPlace(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
 
 
 @inlined
 def _moving(place, velocity, turning):
-    """``Motion`` of a patch."""
+    """``PatchMotion`` of a patch."""
     n_y, n_z, cx, cy, cz = place
     vx = velocity[0] + turning[1] * cz - turning[2] * cy
     vy = velocity[1] + turning[2] * cx - turning[0] * cz
     vz = velocity[2] + turning[0] * cy - turning[1] * cx
-    return Motion(vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz)
+    return PatchMotion(vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz)
 
 
 @inlined

@@ -40,7 +40,7 @@ TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class Estimate:
+class VarianceEstimate:
     """Variances of outputs over the copies: time (N,), s; variance, error (N, p), unit^2, inf where there is none.
 
     ``error`` is the standard error. The mean is known to be zero.
@@ -69,7 +69,7 @@ def along(
     copies: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
-) -> Estimate:
+) -> VarianceEstimate:
     """Variances along a drive, over the copies, where a cell ends next to each of the instants (s).
 
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
@@ -101,7 +101,7 @@ def at_constant_speed(
     copies: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
-) -> Estimate:
+) -> VarianceEstimate:
     """Stationary variances (1, p) over the copies and, in each of them, over ``duration`` (s)."""
     cells = _Cells(vehicle, excitation, weightings, speed)
     skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
@@ -186,10 +186,10 @@ class _Cells:
         """Outputs (p, copies) without white noise."""
         return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
 
-    def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> Estimate:
+    def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> VarianceEstimate:
         """The estimate from variances and their errors (N, 2, p), inf where an output has none."""
         moments = np.where(self.finite, rows, np.inf)
-        return Estimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
+        return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
 
 
 def _legendre() -> np.ndarray:

@@ -109,7 +109,7 @@ def copies_in_time(
     replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
     road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
     settling, counted = int(np.ceil(forgotten(replaced) / road.step)), int(np.ceil(duration / road.step))
-    march = March(vehicle, speed, road.step, copies)
+    march = CopiesMarch(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         left = settling + counted - number * BLOCK
         march.over(portion[: 2 * left + 1], _first(settling, number * BLOCK))
@@ -131,7 +131,7 @@ def coarser_variances(
     kept, road = max(1, math.ceil(AGAIN * copies)), RoadPath(excitation, speed, fine.step / 2.0)
     settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
     block, every = BLOCK // times, EVERY // times
-    march = March(vehicle, speed, times * fine.step, kept)
+    march = CopiesMarch(vehicle, speed, times * fine.step, kept)
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         left = settling + counted - number * block
         march.over(
@@ -143,7 +143,7 @@ def coarser_variances(
     return replace(fine, moments=moments).about_mean()
 
 
-class March:
+class CopiesMarch:
     """Copies of a vehicle at rest, stepped over roads; ``sums`` (4, p, copies): of powers of its outputs so far."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.sensors.rigid_body_motion import LIMIT, NOISE_FACTOR, Motion, Quality
+from models.sensors.rigid_body_motion import LIMIT, NOISE_FACTOR, Quality, RecoveredMotion
 
 UPRIGHT = 1.4
 """rad (80 degrees): beyond this pitch roll and yaw are hardly told apart, and none of them at a right angle."""
@@ -28,7 +28,7 @@ class Record:
     from_rest: bool
 
 
-def assumptions(record: Record, recovered: Motion) -> list[Assumption]:
+def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
     """Assumptions of a motion (n samples) recovered from a record."""
     pitch, turned = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
     listed = [
@@ -59,7 +59,7 @@ def assumptions(record: Record, recovered: Motion) -> list[Assumption]:
     return listed
 
 
-def cardan_pitch(recovered: Motion) -> np.ndarray:
+def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
     """Pitch (n,) in rad, which is defined at every attitude."""
     w, x, y, z = recovered.orientation.T
     return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))

@@ -90,7 +90,7 @@ class CutOffs:
 
 
 @dataclass(frozen=True)
-class Motion:
+class RecoveredMotion:
     """alpha (rad/s^2) and rates (rad/s) local, quaternions, and the reference point's acceleration (m/s^2),
     velocity (m/s) and position (m) in global axes, all (n, 3) but quaternions (n, 4)."""
 
@@ -268,7 +268,7 @@ def motion(
     zeroed: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
-) -> Motion:
+) -> RecoveredMotion:
     """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
 
     readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
@@ -288,7 +288,7 @@ def motion(
     acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
     velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, cut_offs.position)
     position = _filtered(integrated(velocity, period, np.array(start.position)), period, cut_offs.position)
-    return Motion(alpha, w, orientation, acceleration, velocity, position)
+    return RecoveredMotion(alpha, w, orientation, acceleration, velocity, position)
 
 
 def reference_acceleration(

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from models.machine.compiled import njit
-from studies.pictures.shapes import Surface
+from studies.pictures.shapes import PaintedSurface
 
 NEAREST = 0.05
 """m: what is nearer to the eye, or behind it, is not drawn."""
@@ -58,7 +58,7 @@ class Camera:
         return np.stack([width / 2.0 + scale * seen[..., 0], height / 2.0 - scale * seen[..., 1]], -1), near
 
 
-def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
+def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
     """Image (h, w, 3) of surfaces before a sky, whose two colours are those of the picture's top and of the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
@@ -79,7 +79,7 @@ def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int
 
 
 def _shaded(
-    camera: Camera, surfaces: list[Surface], width: int, height: int, haze: np.ndarray
+    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners, depths and colours for ``paint``, of the triangles that lie before the eye."""
     corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from studies.pictures.camera import picture
-from studies.pictures.film import Motion, Stage
+from studies.pictures.film import FilmedMotion, Stage
 from studies.pictures.shapes import arrow, rod
 
 SKY = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
@@ -14,7 +14,7 @@ THICKNESS = 0.024
 GREY = (0.35, 0.37, 0.4)
 
 
-def drawn(motion: Motion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
+def drawn(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
     """Image (height, width, 3), colours from 0 to 1, of frame ``k``."""
     poses = {name: pose(motion, stage, name, k) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
@@ -36,7 +36,7 @@ def drawn(motion: Motion, stage: Stage, k: int, width: int, height: int) -> np.n
     return picture(stage.camera, [around + struts + bodies, seen], width, height, SKY)
 
 
-def lines(motion: Motion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Where each arrow of frame ``k`` begins and what it spans (3,), in m of the picture."""
     spans = []
     for force in motion.arrows:
@@ -46,7 +46,7 @@ def lines(motion: Motion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.nda
     return spans
 
 
-def pose(motion: Motion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
+def pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Place (3,) and turn (3, 3) at which a body is drawn: magnified about its place at rest."""
     rest = np.array(stage.rest[body])
     place, turn = rest + stage.magnified * (motion.places[body][k] - rest), motion.turns[body][k]

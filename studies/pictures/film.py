@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from models.core.result import Result
 from studies.pictures.camera import Camera
-from studies.pictures.shapes import Colour, Surface
+from studies.pictures.shapes import Colour, PaintedSurface
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Arrow:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class FilmedMotion:
     """Poses from one engine at times (f,) in s: places (f, 3) and turns (f, 3, 3) of each body, space from body.
 
     run : the result that is drawn, where its system has one.
@@ -51,7 +51,7 @@ class Kind:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ForceCurve:
     """A curve plotted below the pictures: forces of one kind along a direction, and their name."""
 
     kind: str
@@ -80,18 +80,18 @@ class Stage:
 
     title: str
     caption: str
-    shapes: dict[str, list[Surface]]
+    shapes: dict[str, list[PaintedSurface]]
     rest: Mapping[str, ArrayLike]
     camera: Camera
     kinds: dict[str, Kind]
-    curve: Curve
-    scenery: Callable[[float], list[Surface]] = lambda time: []
+    curve: ForceCurve
+    scenery: Callable[[float], list[PaintedSurface]] = lambda time: []
     magnified: float = 1.0
     wheels: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
 
 
-def gaps(first: Motion, second: Motion) -> tuple[float, float, float]:
+def gaps(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
     """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
     places = [(place, second.places[name]) for name, place in first.places.items()]
     turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]

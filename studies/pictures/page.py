@@ -13,7 +13,7 @@ from matplotlib.transforms import IdentityTransform
 
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY, plt
 from studies.pictures.drawing import drawn
-from studies.pictures.film import Motion, Stage, gaps
+from studies.pictures.film import FilmedMotion, Stage, gaps
 
 WIDTH, HEIGHT = 1280, 720
 EDGE, TOP, TALL = 12, 66, 400
@@ -31,7 +31,7 @@ LETTERS: dict[Any, Any] = {
 class Page:
     """A page of 1280 x 720 pixels on which one frame after the other is drawn."""
 
-    def __init__(self, stage: Stage, motions: list[Motion]) -> None:
+    def __init__(self, stage: Stage, motions: list[FilmedMotion]) -> None:
         self.stage, self.motions = stage, motions
         self._wide = (WIDTH - EDGE * (len(motions) + 1)) // len(motions)
         self._lefts = [EDGE + i * (self._wide + EDGE) for i in range(len(motions))]
@@ -132,7 +132,7 @@ TONES = (DARK, PINK, ORANGE, SKY, GREY)
 """Colours of curves, none of them that of an engine, which stands above its picture."""
 
 
-def difference(motions: list[Motion]) -> str:
+def difference(motions: list[FilmedMotion]) -> str:
     """Sentence on how far two engines differ over the film; on the engine that drew it, for a single engine."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"

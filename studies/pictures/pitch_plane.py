@@ -12,21 +12,21 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, Strut, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, Strut, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
-from studies.pictures.shapes import PAINT, Surface, box, tyred_wheel
+from studies.pictures.shapes import PAINT, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
 MAGNIFIED = 3.0
 RADIUS, HEIGHT = 0.33, 0.95
 """m: of the wheels and of the chassis' centre above the road; the model has neither."""
 KINDS = {"wheel force": Kind((0.0, 0.62, 0.45), 1.2e-4, 4e3), "suspension force": Kind((0.84, 0.2, 0.0), 1.2e-4, 4e3)}
-CURVE = Curve("wheel force", (0.0, 0.0, -1.0), "upwards")
+CURVE = ForceCurve("wheel force", (0.0, 0.0, -1.0), "upwards")
 PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 """Exudyn's axes as columns: backward, down, to the right."""
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
     run = {"duration": float(np.ceil(duration + AHEAD / SPEED)), "step": 1e-3}
     scene = scene_of(
@@ -41,14 +41,14 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
     return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
 
 
-def _motion(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[Motion, Channels]:
+def _motion(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[FilmedMotion, Channels]:
     model: Any = build(engine, assembly, settings_of(assembly.scene, engine))
     run = model.run()
     channels = outputs(assembly, run)
     rows = np.rint(times / (run.times[1] - run.times[0])).astype(int)
     places, turns = (_exudyn if engine == "exudyn" else _mujoco)(model, run.states[rows, :4])
     poses = {name: place + _offset(assembly, name) for name, place in places.items()}, turns
-    return Motion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
+    return FilmedMotion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
 
 
 def _mujoco(model: Any, states: np.ndarray) -> Poses:
@@ -122,7 +122,7 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
     )
 
 
-def shapes(assembly: Assembly) -> dict[str, list[Surface]]:
+def shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
     """A beam for the chassis and two wheels."""
     p = assembly.parameters
     beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT).at((p.b - p.a) / 2.0, 0.0, -0.07)

@@ -15,9 +15,9 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
-from studies.pictures.shapes import PAINT, Colour, Surface, ball, box, extruded, tyred_wheel
+from studies.pictures.shapes import PAINT, Colour, PaintedSurface, ball, box, extruded, tyred_wheel
 
 SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
 """m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
@@ -30,12 +30,12 @@ SCENE = {
     "speeds": {"values": [SPEED]},
 }
 KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
-CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
+CURVE = ForceCurve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
 ENGINE: Colour = (0.75, 0.45, 0.15)
 PERSON: Colour = (0.93, 0.76, 0.55)
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = reporting(vehicle_of(scene))
@@ -54,7 +54,7 @@ def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
     return replace(vehicle, outputs=(*tyres, *across))
 
 
-def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> Motion:
+def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> FilmedMotion:
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
     model: Any = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
@@ -67,7 +67,7 @@ def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndar
         joints = np.empty_like(kept.positions)
         joints[:, model.numbers.columns] = kept.positions
         poses = of_mujoco(model.model, model.numbers.bodies, joints)
-    return Motion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
+    return FilmedMotion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
 
 
 def _exudyn(model: Any, positions: np.ndarray) -> Poses:
@@ -120,7 +120,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     return Stage(title, caption, shapes(vehicle), rest, camera, KINDS, CURVE, passing.at, MAGNIFIED)
 
 
-def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
+def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
     """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
     person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
     return {
@@ -132,7 +132,7 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     }
 
 
-def _car(vehicle: SpatialVehicle) -> list[Surface]:
+def _car(vehicle: SpatialVehicle) -> list[PaintedSurface]:
     """Two convex outlines, through which one sees what is inside, about the chassis' own centre."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)

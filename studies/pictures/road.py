@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.pictures.shapes import Colour, Surface, box, faceted, floor, patches
+from studies.pictures.shapes import Colour, PaintedSurface, box, faceted, floor, patches
 
 LIGHT: Colour = (0.60, 0.61, 0.63)
 DARK: Colour = (0.54, 0.55, 0.57)
@@ -30,7 +30,7 @@ class PassingRoad:
     magnified: float = 1.0
     half: float = 2.6
 
-    def at(self, time: float) -> list[Surface]:
+    def at(self, time: float) -> list[PaintedSurface]:
         """Road, lines along both its edges and the grass at a time (s)."""
         first = np.floor((self.speed * time - AHEAD) / TILE)
         stations = np.arange(first, first + 2.0 * AHEAD / TILE)
@@ -56,6 +56,6 @@ class PassingRoad:
         return self.magnified * (left + share * (two - left))
 
 
-def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> Surface:
+def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> PaintedSurface:
     """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
     return faceted(patches(net)[np.tile(chosen.ravel(), 2)], colour)

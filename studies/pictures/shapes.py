@@ -14,7 +14,7 @@ FAR = 150.0
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class PaintedSurface:
     """Triangles (m, 3, 3) and the outward normals at their corners (m, 3, 3); colour from 0 to 1.
 
     alpha : below 1, what lies behind shines through.
@@ -25,21 +25,21 @@ class Surface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, place: np.ndarray, turn: np.ndarray) -> "Surface":
+    def moved(self, place: np.ndarray, turn: np.ndarray) -> "PaintedSurface":
         """The surface after turning by ``turn`` (3, 3) and shifting by ``place`` (3,)."""
         return replace(self, corners=self.corners @ turn.T + place, normals=self.normals @ turn.T)
 
-    def at(self, *place: float) -> "Surface":
+    def at(self, *place: float) -> "PaintedSurface":
         """The surface shifted."""
         return replace(self, corners=self.corners + np.array(place))
 
 
-def faceted(corners: np.ndarray, colour: Colour) -> Surface:
+def faceted(corners: np.ndarray, colour: Colour) -> PaintedSurface:
     """Triangles (m, 3, 3) with flat faces; counter-clockwise seen from outside."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(length > 0, length, 1.0)
-    return Surface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
+    return PaintedSurface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
 
 def patches(points: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def patches(points: np.ndarray) -> np.ndarray:
     )
 
 
-def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> Surface:
+def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> PaintedSurface:
     """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     y, r = np.array(axial, float), np.array(radii, float)
@@ -61,22 +61,22 @@ def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 4
     slopes /= np.where(length > 0, length, 1.0)
     corners = [patches(net[i : i + 2]) for i in range(len(slopes))]
     normals = [patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
-    return Surface(np.concatenate(corners), np.concatenate(normals), colour)
+    return PaintedSurface(np.concatenate(corners), np.concatenate(normals), colour)
 
 
-def tyred_wheel(radius: float) -> list[Surface]:
+def tyred_wheel(radius: float) -> list[PaintedSurface]:
     """A tyre and its rim."""
     tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
     return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
 
 
-def box(x: float, y: float, z: float, colour: Colour) -> Surface:
+def box(x: float, y: float, z: float, colour: Colour) -> PaintedSurface:
     """A box about the origin with these edges."""
     half = np.array([x, y, z]) / 2.0
     return extruded(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
 
 
-def extruded(outline: np.ndarray, width: float, colour: Colour) -> Surface:
+def extruded(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurface:
     """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
@@ -87,7 +87,7 @@ def extruded(outline: np.ndarray, width: float, colour: Colour) -> Surface:
     return faceted(np.concatenate([*fan, patches(closed)]), colour)
 
 
-def floor(z: float, colour: Colour, up: float) -> Surface:
+def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
     """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time.
 
     up : 1 where z is up, -1 where it is down.
@@ -97,14 +97,14 @@ def floor(z: float, colour: Colour, up: float) -> Surface:
     return faceted(patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 
 
-def ball(radius: float, colour: Colour) -> Surface:
+def ball(radius: float, colour: Colour) -> PaintedSurface:
     """A sphere about the origin."""
     angle = np.linspace(0.0, np.pi, 17)
     round_about = revolved(-radius * np.cos(angle), radius * np.sin(angle), colour, 32)
     return replace(round_about, normals=round_about.corners / radius)
 
 
-def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour) -> Surface:
+def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour) -> PaintedSurface:
     """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
     along = (head - tail) / np.linalg.norm(head - tail)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
@@ -113,13 +113,13 @@ def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.nda
     return revolved(axial, radii, colour, 16).moved(tail, turn)
 
 
-def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> Surface:
+def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
     """A round rod from one point to another."""
     length = float(np.linalg.norm(head - tail))
     return between(tail, head, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour)
 
 
-def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> Surface | None:
+def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
     """An arrow of exactly the vector's length (m); None where it is shorter than a tenth of its thickness."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:

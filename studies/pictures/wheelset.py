@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.discretisation import not_estimated
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
-from models.rail.equations import ROLL, YAW, Path, Y, Z
+from models.rail.equations import ROLL, YAW, WheelsetPath, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.profile_contact import Pose
 from models.rail.wheelset import CHOSEN, Wheelset
@@ -15,8 +15,8 @@ from models.systems.wheelset.of_scene import started
 from models.systems.wheelset.run import run as simulate
 from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage, of_exudyn, of_mujoco
-from studies.pictures.shapes import Colour, Surface, box, extruded, floor, revolved
+from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Stage, of_exudyn, of_mujoco
+from studies.pictures.shapes import Colour, PaintedSurface, box, extruded, floor, revolved
 
 SPEED, SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
 """Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
@@ -30,16 +30,16 @@ RAIL: Colour = (0.66, 0.56, 0.5)
 CONCRETE: Colour = (0.72, 0.71, 0.68)
 BALLAST: Colour = (0.56, 0.54, 0.51)
 KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 8e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 1e-4, 2e3)}
-CURVE = Curve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
+CURVE = ForceCurve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
 SIDES = {"right": RIGHT, "left": LEFT}
 
 
-def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
+def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
     return stage(CHOSEN), [_motion(engine, duration, times) for engine in engines]
 
 
-def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
+def _motion(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
     scene = build(
         {
             "title": "wheelset",
@@ -51,9 +51,9 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
     )
     equations: Any = started(scene, engine, SPEED)[0]
     run = not_estimated(simulate(scene, engine, SPEED), "a film shows the path, and the study wheelset its error")
-    path: Path = run.detail
+    path: WheelsetPath = run.detail
     rows = np.rint(times / STEP).astype(int)
-    kept = Path(path.times[rows], path.states[rows], contacts=path.contacts[rows])
+    kept = WheelsetPath(path.times[rows], path.states[rows], contacts=path.contacts[rows])
     joints = to_joints(kept.states)[:, :JOINTS]
     if engine == "mujoco":
         poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
@@ -67,10 +67,10 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-    return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept), run)
+    return FilmedMotion(engine, kept.times, *poses, arrows(CHOSEN, kept), run)
 
 
-def arrows(w: Wheelset, path: Path) -> tuple[Arrow, ...]:
+def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
     """Normal force and creep force on the wheels where they touch, of the contacts of a path."""
     every = []
     for k, (name, side) in enumerate(SIDES.items()):
@@ -105,7 +105,7 @@ def stage(wheelset: Wheelset) -> Stage:
     )
 
 
-def shapes(w: Wheelset) -> list[Surface]:
+def shapes(w: Wheelset) -> list[PaintedSurface]:
     """An axle and two wheels, whose treads are the model's cones; flanges stand off by the magnified clearance."""
     end = w.half_spacing + 0.12
     surfaces = [revolved([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK)]
@@ -123,7 +123,7 @@ def shapes(w: Wheelset) -> list[Surface]:
     return surfaces
 
 
-def track(w: Wheelset, distance: float) -> list[Surface]:
+def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
     """Rails, sleepers and ballast after a way (m)."""
     first, last, top = -24.0, 2.4, w.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])

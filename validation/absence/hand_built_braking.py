@@ -17,7 +17,7 @@ from models.brake.plane_records import REPORTED, Report, report_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
-from models.systems.braking.march import Path
+from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import controller_of, ready
 from models.tyre.tyre_table import Cells, Tables, across, place
 from validation.absence.braking import STOP
@@ -296,7 +296,7 @@ def march(now, torque, steps, step, truck, known, stop):
     return stop.times.size
 
 
-def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], Path]:
+def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], BrakingPath]:
     """One stop from a speed (m/s) with the front wheels at an angle (rad) of the numbers of a bare vehicle
     (``models.systems.braking.run.Braked``), in at most so many samples, the start included."""
     plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
@@ -314,13 +314,13 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     )
     torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
-    def marched() -> Path:
+    def marched() -> BrakingPath:
         now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORTED, 4)))
         now.state[3] = speed
         stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORTED, 4))))
         n = march(now, torque, vehicle.substeps, grid, truck, room(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
-        return Path(
+        return BrakingPath(
             stop.times[:n],
             stop.states[:n].reshape(n, 2, 3),
             stop.turning[:n],
@@ -337,7 +337,7 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
 STEER, SUPPLY = 0.02, 0.5
 """Angle of the front wheels (rad); pressure of the brakes (bar): all wheels roll down to walking pace, so that their
 whole motion takes part."""
-Job = Callable[[], Path]
+Job = Callable[[], BrakingPath]
 
 
 def stops(speed: float) -> tuple[Job, Job]:
@@ -347,18 +347,18 @@ def stops(speed: float) -> tuple[Job, Job]:
     )
     vehicle, start = ready(scene, STOP)
 
-    def ours() -> Path:
+    def ours() -> BrakingPath:
         return vehicle.run(controller_of(scene, vehicle.plane.wheels, STOP), start, scene.run.duration)
 
     return ours, run(vehicle, speed, STEER, len(ours().times))
 
 
-def forces(path: Path) -> np.ndarray:
+def forces(path: BrakingPath) -> np.ndarray:
     """Forces of the tyres along and across them (2, n - 1, W) in N."""
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 
-def gap(ours: Path, theirs: Path) -> float:
+def gap(ours: BrakingPath, theirs: BrakingPath) -> float:
     """Largest difference of states (m, rad, m/s, rad/s), of the wheels' turning (rad/s), of the tyres' forces by the
     largest one, and of pressures and torques by theirs."""
     shares = [

@@ -9,7 +9,7 @@ import numpy as np
 from numba.core.runtime import _nrt_python, rtsys  # type: ignore[attr-defined]
 
 from models.machine.timing import interleave, paired_ratio
-from models.rail.equations import Path
+from models.rail.equations import WheelsetPath
 from models.systems.wheelset.of_scene import equations_of
 from validation.absence import braking, hand_built_wheelset, hub_forces, wheelset
 from validation.absence.bare_cars import cars
@@ -33,16 +33,16 @@ def arrays(job: Callable[[], Any]) -> int:
         _nrt_python.memsys_disable_stats()
 
 
-def wheelsets(steps: int) -> tuple[Callable[[], Path], Callable[[], Path]]:
+def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
     """Runs of a bare wheelset and of one written out for linear creep on cones alone, whose path passes the same
     checks: both give states and contacts."""
     equations, times = equations_of(bare("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
     start = equations.displaced(1e-3)
     theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
 
-    def written() -> Path:
+    def written() -> WheelsetPath:
         states, contacts = theirs()
-        path = Path(times, states, contacts=contacts)
+        path = WheelsetPath(times, states, contacts=contacts)
         equations.check(path, STEP, 1)
         return path
 

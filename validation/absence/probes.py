@@ -64,7 +64,7 @@ def belongs_to_effects(module: str) -> bool:
 
 
 @dataclass
-class March:
+class MarchCounts:
     """Counts taken while an engine marched: Python frames, memory, callbacks.
 
     frames : Python functions entered, by the engine's own wrapper or from inside the march
@@ -84,21 +84,21 @@ def installed() -> int:
     return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACKS)
 
 
-def march(engine: str, model: Model) -> March:
+def march(engine: str, model: Model) -> MarchCounts:
     """Run a model once and watch its engine march; the guard and the results around it are not counted."""
-    seen = March()
+    seen = MarchCounts()
     with _entry(engine, seen):
         model.run()
     return seen
 
 
-def quietest(engine: str, make: Callable[[], Model], runs: int = 3) -> March:
+def quietest(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march that took the least memory of some: what a loop allocates shows in every one of them."""
     return min((march(engine, make()) for _ in range(runs)), key=lambda seen: seen.memory)
 
 
 @contextmanager
-def _entry(engine: str, seen: March) -> Iterator[None]:
+def _entry(engine: str, seen: MarchCounts) -> Iterator[None]:
     """Put a watch around the one function in which an engine spends its time."""
     if engine == "reference":
         from models.engines import reference
@@ -117,7 +117,7 @@ def _entry(engine: str, seen: March) -> Iterator[None]:
         yield
 
 
-def _watched(function: Callable[..., Any], seen: March) -> Callable[..., Any]:
+def _watched(function: Callable[..., Any], seen: MarchCounts) -> Callable[..., Any]:
     """The function, with frames, memory and callbacks added to ``seen``."""
 
     def call(*args: Any, **options: Any) -> Any:
@@ -136,7 +136,7 @@ def _watched(function: Callable[..., Any], seen: March) -> Callable[..., Any]:
     return call
 
 
-def _count(seen: March, event: str) -> None:
+def _count(seen: MarchCounts, event: str) -> None:
     seen.frames += event == "call"
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.brake.plain.suspension import WheelForces
-from models.brake.plain.tyre import Braked, Motion, Surface
+from models.brake.plain.tyre import Braked, Surface, WheelMotion
 from models.brake.plane_records import KNOWN, REPORTED, Report, Wheels
 from models.brake.plane_step import slide
 from models.brake.plane_step import tyre as compiled_tyre
@@ -23,7 +23,7 @@ PLANE: Plane = truck(PAPER)
 DRY = stacked([surface("dry")])
 
 
-def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked) -> np.ndarray:
+def tyre(tables: Tables, under: Surface, motion: WheelMotion, load: float, of: Braked) -> np.ndarray:
     """(7,) as ``models.brake.plain.tyre.tyre``."""
     wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORTED, 1)), surfaces(1)
     below.first[0], below.second[0], below.share[0] = under.first, under.second, under.share

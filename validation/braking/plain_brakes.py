@@ -60,7 +60,7 @@ def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.
         first, other = map(int, random.integers(0, 3, 2))
         under = plain_tyre.Surface(first, other, float(random.choice([0.0, random.uniform()])))
         turning = u * (1.0 - slip) / radius
-        motion = plain_tyre.Motion(u, rate, u + 0.5 * step * rate, across, 0.1)
+        motion = plain_tyre.WheelMotion(u, rate, u + 0.5 * step * rate, across, 0.1)
         braked = plain_tyre.Braked(torques, step, radius, inertia, turning)
         plain[i] = plain_tyre.tyre(tyre_tables, under, motion, load, braked)
         reports[i] = compiled.tyre(tyre_tables, under, motion, load, braked)

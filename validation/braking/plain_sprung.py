@@ -15,7 +15,7 @@ from models.brake.sprung import Sprung, sprung
 from models.brake.surfaces import EVEN, Stretch, road
 from models.engines.braking_sprung import OnSprings
 from models.engines.braking_sprung_plain import PlainOnSprings
-from models.systems.braking.march import Braked, Path, on_tyres
+from models.systems.braking.march import Braked, BrakingPath, on_tyres
 from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import surface
 from models.vehicles.spatial import Curve, SpatialVehicle
@@ -121,18 +121,20 @@ def controller(valves: bool) -> Controller:
 
 def run(
     vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
-) -> Path:
+) -> BrakingPath:
     """Run so many seconds of a stop from a speed (m/s)."""
     return vehicle_on(vehicle, engine, valves, lags).run(controller(valves), speed, duration)
 
 
 @cache
-def plain_run(vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False) -> Path:
+def plain_run(
+    vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
+) -> BrakingPath:
     """``run`` by plain code."""
     return run(VEHICLES[vehicle](), "reference", duration, valves, speed, lags)
 
 
-def paths_apart(first: Path, other: Path) -> float:
+def paths_apart(first: BrakingPath, other: BrakingPath) -> float:
     """Largest difference of positions, rates and rims (m, rad, per s) at common times; infinite if one ended early."""
     if len(first.times) != len(other.times):
         return np.inf

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.quarter import Quarter, Stop, braked
+from models.brake.quarter import Quarter, QuarterStop, braked
 from models.brake.surfaces import EVEN
 from models.machine.compiled import njit
 from models.tyre.magic_formula import surface
@@ -189,7 +189,7 @@ def stop(
     step: float = STEP,
     after: float = 0.0,
     turning: float | None = None,
-) -> Stop:
+) -> QuarterStop:
     """Braked by a constant torque (N m) for more than it takes at the least of both forces, and ``after`` (s)."""
     least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000

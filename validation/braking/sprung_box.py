@@ -7,12 +7,12 @@ import numpy as np
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Pressures
-from models.brake.plane_records import REPORTED, Motion
+from models.brake.plane_records import REPORTED, PlaneMotion
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
 from models.engines.braking_sprung import OnSprings
-from models.systems.braking.march import Braked, Path, on_tyres
+from models.systems.braking.march import Braked, BrakingPath, on_tyres
 from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
@@ -117,9 +117,9 @@ def braked(
     )
 
 
-def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
+def stays(vehicle: Braked, path: BrakingPath, duration: float = 2.0) -> float:
     """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
-    motion = Motion(path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3), np.zeros((REPORTED, 4)))
+    motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3), np.zeros((REPORTED, 4)))
     torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0
     for _ in range(round(duration / vehicle.sample)):
         vehicle.engine.advance(motion, torques, vehicle.sample, vehicle.steer, vehicle.on_road)

@@ -14,7 +14,7 @@ from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle, sampled
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
-from models.systems.braking.march import Path as Recorded
+from models.systems.braking.march import BrakingPath as Recorded
 from models.systems.braking.march import on_tyres
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface

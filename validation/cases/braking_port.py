@@ -21,7 +21,7 @@ from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
 from models.brake.port.setup import PortTable, Run, opened
 from models.machine.timing import median
-from models.systems.braking.march import Path as Driven
+from models.systems.braking.march import BrakingPath as Driven
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking import misbehaving_client

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.systems.braking.march import Path as Run
+from models.systems.braking.march import BrakingPath as Run
 from models.tyre.magic_formula import surface
 from validation.braking import plain_sprung as whole
 from validation.braking.sprung_box import box, braked, car, steady

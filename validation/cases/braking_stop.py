@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.quarter import Quarter, Stop, braked
+from models.brake.quarter import Quarter, QuarterStop, braked
 from models.brake.surfaces import EVEN
 from models.tyre.magic_formula import SURFACES
 from validation.braking.quarter_stops import FRONT, PATIENCE, SCHEMES, STEP, exact, met, steady, stop, stopped
@@ -135,7 +135,7 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
     ).at_most(BOUND, "as the four above", "closed form")
 
 
-def faults_of(stopped: Stop, radius: float, brakes: bool) -> list[str]:
+def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
     """Names of the rules that a stop breaks."""
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning

@@ -11,7 +11,7 @@ from models.brake.controller import Command, Controller, Sample
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH
-from models.systems.braking.march import Path as Run
+from models.systems.braking.march import BrakingPath as Run
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.ride_choice.activity import activity
-from models.advice.ride_choice.choose import WORTH, Choice, Chooser
+from models.advice.ride_choice.choose import WORTH, Chooser, RideChoice
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, without
@@ -41,7 +41,7 @@ class Judged:
     """
 
     scene: Drawn
-    choice: Choice
+    choice: RideChoice
     identity: float
     by_frequency: np.ndarray | None
     nearby: float

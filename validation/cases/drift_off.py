@@ -18,7 +18,7 @@ from models.ensemble.statistics import quantile
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
-from models.systems.pitch_plane.trust import ANGLE, Curve, interpolation, model, noise
+from models.systems.pitch_plane.trust import ANGLE, GrowthCurve, interpolation, model, noise
 from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
 from models.vehicles.pitch_plane import Parameters
 from validation.common.grounds import allowing
@@ -148,7 +148,7 @@ def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[fl
 def _drift_off(assembly: Assembly, true: Result) -> float:
     """First time (s) at which the run's pitch is ANGLE from the true one; infinite if never."""
     run = simulate(assembly.scene, "reference", assembly=assembly)
-    time = Curve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
+    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
     return np.inf if time is None else time
 
 

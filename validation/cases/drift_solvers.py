@@ -20,7 +20,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.scene import assemble
-from models.systems.pitch_plane.trust import Curve
+from models.systems.pitch_plane.trust import GrowthCurve
 from models.vehicles.pitch_plane_equations import suspension_loads
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
 from validation.common.scenes import drive, force_scene, on_paper_road
@@ -113,7 +113,7 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
-    time = Curve(run.times, error).passes()
+    time = GrowthCurve(run.times, error).passes()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 

@@ -25,7 +25,7 @@ from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, changed
-from models.systems.pitch_plane.tangent import Path as ErrorPath
+from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import covariance, measured_growth, path_of, swing
 from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS

@@ -59,7 +59,7 @@ class FreeRuns:
 
     pitch: np.ndarray
     runs: dict[bool, Assembly]
-    law: float
+    predicted_stiffness: float
 
 
 @allowing("a spring that is too soft lets the run drift off, which is what is shown", "upright")
@@ -74,8 +74,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     if not quick:
         rows += [row for engine in ("exudyn", "mujoco") for row in _ends(JUDGED[3], measured, engine)]
         smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD)]
-        rows += [_found_row(i, name, stiffness, measured.law) for i, (name, stiffness) in enumerate(smallest)]
-    return rows, {"law": measured.law, "found": smallest}
+        rows += [
+            _found_row(i, name, stiffness, measured.predicted_stiffness) for i, (name, stiffness) in enumerate(smallest)
+        ]
+    return rows, {"law": measured.predicted_stiffness, "found": smallest}
 
 
 def _measure(folder: Path) -> FreeRuns:
@@ -83,8 +85,8 @@ def _measure(folder: Path) -> FreeRuns:
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     quiet = assemble(force_scene(folder, step=STEP, duration=DURATION))
     noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=perturbed(PARAMETERS), effects=noise))
-    law = holding_stiffness(quiet.parameters, growth(quiet).rate)
-    return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
+    predicted_stiffness = holding_stiffness(quiet.parameters, growth(quiet).rate)
+    return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)
 
 
 def _error(setting: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
@@ -99,13 +101,13 @@ def _ends(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _error(setting, factor * measured.law, measured, engine)
+        off = _error(setting, factor * measured.predicted_stiffness, measured, engine)
         key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
         rows.append(
             behaves(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {measured.law:.1f} N m/rad, {setting}, {engine}",
+                f"spring of {factor} of the predicted {measured.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
                 "holds" if off <= HELD else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed",
@@ -117,7 +119,7 @@ def _ends(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
 
 def _smallest(setting: Setting, measured: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
-    low, high = 0.5 * measured.law, 1.3 * measured.law
+    low, high = 0.5 * measured.predicted_stiffness, 1.3 * measured.predicted_stiffness
     if _error(setting, high, measured) > HELD:
         return math.nan
     for _ in range(HALVINGS):
@@ -126,16 +128,18 @@ def _smallest(setting: Setting, measured: FreeRuns) -> float:
     return high
 
 
-def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
+def _found_row(index: int, name: str, stiffness: float, predicted_stiffness: float) -> Row:
     key, what = (
         f"holding_spring.found.{index + 1}",
         f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {name}",
     )
     if index >= len(JUDGED):
-        return Observed(key, SYSTEM, what, law / stiffness, "").beside(
+        return Observed(key, SYSTEM, what, predicted_stiffness / stiffness, "").beside(
             "1 for little damping and no noise", "said, not judged"
         )
-    return Observed(key, SYSTEM, what, law / stiffness, "").within(1.0, 0.3, "30 % is asked", "closed form")
+    return Observed(key, SYSTEM, what, predicted_stiffness / stiffness, "").within(
+        1.0, 0.3, "30 % is asked", "closed form"
+    )
 
 
 def tables(data: Saved) -> list[Table]:

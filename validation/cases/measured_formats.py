@@ -16,7 +16,7 @@ from models.core.noise import normal
 from models.fatigue.damage import pseudo_damage
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import ChannelGroup
 from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 from validation.measured.measured_files import csv_forms, kinds
 from validation.measured.measured_files.odd import Odd, read
@@ -49,7 +49,7 @@ def samples() -> np.ndarray:
 def written(path: Path, values: np.ndarray) -> Path:
     """Write the values in blocks of 700."""
     blocks = (values[i : i + 700] for i in range(0, len(values), 700))
-    return write(path, [Group(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
+    return write(path, [ChannelGroup(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
 
 
 def apart(values: np.ndarray, truth: np.ndarray) -> float:
@@ -153,7 +153,7 @@ def two_rates(path: Path, extension: str) -> Row:
     write(
         path,
         [
-            Group(names, ("N",), ("",), period, len(values_of), [values_of[:, None]])
+            ChannelGroup(names, ("N",), ("",), period, len(values_of), [values_of[:, None]])
             for names, (period, values_of) in values.items()
         ],
     )
@@ -228,7 +228,7 @@ def wheel_force() -> np.ndarray:
 def resolution(folder: Path) -> list[Row]:
     """Why RPC III is written with floating-point samples: damage of the road beside one pothole, in both."""
     load = wheel_force()
-    path = write(folder / "choice.rsp", [Group(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
+    path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
     whole = step * np.round(load / step)
@@ -269,7 +269,7 @@ def memory(path: Path, extension: str) -> list[Row]:
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
     count, base = 300_000, 1e3 * normal(SEED, 2, 60_000, 60)
     blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
-    write(path, [Group(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
+    write(path, [ChannelGroup(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
     out = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, check=True).stdout
     samples, peak = (int(word) for word in out.split())
     size = path.stat().st_size / 1e6

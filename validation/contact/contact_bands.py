@@ -33,7 +33,7 @@ FASTSIM = [
 
 
 @dataclass(frozen=True)
-class Held:
+class TheoryErrors:
     """A theory against the exact one: force (n, 2) by mu N, moment (n,) by mu N times the lever.
 
     error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
@@ -57,9 +57,9 @@ class Held:
         """Size of force and moment, (n,)."""
         return used_with_moment(self.used, self.moment)
 
-    def of(self, which: Array) -> "Held":
+    def of(self, which: Array) -> "TheoryErrors":
         """Some of the contacts, by a mask (n,)."""
-        return Held(*(getattr(self, part.name)[which] for part in fields(self)))
+        return TheoryErrors(*(getattr(self, part.name)[which] for part in fields(self)))
 
 
 def forces(name: str, cases: list[Case], cells: int) -> Array:
@@ -94,18 +94,18 @@ def groups(cases: list[Case]) -> Array:
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
 
-def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
+def held(name: str, cases: list[Case], cells: int = CELLS) -> TheoryErrors:
     """A theory's forces, moments and errors."""
     answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
     off, share = answers - exact, spin_share(axes[0], axes[1], motions, nu)
-    return Held(
+    return TheoryErrors(
         answers[:, :2], answers[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, groups(cases)
     )
 
 
-def kept(name: str, constant: Held) -> tuple[float, float]:
+def kept(name: str, constant: TheoryErrors) -> tuple[float, float]:
     """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
     moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
@@ -114,7 +114,7 @@ def kept(name: str, constant: Held) -> tuple[float, float]:
     )
 
 
-def measured(error: Array, used: Array, theory: Held) -> tuple[list[float], ...]:
+def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
     """Quantiles of the error at each knot, without spin and with it, of the group with the largest."""
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]

@@ -19,7 +19,7 @@ from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.effects.kalman_filter import BANDWIDTH, guide_of
-from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE, Estimate, Measurement, estimate
+from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE, Measurement, PitchEstimate, estimate
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, changed
 from models.systems.pitch_plane.scene import build as build_scene
@@ -106,7 +106,7 @@ START = 0.02
 """Deviation (rad) of the start in the runs on consistency."""
 
 
-def nees(estimated: Estimate, states: np.ndarray) -> np.ndarray:
+def nees(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
     """Normalised error squared of the six states, once a second from the second one on."""
     rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
     wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]

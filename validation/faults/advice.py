@@ -15,7 +15,7 @@ import numpy as np
 
 from models.advice.price import Answer, Ladder, recommendation, search, truth
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import Choice, Recommendation
+from models.advice.price.recommendation import Recommendation, SettingChoice
 from models.advice.price.truth import Truth, at
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
@@ -51,7 +51,7 @@ CLOCK = _Clock()
 
 @dataclass(frozen=True)
 class Swing:
-    """See ``models.advice.price.OwnScene``. The error has grown by the end, beyond what is searched."""
+    """See ``models.advice.price.PricedScene``. The error has grown by the end, beyond what is searched."""
 
     title, quantity, unit, cell, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
@@ -130,7 +130,7 @@ def _found(tolerance: float) -> Recommendation:
         return recommendation.recommend(Swing(), tolerance)
 
 
-def _worst(size: Callable[[Choice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)) -> float:
+def _worst(size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)) -> float:
     """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
     return max(
         max(
@@ -141,15 +141,15 @@ def _worst(size: Callable[[Choice, float], float], kind: str = "", asked: tuple[
     )
 
 
-def _held(choice: Choice, tolerance: float) -> float:
+def _held(choice: SettingChoice, tolerance: float) -> float:
     return _error(choice.tried.setting) / tolerance
 
 
-def _told(choice: Choice, tolerance: float) -> float:
+def _told(choice: SettingChoice, tolerance: float) -> float:
     return abs(math.log(max(choice.error, 1e-300) / min(_error(choice.tried.setting), 1e300)))
 
 
-def _dear(choice: Choice, tolerance: float) -> float:
+def _dear(choice: SettingChoice, tolerance: float) -> float:
     return choice.calls / _least(tolerance) - 1.0
 
 
@@ -185,21 +185,21 @@ def _tenth(real: Any) -> Any:
     return told
 
 
-def _by_error(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+def _by_error(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
     return min(timed, key=lambda choice: choice.error, default=None)
 
 
-def _dearest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+def _dearest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
     return max(timed, key=lambda choice: choice.calls, default=None)
 
 
 def _mean(self: Truth, other: Answer) -> float:
-    exact = at(self.answer, other.times, self.cell)
+    exact = at(self.answer, other.times, self.kink_period)
     return float(np.abs(other.values - exact).mean()) if np.isfinite(other.values).all() else np.inf
 
 
 def _numbers_alone(self: Truth, other: Answer) -> float:
-    exact = at(self.answer, other.times, self.cell)
+    exact = at(self.answer, other.times, self.kink_period)
     return float(np.nanmax(np.abs(other.values - exact)))
 
 

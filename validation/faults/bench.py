@@ -32,7 +32,7 @@ from validation.common.checks import (
 )
 
 STEP = 1e-3
-PERIOD = 2e-3
+SAMPLING_PERIOD = 2e-3
 SHORT = 2.5e-4
 """Step of the order check (s), where the stiff wheels no longer bend the observed order of RK4."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
@@ -72,19 +72,19 @@ class Bench:
     @cached_property
     def linear(self) -> Assembly:
         """The vehicle under wheel forces that are linear between their samples."""
-        return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=False))
+        return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=False))
 
     @cached_property
     def held(self) -> Assembly:
         """The vehicle under wheel forces that are constant over each sample."""
-        return self.road.without_tyres().with_input("force", Sampled(self._forces(), PERIOD, held=True))
+        return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=True))
 
     @cached_property
     def guided(self) -> Assembly:
         """The vehicle under wheel forces, with a prescribed pitch."""
         start = self.road.initial
-        pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], PERIOD, derivatives=2, degree=5)
-        forces = Smooth(self._forces(), PERIOD)
+        pitch = Smooth((start[3] + 0.05 * self._swell(7.0))[:, None], SAMPLING_PERIOD, derivatives=2, degree=5)
+        forces = Smooth(self._forces(), SAMPLING_PERIOD)
         return self.road.without_tyres().with_input("pitch", Stacked((forces, pitch)))
 
     @cached_property
@@ -92,14 +92,14 @@ class Bench:
         """The vehicle under wheel forces, with heave and pitch prescribed."""
         start = self.road.initial
         motion = start[2:4] + np.column_stack([0.01 * self._swell(9.0), 0.05 * self._swell(7.0)])
-        parts = (Smooth(self._forces(), PERIOD), Smooth(motion, PERIOD, derivatives=2, degree=5))
+        parts = (Smooth(self._forces(), SAMPLING_PERIOD), Smooth(motion, SAMPLING_PERIOD, derivatives=2, degree=5))
         return self.road.without_tyres().with_input("heave-pitch", Stacked(parts))
 
     @cached_property
     def stabilised(self) -> Assembly:
         """The vehicle under sampled wheel forces, with an added moment and a spring whose dead band the pitch
         leaves."""
-        moment = Sampled(3e3 * self._swell(31.0)[:, None], PERIOD, held=False)
+        moment = Sampled(3e3 * self._swell(31.0)[:, None], SAMPLING_PERIOD, held=False)
         spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
         vehicle = replace(self.held.vehicle, pitch_springs=(spring,))
         return replace(self.held, vehicle=vehicle).with_moment(moment)
@@ -122,7 +122,7 @@ class Bench:
 
     def _swell(self, frequency: float) -> np.ndarray:
         """Samples of a swell from 0 to 1 and back with a smooth start; frequency in rad/s."""
-        times = PERIOD * np.arange(round(self.duration / PERIOD) + 4)
+        times = SAMPLING_PERIOD * np.arange(round(self.duration / SAMPLING_PERIOD) + 4)
         return 0.5 * (1 - np.cos(frequency * times))
 
     def _forces(self) -> np.ndarray:

@@ -15,8 +15,7 @@ from models.brake import brake, plane_vehicle
 from models.brake.advance import advance
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
 from models.brake.port import sensors
-from models.brake.quarter import Path as QuarterPath
-from models.brake.quarter import Stop
+from models.brake.quarter import QuarterPath, QuarterStop
 from models.brake.surfaces import EVEN, Road, Stretch, road
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
@@ -153,7 +152,7 @@ def _literal(real: Any) -> Any:
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
         way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
         none = np.zeros(2)
-        return Stop(QuarterPath(none, np.array([0.0, way]), np.array([speed, 0.0]), none, none), 1)
+        return QuarterStop(QuarterPath(none, np.array([0.0, way]), np.array([speed, 0.0]), none, none), 1)
 
     return stop
 

@@ -195,31 +195,31 @@ def _other_share(real: Any) -> Any:
 def _more_torque(real: Any) -> Any:
     """Torques 1 % too large."""
 
-    def valves(*given: Any) -> None:
+    def planted(*given: Any) -> None:
         real(*given)
         given[-1][:] *= 1.01
 
-    return valves
+    return planted
 
 
 def _late_torque(real: Any) -> Any:
     """Torques of the start of each step at its end."""
 
-    def valves(*given: Any) -> None:
+    def planted(*given: Any) -> None:
         real(*given)
         given[-1][1:] = given[-1][:-1].copy()
 
-    return valves
+    return planted
 
 
 def _quick_valves(real: Any) -> Any:
     """Valves without their delay within a sample."""
 
-    def valves(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
+    def planted(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
         whole_samples = sample * int(chambers.delay / sample)
         real(states, sample, air, chambers._replace(delay=whole_samples), *rest)
 
-    return valves
+    return planted
 
 
 def _longer(real: Any) -> Any:

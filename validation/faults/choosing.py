@@ -13,8 +13,8 @@ import numpy as np
 
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
-from models.advice.ride_choice.choose import Choice
 from models.advice.ride_choice.choose import Chooser as LinearChooser
+from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import Asked
 from validation.choice.drawn_scenes import drawn as drawn_run
@@ -43,7 +43,7 @@ def _run() -> Asked:
     return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
 
 
-def _by_frequency() -> tuple[Choice, np.ndarray, float]:
+def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
     """The linear scene's choice by the functions that are in place now, its changes (quantities,) by frequency, and its
     largest change nearby."""
     return _linear_by(LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted)
@@ -55,7 +55,7 @@ def _by_runs() -> JudgedByRuns:
 
 
 @cache
-def _linear_by(*functions: Any) -> tuple[Choice, np.ndarray, float]:
+def _linear_by(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
     chooser = asked(_linear())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWS, DRAWS) * chooser.tolerance

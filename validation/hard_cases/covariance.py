@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.signals import Sampled
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.tangent import Path as ErrorPath
+from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import carried
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case

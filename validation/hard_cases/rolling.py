@@ -15,7 +15,7 @@ from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import free
 from models.rail.equations import Equations
-from models.rail.equations import Path as Motion
+from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import implementation as kind_of
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word

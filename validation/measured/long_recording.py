@@ -16,7 +16,7 @@ from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.systems.measured.section_run import Hold, SectionRun, run
-from models.systems.measured.sections import Point, Sections
+from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.spatial.cars import r19
 
@@ -77,7 +77,7 @@ def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
 
 def sections() -> Sections:
     """All sections, and where the accelerometers sit."""
-    return Sections(r19(), points=tuple(Point(name, "body", place) for name, place in PLACES.items()))
+    return Sections(r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in PLACES.items()))
 
 
 def run_of(

@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline
 from models.core.finding import Finding
 from models.measured.checks import check
 from models.measured.faults_of_measurement import Faults
-from models.measured.signal import HUB, Place
+from models.measured.signal import HUB, TransducerPlace
 from models.systems.hub_forces.scene import Road
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.vehicles.cut_vehicle import CutVehicle, cut
@@ -146,7 +146,7 @@ def _sprung(whole: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehi
 def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts of samples (m, signals)."""
     spoilt = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
-    places = {name: Place("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
+    places = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
     claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
     return tuple(finding for finding in check(spoilt, virtual.vehicle, places, claimed) if finding.weight != "note")
 

@@ -19,7 +19,7 @@ from models.machine.timing import interleave
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.monte_carlo import Estimate, at_constant_speed
+from models.ride.monte_carlo import VarianceEstimate, at_constant_speed
 from models.ride.sweep import sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -43,7 +43,7 @@ KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
 
 
 @dataclass(frozen=True)
-class Point:
+class RoutePoint:
     """One route. count : of what it is made, solves, points, frequencies or copies; errors : largest of each of KINDS,
     relative; z : of the variances of a random one, largest; seconds : median, of long ones those of the one run."""
 
@@ -115,15 +115,15 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
         begun = time.perf_counter()
         errors = ride.errors(grid(ride, count, last, even))
-        points.append(Point(name, "frequencies", count, errors, time.perf_counter() - begun))
+        points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - begun))
         jobs.append(partial(grid, ride, count, last, even))
     for copies, lasting in COPIES[quick]:
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
         begun = time.perf_counter()
-        estimate: Estimate = jobs[-1]()
+        estimate: VarianceEstimate = jobs[-1]()
         errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
         name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - begun
-        points.append(Point(name, "copies", copies, errors, seconds, z))
+        points.append(RoutePoint(name, "copies", copies, errors, seconds, z))
     few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
     for i, times in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True):
         points[i] = replace(points[i], seconds=float(np.median(times)))
@@ -131,23 +131,25 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
 
-def _lyapunov(ride: Ride) -> Point:
+def _lyapunov(ride: Ride) -> RoutePoint:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
         deviations = direct(ride)
-    return Point("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
+    return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
-def _swept(ride: Ride, speeds: int) -> Point:
+def _swept(ride: Ride, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes", wraps=module.modes) as made:
         deviations = fast(ride, speeds)
-    return Point(f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(deviations), 0.0)
+    return RoutePoint(
+        f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(deviations), 0.0
+    )
 
 
-def judged(ride: Ride, points: list[Point]) -> list[Row]:
+def judged(ride: Ride, points: list[RoutePoint]) -> list[Row]:
     """Errors and counts against what they must be."""
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]

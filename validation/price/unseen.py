@@ -16,9 +16,9 @@ import numpy as np
 
 from models.advice.price import Answer
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, priced, recommend
+from models.advice.price.recommendation import LEAST, SLOWER, Recommendation, SettingChoice, priced, recommend
 from models.advice.price.search import Tried
-from models.advice.price.systems.pitch_plane import OwnPitchPlane
+from models.advice.price.systems.pitch_plane import PricedPitchPlane
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
@@ -213,20 +213,20 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
         parts = {setting: _fine(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
-    exact = {n: Truth(_exact(scene, scene.base / n), 0.0, "", 0, scene.cell) for n in set(parts.values())}
+    exact = {n: Truth(_exact(scene, scene.base / n), 0.0, "", 0, scene.kink_period) for n in set(parts.values())}
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
-def _fine(scene: OwnPitchPlane, parts: int) -> int:
+def _fine(scene: PricedPitchPlane, parts: int) -> int:
     """A multiple of ``parts`` in which rows lie no further apart than LONGEST."""
     return parts * math.ceil(scene.base / parts / LONGEST * (1 - 1e-9))
 
 
-def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
+def _exact(scene: PricedPitchPlane, spacing: float) -> Answer:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TIGHT)))
 
 
-def slower(recommendation: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
+def slower(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
     """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
     engine, kind = key
     rivals = [attempt for attempt in _defaults(recommendation) if attempt.setting.engine.startswith(engine)]
@@ -252,7 +252,7 @@ def _defaults(recommendation: Recommendation) -> list[Tried]:
     return list({each.setting.curve: each for each in able}.values())
 
 
-def _loses(recommendation: Recommendation, choice: Choice, rival: Tried) -> bool:
+def _loses(recommendation: Recommendation, choice: SettingChoice, rival: Tried) -> bool:
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
     jobs = [

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer
-from models.advice.price.meshed import Meshed
+from models.advice.price.meshed import MeshedScene
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation
 from models.advice.price.truth import Truth
@@ -108,13 +108,15 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     finer = Setting(ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / MORE, ladder.order)
 
     def error(setting: Setting) -> float:
-        exact = _exact(scene, setting) if isinstance(scene, Meshed) else scene.answer(scene.solve(finer, scene.whole))
+        exact = (
+            _exact(scene, setting) if isinstance(scene, MeshedScene) else scene.answer(scene.solve(finer, scene.whole))
+        )
         return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
 
     return {setting: error(setting) for setting in settings}
 
 
-def _exact(scene: Meshed, setting: Setting) -> Answer:
+def _exact(scene: MeshedScene, setting: Setting) -> Answer:
     cells = min(MOST, max(LEAST, FINER * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from validation.replay import jobs as asked
-from validation.replay.answers import JOBS, Answer, answer, difference, load, read_jobs, save, write_jobs
+from validation.replay.answers import JOBS, CommandAnswer, answer, difference, load, read_jobs, save, write_jobs
 
 
 def main(words: list[str]) -> int:
@@ -63,7 +63,7 @@ def _chosen(given: argparse.Namespace) -> list[asked.Job]:
     return [job for job in read_jobs(given.folder)[:: given.every] if fnmatch.fnmatch(job.name, given.only)]
 
 
-def _answers(jobs: list[asked.Job], given: argparse.Namespace) -> Iterator[tuple[asked.Job, Answer]]:
+def _answers(jobs: list[asked.Job], given: argparse.Namespace) -> Iterator[tuple[asked.Job, CommandAnswer]]:
     """Answers as they come in the jobs' order, several commands at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 

@@ -31,7 +31,7 @@ UNWATCHED = ("seconds", "folder", "command", "price", "range")
 
 
 @dataclass
-class Answer:
+class CommandAnswer:
     """Exit codes, message, seconds, arrays by "file: channel"; channels of printed tables belong to no file."""
 
     codes: list[int]
@@ -40,7 +40,7 @@ class Answer:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def answer(job: Job, command: str, folder: Path) -> Answer:
+def answer(job: Job, command: str, folder: Path) -> CommandAnswer:
     """Run the commands of a job in a new folder, which is gone afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -48,7 +48,7 @@ def answer(job: Job, command: str, folder: Path) -> Answer:
         shutil.copy(file, folder)
     (folder / "scene.toml").write_text(job.scene)
     given = {path.name for path in folder.iterdir()}
-    now = Answer([], "", 0.0)
+    now = CommandAnswer([], "", 0.0)
     for words in job.commands:
         _ask([command, *words], folder, now)
     now.arrays |= dict(_saved(folder, given))
@@ -56,7 +56,7 @@ def answer(job: Job, command: str, folder: Path) -> Answer:
     return now
 
 
-def _ask(words: list[str], folder: Path, now: Answer) -> None:
+def _ask(words: list[str], folder: Path, now: CommandAnswer) -> None:
     """Run one command, and add what it says."""
     begun = time.monotonic()
     code, said, wrong = _run(words, folder)
@@ -160,7 +160,7 @@ def read_jobs(folder: Path) -> list[Job]:
     ]
 
 
-def save(folder: Path, name: str, answer: Answer) -> None:
+def save(folder: Path, name: str, answer: CommandAnswer) -> None:
     """Keep an answer; its note is written last."""
     arrays = {str(i): array for i, array in enumerate(answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
@@ -168,7 +168,7 @@ def save(folder: Path, name: str, answer: Answer) -> None:
     (folder / f"{name}.json").write_text(json.dumps(note, indent=1))
 
 
-def load(folder: Path, name: str) -> Answer | None:
+def load(folder: Path, name: str) -> CommandAnswer | None:
     """A kept answer, or None where there is none that is whole."""
     try:
         note = json.loads((folder / f"{name}.json").read_text())
@@ -176,7 +176,7 @@ def load(folder: Path, name: str) -> Answer | None:
             arrays = {key: file[str(i)] for i, key in enumerate(note["arrays"])}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None
-    return Answer(note["codes"], note["message"], note["seconds"], arrays)
+    return CommandAnswer(note["codes"], note["message"], note["seconds"], arrays)
 
 
 @dataclass
@@ -188,7 +188,7 @@ class Difference:
     other: list[str] = field(default_factory=list)
 
 
-def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, str]) -> Difference:
+def difference(before: CommandAnswer, now: CommandAnswer, bound: float, renamed: Mapping[str, str]) -> Difference:
     """Difference of an answer from a recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier

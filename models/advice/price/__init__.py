@@ -1,6 +1,6 @@
 """The price of accuracy of a user's own scene: ``twinrig price SCENE --tolerance T``.
 
-scene -> OwnScene (by a file of ``systems``) -> truth -> search -> recommendation -> text
+scene -> PricedScene (by a file of ``systems``) -> truth -> search -> recommendation -> text
 """
 
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class Answer:
     counts: dict[str, int]
 
 
-class OwnScene(Protocol):
+class PricedScene(Protocol):
     """Protocol of a priced scene, which the search for settings uses."""
 
     @property
@@ -85,7 +85,7 @@ class OwnScene(Protocol):
         ...
 
     @property
-    def cell(self) -> float:
+    def kink_period(self) -> float:
         """Time between kinks of the quantity, s; 0 where there are none."""
         ...
 

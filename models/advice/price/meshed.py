@@ -32,9 +32,9 @@ def first_part(duration: float, longest: float) -> float:
 
 
 @dataclass(frozen=True)
-class Meshed(ABC):
-    """See ``models.advice.price.OwnScene``. reference_engine : that runs the reference; step : the scene's (s); longest
-    : step (s) of the reference's first rung; cells : the scene's, 0 where its contacts have none."""
+class MeshedScene(ABC):
+    """See ``models.advice.price.PricedScene``. reference_engine : that runs the reference; step : the scene's (s);
+    longest : step (s) of the reference's first rung; cells : the scene's, 0 where its contacts have none."""
 
     title: str
     quantity: str
@@ -47,7 +47,7 @@ class Meshed(ABC):
     step: float
     longest: float
     cells: int
-    cell = 0.0
+    kink_period = 0.0
 
     @abstractmethod
     def run(self, engine: str, cells: int, step: float, duration: float) -> Any:

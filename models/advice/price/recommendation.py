@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price import Answer, Ladder, PricedScene
 from models.advice.price.problem import Setting
 from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
@@ -44,7 +44,7 @@ DEARER = 8.0
 
 
 @dataclass(frozen=True)
-class Choice:
+class SettingChoice:
     """A setting with the error that it has (in the quantity's unit; the truth's own uncertainty where that is more),
     its force calls, its seconds (median), and those of the rounds in which it was timed beside others; ``confirmed`` :
     over the whole run."""
@@ -57,7 +57,7 @@ class Choice:
     rounds: tuple[float, ...] = ()
 
 
-Winners = dict[tuple[str, str], Choice]
+Winners = dict[tuple[str, str], SettingChoice]
 """By engine, "" for all, and by what is counted, "calls" or "seconds"."""
 
 
@@ -67,7 +67,7 @@ class Default:
     meet the tolerance; ``extrapolated`` by its declared order where no step tried was fine enough."""
 
     as_it_is: Tried
-    refined: Choice | None
+    refined: SettingChoice | None
     extrapolated: bool
 
 
@@ -76,7 +76,7 @@ class Recommendation:
     """Winners by engine and cost ("" for all engines), defaults by engine, all that was tried; the truth over the part
     that was searched, and over the whole run."""
 
-    scene: OwnScene
+    scene: PricedScene
     tolerance: float
     searched: Truth
     truth: Truth
@@ -97,11 +97,11 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     return recommend(priced(scene, quantity, engines), tolerance)
 
 
-def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnScene:
+def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
     """A scene as its system's file gives it to the search; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
-        priceable: OwnScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
+        priceable: PricedScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
         return priceable
     package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
     why = getattr(package, "NO_PRICE", "has no steps to choose")
@@ -110,7 +110,7 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnSce
     )
 
 
-def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
+def recommend(scene: PricedScene, tolerance: float) -> Recommendation:
     """Search the first part of the run, time what is near the best, confirm it over the whole run."""
     searched = known = truth(scene, tolerance, scene.first)
     search = Search(scene, searched, tolerance, scene.first).everything()
@@ -128,7 +128,7 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
 
 
-def _timed(search: Search) -> list[Choice]:
+def _timed(search: Search) -> list[SettingChoice]:
     """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
     curves: dict[str, Tried] = {}
     for attempt in search.meeting():
@@ -141,7 +141,7 @@ def _timed(search: Search) -> list[Choice]:
     taken, longer = _raced(search, _rivals(attempts)), search.scene.whole / search.duration
     seconds = [tuple(longer * taken.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts]
     return [
-        Choice(attempt, attempt.error, longer * attempt.calls, float(np.median(took)), False, took)
+        SettingChoice(attempt, attempt.error, longer * attempt.calls, float(np.median(took)), False, took)
         for attempt, took in zip(attempts, seconds, strict=True)
     ]
 
@@ -184,12 +184,12 @@ def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, n
     return dict(zip((attempt.setting for attempt in rivals), taken, strict=True))
 
 
-def _winners(timed: list[Choice], keys: Iterable[tuple[str, str]]) -> Winners:
+def _winners(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
     """The cheapest for every engine and cost for which there is any."""
     return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
 
 
-def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
     """The least cost; an engine's default method is kept where it does not take longer beyond doubt: seconds wander."""
     able = [choice for choice in timed if choice.tried.setting.engine.startswith(engine)]
     if not able:
@@ -201,7 +201,7 @@ def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
     return min(usual, key=lambda choice: choice.seconds) if usual else best
 
 
-def _slower(choice: Choice, best: Choice) -> bool:
+def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
     """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
     both = min(len(choice.rounds), len(best.rounds))
     if both < FEWEST:
@@ -209,10 +209,10 @@ def _slower(choice: Choice, best: Choice) -> bool:
     return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER
 
 
-Known = tuple[Truth, list[Choice], Winners]
+Known = tuple[Truth, list[SettingChoice], Winners]
 
 
-def _confirmed(search: Search, timed: list[Choice], winners: Winners) -> Known:
+def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners) -> Known:
     """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
     known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
@@ -225,19 +225,19 @@ def _confirmed(search: Search, timed: list[Choice], winners: Winners) -> Known:
     return known, held, _winners(held, winners)
 
 
-def _shown(timed: list[Choice], winners: Winners) -> list[Choice]:
+def _shown(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
     """The winners and the defaults."""
     return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
 
 
-def _over_all(over: Search, ladder: Ladder, choice: Choice) -> Choice | None:
+def _over_all(over: Search, ladder: Ladder, choice: SettingChoice) -> SettingChoice | None:
     """A setting, or the next finer one of its method that meets the tolerance over the whole run."""
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
     for _ in range(ATTEMPTS):
         now = over.attempt(ladder.setting(i))
         if over.meets(now):
             ratio = ladder.work(first.setting.value, now.setting.value)
-            return Choice(
+            return SettingChoice(
                 now, now.error, now.calls, ratio * choice.seconds, True, tuple(ratio * s for s in choice.rounds)
             )
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
@@ -248,7 +248,7 @@ def _over_all(over: Search, ladder: Ladder, choice: Choice) -> Choice | None:
     return None
 
 
-def _resolved(scene: OwnScene, known: Truth, timed: list[Choice], winners: Winners) -> Known:
+def _resolved(scene: PricedScene, known: Truth, timed: list[SettingChoice], winners: Winners) -> Known:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
     shown = _shown(timed, winners)
@@ -272,7 +272,7 @@ def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
     return min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE
 
 
-def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
+def _finer(scene: PricedScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
     """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
     while _blurred(known, errors):
@@ -286,7 +286,7 @@ def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tup
     return known, errors
 
 
-def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
+def _default(search: Search, ladder: Ladder, timed: list[SettingChoice]) -> Default | None:
     """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
@@ -302,5 +302,5 @@ def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | N
     setting = replace(finest.setting, value=finest.setting.value / finer)
     longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration
     guess = Tried(setting, "ok", "", search.tolerance)
-    refined = Choice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
+    refined = SettingChoice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
     return Default(as_it_is, refined, True)

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
-from models.advice.price import Ladder, OwnScene
+from models.advice.price import Ladder, PricedScene
 from models.advice.price.problem import Setting
 from models.advice.price.runner import Status
 from models.advice.price.truth import Truth
@@ -49,7 +49,7 @@ class Tried:
 class Search:
     """Settings of a scene tried over ``duration`` (s) against its truth."""
 
-    scene: OwnScene
+    scene: PricedScene
     truth: Truth
     tolerance: float
     duration: float

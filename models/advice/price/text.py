@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import Choice, Recommendation, Winners
+from models.advice.price.recommendation import Recommendation, SettingChoice, Winners
 from models.advice.price.search import Tried
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
@@ -101,7 +101,7 @@ def _defaults(recommendation: Recommendation) -> list[str]:
     return rows if recommendation.defaults else []
 
 
-def _lost(recommendation: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
+def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool) -> str:
     """Text: cost of the refined default method beside the engine's cheapest setting and the cheapest of all."""
     if refined is None:
         return "; no step tried gives an answer"
@@ -172,7 +172,7 @@ def as_dict(recommendation: Recommendation) -> dict[str, Any]:
     }
 
 
-def _choice(choice: Choice) -> dict[str, Any]:
+def _choice(choice: SettingChoice) -> dict[str, Any]:
     return {**_tried(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price import Answer, Ladder, PricedScene
 from models.advice.price.problem import Setting
 from models.core.assumptions import Broken, breaches
 from models.core.errors import InputError, RunFailed
@@ -21,15 +21,15 @@ MOST_ROWS = 4_000_000
 
 @dataclass(frozen=True)
 class Truth:
-    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder; cell : s
-    between kinks of the quantity, 0 where there are none; seconds : that the reference took; broken : assumptions that
-    the reference breaks, and with it every setting that is right."""
+    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder;
+    kink_period : s between kinks of the quantity, 0 where there are none; seconds : that the reference took; broken :
+    assumptions that the reference breaks, and with it every setting that is right."""
 
     answer: Answer
     uncertainty: float
     how: str
     rung: int
-    cell: float = 0.0
+    kink_period: float = 0.0
     seconds: float = 0.0
     broken: tuple[Broken, ...] = ()
 
@@ -42,7 +42,7 @@ class Truth:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
         if not np.isfinite(other.values).all():
             return float("inf")
-        return float(np.abs(other.values - at(self.answer, other.times, self.cell)).max())
+        return float(np.abs(other.values - at(self.answer, other.times, self.kink_period)).max())
 
     @property
     def size(self) -> float:
@@ -50,16 +50,16 @@ class Truth:
         return float(np.abs(self.answer.values).max())
 
 
-def at(answer: Answer, times: np.ndarray, cell: float = 0.0) -> np.ndarray:
+def at(answer: Answer, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
     """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
-    all of them of one cell."""
+    all of them of one period."""
     last = len(answer.times) - 1
     step = float(answer.times[-1]) / last
     place = times / step
     index = np.rint(place).astype(int)
     if np.abs(place - index).max() < NEARLY:
         return answer.values[np.minimum(index, last)]
-    rows = max(3, round(cell / step)) if cell else last
+    rows = max(3, round(kink_period / step)) if kink_period else last
     first = np.minimum((place + NEARLY) // rows * rows, last - 3).astype(int)
     left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
     s = place - left
@@ -72,7 +72,7 @@ def at(answer: Answer, times: np.ndarray, cell: float = 0.0) -> np.ndarray:
     return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
-def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twice: bool = True) -> Truth:
+def truth(scene: PricedScene, tolerance: float, duration: float, rung: int = 0, twice: bool = True) -> Truth:
     """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``twice`` : by a second family too.
 
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
@@ -82,7 +82,7 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
-    alone = Truth(settled, change, f"{said}; {finer}", rung, scene.cell, seconds, tuple(broken.values()))
+    alone = Truth(settled, change, f"{said}; {finer}", rung, scene.kink_period, seconds, tuple(broken.values()))
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
@@ -92,10 +92,10 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     return replace(alone, uncertainty=max(change, differs), how=f"{both}, which differ by")
 
 
-def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
+def _change(scene: PricedScene, before: Answer, now: Answer) -> float:
     """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
     both = ((now, before), (before, now))
-    return max(Truth(run, 0.0, "", 0, scene.cell).error(other) for run, other in both)
+    return max(Truth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
 
 
 def _named(setting: Setting) -> str:
@@ -103,7 +103,7 @@ def _named(setting: Setting) -> str:
 
 
 def _settled(
-    scene: OwnScene, ladder: Ladder, tolerance: float, duration: float, rung: int
+    scene: PricedScene, ladder: Ladder, tolerance: float, duration: float, rung: int
 ) -> tuple[Answer, int, float, float, dict[str, Broken]]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
     seconds that it took; what it broke."""

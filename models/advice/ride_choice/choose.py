@@ -42,7 +42,7 @@ Saved = Callable[[Set, Set], float]
 
 
 @dataclass(frozen=True)
-class Choice:
+class RideChoice:
     """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
 
     predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
@@ -115,7 +115,7 @@ class Chooser(Candidates):
             step *= SHORTER
         return self.at_step(chosen, step)
 
-    def choose(self) -> Choice:
+    def choose(self) -> RideChoice:
         """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
         chosen, rounds = self._greedy()
         chosen = self._worthwhile(chosen)
@@ -123,7 +123,7 @@ class Chooser(Candidates):
             chosen = frozenset()
         changes, between, none = self.confirm(chosen), self.between(chosen), frozenset[Effect]()
         off = self.off(chosen) if chosen else np.zeros(len(self.rows))
-        return Choice(
+        return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
             self.predicted(chosen),

@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import absent, beside
 from models.core.strict import LARGEST, Strict, quantity
 from models.ride.gaussian_laws import of_curve, of_friction
-from models.ride.nonlinear_copies import EVERY, March, forgotten, usual_step
+from models.ride.nonlinear_copies import EVERY, CopiesMarch, forgotten, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import BentSpring, statistically_linear
 from models.road.excitation import Excitation
@@ -137,7 +137,7 @@ class InTime:
     def squares(self, pace: Pace, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
         """Outputs, and each copy's mean square (copies, p) about the mean of all."""
         step = 2.0 * pace.half * self.times
-        march = March(self.vehicle(pace), pace.speed, step, self.samples.copies)
+        march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
         every = max(1, EVERY // self.times)
         march.over(roads, pace.settling // self.times, every)
         count = len(range(0, pace.counted // self.times, every))

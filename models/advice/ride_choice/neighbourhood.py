@@ -127,7 +127,7 @@ class Neighbourhood:
         weights = weights[:, None] * abs(factors) ** 2 / np.pi
         road = at_axles(filtered(excitation, speeds, omega), excitation, speeds, omega, apart)
         heights = np.hstack(excitation.heights) @ road
-        response = Response(vehicle, [row for row, _ in self.quantities], omega)
+        response = VehicleResponse(vehicle, [row for row, _ in self.quantities], omega)
         seen = response.H @ heights
         variances = np.einsum("vwqk,vwqk,wq->vq", seen, seen.conj(), weights, optimize=True).real
         if not slopes:
@@ -140,7 +140,7 @@ class Neighbourhood:
         return Spectra(variances, by_parameter)
 
 
-class Response:
+class VehicleResponse:
     """Outputs by heights, H (w, q, wheels), of a vehicle at frequencies (w,), and how another one moves them."""
 
     def __init__(self, vehicle: LinearVehicle, rows: list[int], omega: np.ndarray) -> None:

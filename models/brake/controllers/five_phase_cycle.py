@@ -27,7 +27,7 @@ CLOSED = 1e-9
 """Relative change of slip and torque from one cycle to the next one at which it is the limit cycle."""
 
 
-class State(NamedTuple):
+class WheelState(NamedTuple):
     """State of a wheel in the five-phase cycle: pressure (bar) and torque (N m) of its brake, speed of turning (rad/s),
     time (s), and the integral of the tyre's force over that time (N s)."""
 
@@ -85,9 +85,9 @@ class Frozen:
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
 
-    def rolling(self) -> State:
+    def rolling(self) -> WheelState:
         """A wheel that rolls without torque, at time 0."""
-        return State(0.0, 0.0, self.speed / self.radius, 0.0, 0.0)
+        return WheelState(0.0, 0.0, self.speed / self.radius, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -107,7 +107,7 @@ def go_on(state, rate, time, driven):
     after = torque(0, pressure, state.torque, driven.brakes)
     drive = StepInput(driven.speed, driven.speed, state.torque, after, time)
     rolled = wheel_step(drive, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
-    return State(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
+    return WheelState(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 
 
 @njit(cache=True, error_model="numpy")
@@ -195,14 +195,16 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
     raise RunFailed("braking", f"{most} cycles of the five phases do not close")
 
 
-def _cycle(at: list[State], frozen: Frozen) -> Cycle:
+def _cycle(at: list[WheelState], frozen: Frozen) -> Cycle:
     """The ``Cycle`` of the states at its six switches."""
     last, slips = at[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in at]
     durations = tuple(np.diff([state.time for state in at]).tolist())
     return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
 
 
-def _to_end(state: State, number: int, controller: FivePhase, step: float, frozen: Frozen) -> tuple[State, int]:
+def _to_end(
+    state: WheelState, number: int, controller: FivePhase, step: float, frozen: Frozen
+) -> tuple[WheelState, int]:
     """The state at the end of a phase, and whether that is MET or BACK; raises RunFailed."""
     sign, level = end_of(number, controller)
     back = controller.e4 if number == CLIMB else -math.inf
@@ -219,7 +221,7 @@ def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: i
     Raises RunFailed if it does not cycle.
     """
     state, driven, number, falling = frozen.rolling(), frozen.driven, 0, False
-    starts: list[State] = []
+    starts: list[WheelState] = []
     while len(starts) <= cycles + skip:
         wheels = np.array([frozen.radius * state.turning])
         sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)

@@ -11,8 +11,8 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE
 from models.brake.plain.road import under_wheels, ways
-from models.brake.plain.suspension import Contact, Suspension, WheelForces
-from models.brake.plain.tyre import Braked, Motion, Surface, tyre
+from models.brake.plain.suspension import Suspension, TyreContact, WheelForces
+from models.brake.plain.tyre import Braked, Surface, WheelMotion, tyre
 from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
 
@@ -96,13 +96,13 @@ class Steps:
         places = self.course.on.plane.place
         return under_wheels(self.course.on.road, ways(state[0, :3], state[1, :3], places, time), self.course.on.kind)
 
-    def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[Contact]:
+    def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
         return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
 
     def _hold(
         self,
         moving: Moving,
-        contacts: list[Contact],
+        contacts: list[TyreContact],
         starts: np.ndarray,
         under: list[Surface],
         torques: np.ndarray,
@@ -111,7 +111,7 @@ class Steps:
         """Forces over a time (s) by loads and motion at contacts; the reports are filled."""
         course = self.course
         for i, contact in enumerate(contacts):
-            motion = Motion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
+            motion = WheelMotion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
             if moving.lag is not None:
                 motion = replace(motion, across=moving.lag.across(i, max(motion.forwards, course.regular)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
@@ -133,6 +133,6 @@ class Steps:
         return stands if stands <= self.step and speed <= (1.5 * self.step) ** 2 * rate else None
 
 
-def speeds(contacts: list[Contact]) -> np.ndarray:
+def speeds(contacts: list[TyreContact]) -> np.ndarray:
     """Speeds (W,) of the wheels' centres along them (m/s)."""
     return np.array([contact.passing for contact in contacts])

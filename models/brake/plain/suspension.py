@@ -24,7 +24,7 @@ def round_the_vertical(vector: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class TyreContact:
     """Where a tyre touches the road: level axes along and across the wheel, the latter its axle, in space; how far its
     centre is above the road (m), its load (N), and speeds (m/s) of the centre along and of the contact across."""
 
@@ -70,12 +70,12 @@ class Suspension:
         """Number of coordinates of the suspended vehicle."""
         return self.bodies.size
 
-    def contacts(self, motion: Motion, steer: np.ndarray) -> list[Contact]:
+    def contacts(self, motion: Motion, steer: np.ndarray) -> list[TyreContact]:
         """Contact of every tyre, whose wheels are steered (W,) in rad."""
         hubs, heading = motion.at(self._hubs), motion.axes(self._carrier)[PLACE]
         return [self._contact(i, hub, motion, heading, float(steer[i])) for i, hub in enumerate(hubs)]
 
-    def _contact(self, i: int, hub: np.ndarray, motion: Motion, heading: np.ndarray, steer: float) -> Contact:
+    def _contact(self, i: int, hub: np.ndarray, motion: Motion, heading: np.ndarray, steer: float) -> TyreContact:
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         along = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
@@ -84,7 +84,7 @@ class Suspension:
             axle @ (carrying - hub_turning)
         )  # the rim does not turn beside the chassis about its axle
         sliding = hub[RATE] + height * round_the_vertical(turning)
-        return Contact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
+        return TyreContact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
 
     def _load(self, i: int, hub: np.ndarray) -> float:
         """Load (N) of a tyre that never pulls, neither by its spring nor by its damper."""

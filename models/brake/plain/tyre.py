@@ -68,7 +68,7 @@ class Friction:
 
 
 @dataclass(frozen=True)
-class Motion:
+class WheelMotion:
     """Motion of a wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds
     along and across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those
     at it."""
@@ -107,7 +107,7 @@ class Braked:
     turning: float
 
 
-def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked) -> np.ndarray:
+def tyre(tables: Tables, under: Surface, motion: WheelMotion, load: float, of: Braked) -> np.ndarray:
     """(7,) mean forces along and across (N), load (N), mean slip, slip angle (rad), time locked (s), turning (rad/s)
     at the end: the columns of ``plane_step``."""
     friction, sense = Friction(tables, under, motion.angle, load), motion.sense
@@ -120,7 +120,7 @@ def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked
     return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
 
 
-def _turned_to_sliding(forces: np.ndarray, slip: float, motion: Motion) -> np.ndarray:
+def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
     """Sizes (2,) of the forces along and across, turned against the sliding of a wheel that is nearly locked."""
     sliding = np.array([motion.forwards, abs(motion.across)])
     speed = float(np.hypot(*sliding))

@@ -75,7 +75,7 @@ def raised(error: BaseException) -> str:
 
 
 @dataclass
-class Asked:
+class CheckedController:
     """A controller whose answers are checked before anything is done with them."""
 
     inner: Controller

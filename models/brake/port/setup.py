@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from models.brake.controller import Controller
 from models.brake.port import socket_port
-from models.brake.port.ask import STATES, WITH_SLOW, Asked
+from models.brake.port.ask import STATES, WITH_SLOW, CheckedController
 from models.brake.port.faults import Fault, Faulty, missing_teeth
 from models.brake.port.host import Guest
 from models.brake.port.hosted import hosted
@@ -100,7 +100,9 @@ def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple
     """
     check_port(table, run)
     with ExitStack() as stack:
-        inner = Asked(stack.enter_context(_behind(table, run, controller)), WITH_SLOW if run.slow else STATES)
+        inner = CheckedController(
+            stack.enter_context(_behind(table, run, controller)), WITH_SLOW if run.slow else STATES
+        )
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:

@@ -11,7 +11,7 @@ from models.core.finding import Finding, Weight
 from models.measured.checks import clipped, drift, faults, gaps, gravity, noise, rigid, spikes, swapped, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.recording import Recording
-from models.measured.signal import Place
+from models.measured.signal import TransducerPlace
 from models.vehicles.cut_vehicle import CutVehicle
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
@@ -49,7 +49,7 @@ ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
 def check(
     recording: Recording,
     vehicle: CutVehicle | None,
-    places: Mapping[str, Place] | None = None,
+    places: Mapping[str, TransducerPlace] | None = None,
     claimed: Mapping[str, float] | None = None,
 ) -> tuple[Finding, ...]:
     """All findings, errors first, with what was noticed while reading.

@@ -38,7 +38,7 @@ SMOOTHED = 9
 
 
 @dataclass(frozen=True)
-class Group:
+class SignalGroup:
     """Signals that are wrong together. forces : whether of hubs; members : their numbers among those or the
     readings."""
 
@@ -48,7 +48,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Fault:
+class MeasurementFault:
     """late : size in s; factor : recorded by true value; swapped, of hubs, and crossed, of two channels : size is the
     share that is explained only then; lever : size in m by which the point that moments are about lies above the hub.
 
@@ -136,9 +136,9 @@ class Agreement:
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
         return self.averages / np.maximum(np.stack(smooth, axis=1), TINY)
 
-    def search(self) -> tuple["Agreement", tuple[Fault, ...]]:
+    def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """All faults, the worst first, and what is left without them."""
-        now, faults = self, list[Fault]()
+        now, faults = self, list[MeasurementFault]()
         while len(faults) < FAULTS:
             worst = max(now._offers(), key=lambda fault: fault.fall, default=None)
             if worst is None:
@@ -147,7 +147,7 @@ class Agreement:
             now = now.without(worst)
         return now, tuple(faults)
 
-    def without(self, fault: Fault) -> "Agreement":
+    def without(self, fault: MeasurementFault) -> "Agreement":
         """The agreement with a fault put right: true by recorded forces, or recorded by true readings, in the
         response."""
         response = self.response.copy()
@@ -172,7 +172,7 @@ class Agreement:
         pick = [(self.inputs if forces else self.outputs).index(s) for s in signals]
         return forces, (slice(None), slice(None), pick) if forces else (slice(None), pick)
 
-    def _offers(self) -> Iterator[Fault]:
+    def _offers(self) -> Iterator[MeasurementFault]:
         """Every single fault that would explain more and is large enough to be named."""
         weights = self.weights
         for group in self.groups():
@@ -183,7 +183,7 @@ class Agreement:
         yield from self._pairs(weights)
         yield from self._about(weights)
 
-    def groups(self) -> Iterator[Group]:
+    def groups(self) -> Iterator[SignalGroup]:
         """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
             keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals]]
@@ -196,7 +196,7 @@ class Agreement:
                     of_name = tuple(i for i, other in enumerate(names) if other == name)
                     if of_name not in seen and not (forces and len(of_name) == len(signals)):
                         seen.add(of_name)
-                        yield Group(name, forces, of_name)
+                        yield SignalGroup(name, forces, of_name)
 
     @cached_property
     def _told(self) -> np.ndarray:
@@ -208,7 +208,7 @@ class Agreement:
         """exp(i omega t) (t, f) of all delays."""
         return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
 
-    def share(self, group: Group) -> tuple[np.ndarray, np.ndarray]:
+    def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
         pick = list(group.members)
         if group.forces:
@@ -221,7 +221,7 @@ class Agreement:
         power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], response.conj())
         return cross, power.real
 
-    def lateness(self, group: Group, weights: np.ndarray) -> tuple[float, float, float]:
+    def lateness(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
         """Delay (s) of a group, its standard error, infinite if nothing tells, and the fall of chi square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
@@ -233,12 +233,12 @@ class Agreement:
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
         return late, steep**-0.5 if steep > 0 else float("inf"), fall
 
-    def _late(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+    def _late(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
         late, error, fall = self.lateness(group, weights)
         if fall > CERTAIN and abs(late) > max(SMALL_DELAY, 4 * error):
-            yield Fault("late", group.name, self._signals(group), late, error, fall)
+            yield MeasurementFault("late", group.name, self._signals(group), late, error, fall)
 
-    def _wrong(self, group: Group, weights: np.ndarray) -> Iterator[Fault]:
+    def _wrong(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
         cross, power = ((weights * part).sum() for part in self.share(group))
         ratio = float(cross.real / power) if power > 0 else 0.0
         if ratio == 0.0:
@@ -246,9 +246,11 @@ class Agreement:
         fall, error = float(power) * (ratio - 1) ** 2, float(2 * power) ** -0.5
         factor = 1 / ratio if group.forces else ratio
         if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
-            yield Fault("factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall)
+            yield MeasurementFault(
+                "factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall
+            )
 
-    def _about(self, weights: np.ndarray) -> Iterator[Fault]:
+    def _about(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Moments about another point than the hub, above or below, of one hub, of two, or of all alike."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
@@ -258,7 +260,7 @@ class Agreement:
                 continue
             rest = self.between - self._told
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
-            fault = Fault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
+            fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
             large = fault.fall > CERTAIN and abs(size) > max(SMALL_LEVER, 4 * fault.error)
             if large and self._worth(self.without(fault), weights):
                 yield fault
@@ -276,7 +278,7 @@ class Agreement:
                     out[:, :, force] += sign * self.response[:, :, moment]
         return out
 
-    def _swapped(self, weights: np.ndarray) -> Iterator[Fault]:
+    def _swapped(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Faults of hubs with exchanged channels: two hubs, or two pairs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
@@ -289,12 +291,12 @@ class Agreement:
                 if fall > CERTAIN and other.left.sum() < self.left.sum():
                     yield replace(fault, size=self.rms, error=other.rms, fall=fall)
 
-    def _pairs(self, weights: np.ndarray) -> Iterator[Fault]:
+    def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Two channels that each have what the other one measured."""
         for pair, other in self._exchanges():
             fall = self._better(other, weights)
             if fall:
-                yield Fault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
+                yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
     def blind(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments of one axis that might be exchanged without being named."""
@@ -320,14 +322,16 @@ class Agreement:
         response[self._picked(pair)[1]] = self.response[self._picked(pair[::-1])[1]]
         return replace(self, response=response)
 
-    def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> Fault | None:
+    def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
         """Fault of exchanged pairs of hubs; None where they do not have the same channels."""
         both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
         signals = tuple(s for s in self.inputs if s.at in dict(both))
         keys = {(s.at, s.quantity, s.component) for s in signals}
         if {(dict(both)[at], quantity, component) for at, quantity, component in keys} != keys:
             return None
-        return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both)
+        return MeasurementFault(
+            "swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both
+        )
 
     def seen(self) -> dict[str, tuple[float, float]]:
         """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
@@ -342,7 +346,7 @@ class Agreement:
 
     def factor(self, signal: Signal) -> tuple[float, float]:
         """Recorded by true value of a force by the motion alone, as it is now, and its standard error."""
-        group = Group(signal.name, True, (self.inputs.index(signal),))
+        group = SignalGroup(signal.name, True, (self.inputs.index(signal),))
         cross, power = ((self.weights * part).sum() for part in self.share(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
 
@@ -354,7 +358,7 @@ class Agreement:
         """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
         return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._rest(weights)))
 
-    def _signals(self, group: Group) -> tuple[Signal, ...]:
+    def _signals(self, group: SignalGroup) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.members)
 
 

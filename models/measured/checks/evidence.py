@@ -6,12 +6,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from models.measured.checks.agreement import Agreement, Fault
-from models.measured.checks.response import AXES, Response, number
+from models.measured.checks.agreement import Agreement, MeasurementFault
+from models.measured.checks.response import AXES, SensorResponse, number
 from models.measured.checks.spectra import Spectra, mean, noise, spectra
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.signal import Place, Signal
+from models.measured.signal import Signal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
@@ -31,7 +31,7 @@ class Evidence:
 
     recording: Recording
     vehicle: CutVehicle | None
-    places: Mapping[str, Place] = field(default_factory=dict)
+    places: Mapping[str, TransducerPlace] = field(default_factory=dict)
     claimed: Mapping[str, float] = field(default_factory=dict)
     plane: Parameters | None = None
 
@@ -52,14 +52,14 @@ class Evidence:
         """Vertical force of every hub that has one."""
         return {s.at: s for s in self.forces if s.quantity == "force" and s.component == "z"}
 
-    def place(self, signal: Signal) -> Place | None:
+    def place(self, signal: Signal) -> TransducerPlace | None:
         """Where a signal is measured; None where neither the scene nor the vehicle says."""
         if signal.at in self.places or self.vehicle is None:
             return self.places.get(signal.at)
         bodies = {body.name: body for body in self.vehicle.whole.bodies}
         bodies |= {tyre.name: bodies[tyre.body] for tyre in self.vehicle.whole.tyres}
         body = bodies.get(signal.at)
-        return Place(body.name, body.position) if body else None
+        return TransducerPlace(body.name, body.position) if body else None
 
     @cached_property
     def lacking(self) -> str:
@@ -114,7 +114,7 @@ class Evidence:
         assert self.vehicle is not None and self._spectra is not None
         measured_spectra, c = self._spectra, len(self.forces)
         places = [place for s in self.inertial if (place := self.place(s)) is not None]
-        response = Response(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
+        response = SensorResponse(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
         numbers = [number(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
         forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
         return Agreement(
@@ -135,12 +135,12 @@ class Evidence:
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
-    def searched(self) -> tuple[Agreement, tuple[Fault, ...]] | None:
+    def searched(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
         """The agreement after its faults are taken out, and the faults, the worst first."""
         return self.agreement.search() if self.agreement else None
 
     @property
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[MeasurementFault, ...]:
         """Faults between forces and motion; none where they cannot be set against each other."""
         return self.searched[1] if self.searched else ()
 

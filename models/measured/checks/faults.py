@@ -5,7 +5,7 @@ about the contact patch, or a plane of the transducer.
 """
 
 from models.core.finding import Finding, Weight
-from models.measured.checks.agreement import Fault
+from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spikes import spikes
 from models.measured.ratios import sentence
@@ -30,7 +30,7 @@ def factors(evidence: Evidence) -> list[Finding]:
     return [*findings, Finding("gain", "note", "", text)]
 
 
-def _factor(evidence: Evidence, fault: Fault) -> Finding:
+def _factor(evidence: Evidence, fault: MeasurementFault) -> Finding:
     kind, text = sentence(fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell")
     if len(fault.signals) > 1:
         text = f"{fault.name[0].upper()}{fault.name[1:]} are wrong alike: {text}"
@@ -55,7 +55,7 @@ def shifts(evidence: Evidence) -> list[Finding]:
     return [*findings, Finding("shift", "note", "", text)]
 
 
-def _shift(fault: Fault) -> Finding:
+def _shift(fault: MeasurementFault) -> Finding:
     late, single = "late" if fault.size > 0 else "early", len(fault.signals) == 1
     subject = f"{fault.name} is" if single else f"{fault.name[0].upper()}{fault.name[1:]} are"
     text = (
@@ -71,7 +71,7 @@ def levers(evidence: Evidence) -> list[Finding]:
     return [_lever(fault) for fault in evidence.faults if fault.kind == "lever"]
 
 
-def _lever(fault: Fault) -> Finding:
+def _lever(fault: MeasurementFault) -> Finding:
     hubs = tuple(dict.fromkeys(signal.at for signal in fault.signals))
     length, side, wheel = abs(fault.size), "above" if fault.size > 0 else "below", ""
     if PATCH[0] < length < PATCH[1]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.engines.cut_vehicle import HubModel, build
-from models.measured.signal import Place, Signal
+from models.measured.signal import Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -28,7 +28,7 @@ def number(signal: Signal, hub: int) -> int:
     return WRENCH * hub + 3 * (signal.quantity == "moment") + AXES[signal.component]
 
 
-class Response:
+class SensorResponse:
     """The linear vehicle: q'' = stiff q + damped q' + pushed u, u (6 h,) in N and N m, in a frame."""
 
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
@@ -41,7 +41,7 @@ class Response:
         still, hubs = at(0.0, rest, rest), range(WRENCH * len(vehicle.hubs))
         self.pushed = np.column_stack([(at((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in hubs])
 
-    def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[Place]) -> np.ndarray:
+    def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
         laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(
@@ -50,7 +50,7 @@ class Response:
         rows = np.stack([self._row(laplace[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
         return np.asarray(rows @ q)
 
-    def _row(self, i_omega: np.ndarray, signal: Signal, place: Place) -> np.ndarray:
+    def _row(self, i_omega: np.ndarray, signal: Signal, place: TransducerPlace) -> np.ndarray:
         """(f, n): reading by coordinates, at own = i omega (f, 1)."""
         axis, turn = AXES[signal.component], self.motion.turn(place.body)
         if signal.quantity == "angle":

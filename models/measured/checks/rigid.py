@@ -8,7 +8,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
-from models.measured.signal import Place, Signal
+from models.measured.signal import Signal, TransducerPlace
 
 NAME = "rigid"
 MOST = 6000
@@ -23,9 +23,9 @@ def check(evidence: Evidence) -> list[Finding]:
     return findings or [Finding(NAME, "note", "", lacks)]
 
 
-def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[Place, Axes]]]:
+def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[TransducerPlace, Axes]]]:
     """Complete sensors by body and name."""
-    bodies: dict[str, dict[str, tuple[Place, Axes]]] = {}
+    bodies: dict[str, dict[str, tuple[TransducerPlace, Axes]]] = {}
     for name in dict.fromkeys(s.at for s in evidence.recording.find("acceleration")):
         axes = [evidence.recording.find("acceleration", name, axis) for axis in "xyz"]
         place = evidence.place(axes[0][0]) if all(axes) else None
@@ -34,7 +34,7 @@ def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[Place, Axes]]]:
     return bodies
 
 
-def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[Place, Axes]]) -> Finding:
+def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlace, Axes]]) -> Finding:
     from models.sensors.rigid_body_motion import quality
     from models.sensors.sensor_array import sensor_array
 

@@ -1,7 +1,7 @@
 """Hubs whose channels are exchanged: left and right, front and rear, across; and two channels that are."""
 
 from models.core.finding import Finding
-from models.measured.checks.agreement import Fault
+from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT
 
@@ -21,7 +21,7 @@ def check(evidence: Evidence) -> list[Finding]:
     return [*findings, _rest(evidence), _blind(evidence)]
 
 
-def _finding(fault: Fault) -> Finding:
+def _finding(fault: MeasurementFault) -> Finding:
     text = (
         f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
         f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
@@ -30,7 +30,7 @@ def _finding(fault: Fault) -> Finding:
     return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
-def _pair(fault: Fault) -> Finding:
+def _pair(fault: MeasurementFault) -> Finding:
     text = (
         f"{fault.name} are exchanged: as mapped, {100 * fault.size:.0f} % of the measured motion stays unexplained, "
         f"exchanged {100 * fault.error:.0f} %; exchange their names in the channel map."

@@ -14,7 +14,7 @@ from models.measured.formats.mdf4 import open_mdf
 from models.measured.formats.opened import Opened, notice
 from models.measured.formats.rpc3 import open_rpc
 from models.measured.formats.tdms import open_tdms
-from models.measured.formats.writing import WRITERS, Group, check, new_file
+from models.measured.formats.writing import WRITERS, ChannelGroup, check, new_file
 
 READERS: dict[str, Callable[[Path], Opened]] = {
     "CSV": open_csv,
@@ -56,7 +56,7 @@ def open_source(path: str | Path) -> Source:
     return replace(source, noticed=(*said, *source.noticed))
 
 
-def write(path: str | Path, groups: Sequence[Group], start: datetime | None = None, comment: str = "") -> Path:
+def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | None = None, comment: str = "") -> Path:
     """Write channels to a new file, in the format of its extension, block by block, whole or not at all.
 
     Parameters

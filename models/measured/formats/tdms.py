@@ -31,7 +31,7 @@ EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
-class Place:
+class ChannelLocation:
     """Where a channel is: group and name in the file, the name of the clock or first time and increment (s)."""
 
     group: str
@@ -45,7 +45,7 @@ class Place:
 class TdmsData(Opened):
     """``places`` of every channel in the file."""
 
-    places: tuple[Place, ...]
+    places: tuple[ChannelLocation, ...]
 
     def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read each channel's own part of each span."""
@@ -168,7 +168,7 @@ def _numeric(channel: Any, left_out: LeftOut) -> bool:
     return False
 
 
-def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> Place | None:
+def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> ChannelLocation | None:
     """Where a channel's samples and times are; None where it has no clock or is one."""
     properties, start = channel.properties, _started(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
@@ -177,7 +177,9 @@ def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -
         left_out.add("its clock does not count seconds", repr(channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
-        return Place(group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment)
+        return ChannelLocation(
+            group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment
+        )
     clocks = [
         clock
         for clock in group.channels()
@@ -188,7 +190,7 @@ def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -
     if len(clocks) != 1:
         left_out.add("no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name))
         return None
-    return Place(group.name, channel.name, clocks[0].name, late, 0.0)
+    return ChannelLocation(group.name, channel.name, clocks[0].name, late, 0.0)
 
 
 def _started(channel: Any) -> datetime | None:

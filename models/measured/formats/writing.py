@@ -39,7 +39,7 @@ MOST = 1024
 
 
 @dataclass(frozen=True)
-class Group:
+class ChannelGroup:
     """Channels to be written that share one clock; the first sample is at the file's start.
 
     names, units, comments : one text per channel. period : s. count : samples. blocks : arrays (n, channels) that
@@ -70,7 +70,7 @@ class Group:
             raise ValueError(f"{first} samples instead of {self.count}")
 
 
-def check(path: Path, groups: Sequence[Group], start: datetime | None) -> None:
+def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) -> None:
     """Refuse channels that a reader could not tell apart or a header could not hold, and a start without its zone."""
     names = [name for group in groups for name in group.names]
     for name in names:
@@ -84,7 +84,7 @@ def check(path: Path, groups: Sequence[Group], start: datetime | None) -> None:
         raise InputError(path, "start", str(start), "a start with its time zone is needed")
 
 
-def _single(path: Path, groups: Sequence[Group], form: str) -> Group:
+def _single(path: Path, groups: Sequence[ChannelGroup], form: str) -> ChannelGroup:
     """The only group of a format with one clock."""
     if len(groups) != 1:
         raise InputError(path, "groups", len(groups), f"{form} has one sampling rate: write a file for each, or MDF 4")
@@ -122,7 +122,9 @@ def new_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def write_csv(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_csv(
+    path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
+) -> None:
     """Write the header to the file ``temporary``, then rows of shortest numbers, block by block."""
     group = _single(path, groups, "CSV")
     for name, unit in zip(group.names, group.units, strict=True):
@@ -137,7 +139,7 @@ def write_csv(path: Path, temporary: Path, groups: Sequence[Group], start: datet
             file.writelines(f"{t},{','.join(map(repr, row))}\n" for t, row in zip(times, values.tolist(), strict=True))
 
 
-def _csv_header(group: Group, start: datetime | None, comment: str) -> str:
+def _csv_header(group: ChannelGroup, start: datetime | None, comment: str) -> str:
     """Comment lines and headings; ``# samples:`` lets a reader see that the file was cut off."""
     lines = [f"comment: {line}" for line in comment.splitlines()]
     lines += [] if start is None else [f"start: {start.isoformat()}"]
@@ -150,7 +152,9 @@ def _csv_header(group: Group, start: datetime | None, comment: str) -> str:
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()
 
 
-def write_mdf(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_mdf(
+    path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
+) -> None:
     """Append the blocks to a temporary file beside ``temporary``, then save it as a whole."""
     try:
         from asammdf import MDF
@@ -172,7 +176,7 @@ def write_mdf(path: Path, temporary: Path, groups: Sequence[Group], start: datet
         mdf.close()
 
 
-def _append(mdf: Any, index: int, group: Group, times: np.ndarray, values: np.ndarray) -> None:
+def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values: np.ndarray) -> None:
     """Add a block to a group that the first one begins."""
     from asammdf import Signal
 
@@ -187,7 +191,9 @@ def _append(mdf: Any, index: int, group: Group, times: np.ndarray, values: np.nd
     )
 
 
-def write_tdms(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_tdms(
+    path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
+) -> None:
     """Write the groups one after the other, each block as one segment."""
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
@@ -219,7 +225,9 @@ def write_tdms(path: Path, temporary: Path, groups: Sequence[Group], start: date
                 )
 
 
-def write_rpc(path: Path, temporary: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+def write_rpc(
+    path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
+) -> None:
     """Write the header, groups of samples, and the header again with the limits of every channel."""
     group = _single(path, groups, "RPC III")
     limits = np.tile([[np.inf], [-np.inf]], len(group.names))
@@ -232,7 +240,7 @@ def write_rpc(path: Path, temporary: Path, groups: Sequence[Group], start: datet
         file.write(_rpc_header(path, group, np.where(np.isfinite(limits), limits, 0.0), start, comment))
 
 
-def _frames(path: Path, group: Group) -> Iterator[np.ndarray]:
+def _frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
     """Values in frames of equal length, the last one filled up with the last values."""
     kept = np.empty((0, len(group.names)))
     for first, values in group.rows(path):
@@ -246,7 +254,7 @@ def _frames(path: Path, group: Group) -> Iterator[np.ndarray]:
         yield np.concatenate((kept, np.repeat(kept[-1:], POINTS - len(kept), axis=0)))
 
 
-def _rpc_header(path: Path, group: Group, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
+def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
     """Header blocks; of the same length whatever the limits are."""
     parameters: dict[str, object] = {
         "FILE_TYPE": "TIME_HISTORY",
@@ -301,7 +309,7 @@ def _long(name: str, text: str) -> dict[str, object]:
     return {f"{name}_{i // LONGEST + 1}": plain[i : i + LONGEST] for i in range(0, len(plain), LONGEST)}
 
 
-WRITERS: dict[str, Callable[[Path, Path, Sequence[Group], datetime | None, str], None]] = {
+WRITERS: dict[str, Callable[[Path, Path, Sequence[ChannelGroup], datetime | None, str], None]] = {
     ".csv": write_csv,
     ".mf4": write_mdf,
     ".rsp": write_rpc,

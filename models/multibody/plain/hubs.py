@@ -21,7 +21,7 @@ WRENCH = 6
 REPORTED = ("inside", "wrenches", "moments")
 
 
-class State(NamedTuple):
+class HubState(NamedTuple):
     """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the drive's frame, moments (2,) that
     hold roll and pitch, at one state."""
 
@@ -53,7 +53,7 @@ class PlainHubs:
         frames = {"hub": self._hubs.rows, "body": np.full(len(tyres), self._chassis)}
         self._frames = frames.get(drive.frame, np.full(len(tyres), GROUND))
 
-    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
+    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> HubState:
         """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
         hubs, guide = self._inputs(t)
         motion = self.bodies.move(q, v)
@@ -64,7 +64,7 @@ class PlainHubs:
         by_hubs, wrenches = self._act(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
         acceleration, moments = self._hold(mass, force, guide, q, v)
-        return State(acceleration, inside, wrenches, moments)
+        return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Rows of the hubs and of the guide at a time (s): the nearest ones, or by differences of a step's three."""

@@ -60,7 +60,7 @@ class State(NamedTuple):
     ledger: Ledger
 
 
-class Contact(NamedTuple):
+class TyreContact(NamedTuple):
     """Where tyres touch the road, and how they press on it.
 
     down (w, 3) : arms from the wheels' centres to the contacts (m); along, across, normal (w, 3) : axes on the road;
@@ -171,7 +171,7 @@ class PlainRolling:
         )
         return force, report, ledger
 
-    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> Contact:
+    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
         """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
@@ -188,10 +188,10 @@ class PlainRolling:
         down = (axle * (axle * normal).sum(1)[:, None] - normal) * (radius / flat)[:, None]
         pressing = upwards * load[:, None]
         across = _cross(normal, along)
-        return Contact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
+        return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
     def _slide(
-        self, motion: Motion, points: np.ndarray, contact: Contact, steering: np.ndarray, v: np.ndarray
+        self, motion: Motion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside the chassis, rad/s; steering (w,), rad/s."""
         axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
@@ -210,7 +210,7 @@ class PlainRolling:
         turned: np.ndarray = axes @ motion.axes(self._carrier)[PLACE].T
         return turned
 
-    def _creep(self, contact: Contact, slides: np.ndarray) -> np.ndarray:
+    def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
         """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
         of, ones = self.handling.tyres, np.ones(len(slides))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
@@ -218,7 +218,7 @@ class PlainRolling:
         return tyre_forces(patch, slides, of.cells)
 
     def _press(
-        self, motion: Motion, points: np.ndarray, contact: Contact, creep: np.ndarray
+        self, motion: Motion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]

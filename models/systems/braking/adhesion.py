@@ -24,7 +24,7 @@ from models.brake.figures_of_merit import (
 )
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
-from models.systems.braking.march import Braked, Path
+from models.systems.braking.march import Braked, BrakingPath
 from models.systems.braking.of_scene import braked, sides, vehicle_of
 from models.systems.braking.plan import behind
 from models.systems.braking.procedures import looped, step_steer
@@ -120,7 +120,7 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
     """z of the fastest runs with one axle braked, from 40 to 20 km/h."""
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
-    def run(pressure: float) -> Path:
+    def run(pressure: float) -> BrakingPath:
         return vehicle.run(Pressures(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
 
     low, high = 0.0, scene.brakes.supply
@@ -135,13 +135,13 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
     return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
 
 
-def _locks(path: Path) -> bool:
+def _locks(path: BrakingPath) -> bool:
     """Whether a wheel locks above 20 km/h."""
     fast = Stop(path).speed[:-1] > 20.0 * KMH
     return bool((path.reports.locked[fast] > 0.0).any())
 
 
-def _between(path: Path, high: float, low: float) -> float:
+def _between(path: BrakingPath, high: float, low: float) -> float:
     """Time (s) from one speed to another, in km/h; not a number if the vehicle does not get there."""
     stop = Stop(path)
     return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)

@@ -17,7 +17,7 @@ import numpy as np
 from models.core.discretisation import LEAST_ORDER, ROUNDING, Estimate, not_estimated, rescaled, size_of, stated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
-from models.systems.braking.march import Path
+from models.systems.braking.march import BrakingPath
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
@@ -51,8 +51,8 @@ class OtherRuns(NamedTuple):
     answered : what the controller says to speeds of turning (n - 1, W) in rad/s and of the vehicle (n - 1,) in m/s at
     the samples of a run."""
 
-    again: Callable[[int, float], Path]
-    answered: Callable[[Path, np.ndarray, np.ndarray], np.ndarray]
+    again: Callable[[int, float], BrakingPath]
+    answered: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
 
 
 Channels = dict[str, np.ndarray]
@@ -98,19 +98,19 @@ def repeatable(scene: BrakingScene) -> bool:
     return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
 
 
-def controlled(scene: BrakingScene, path: Path) -> bool:
+def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
     """Whether a controller in the loop, or something unknown behind the port, has let pressures fall."""
     none = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
     return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
-def alike(path: Path, other: Path) -> bool:
+def alike(path: BrakingPath, other: BrakingPath) -> bool:
     """Whether the controller has acted alike in two runs."""
     pressures = _at(path.times, other, other.pressures)
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
-def near(path: Path, longer: Path, repeats: OtherRuns) -> bool:
+def near(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
     """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps:
     of valves another state of any, of pressures what is not alike."""
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
@@ -123,7 +123,7 @@ def near(path: Path, longer: Path, repeats: OtherRuns) -> bool:
     return _rms(said - beside) > ALIKE * size_of(said)
 
 
-def channels(path: Path, times: np.ndarray) -> Channels:
+def channels(path: BrakingPath, times: np.ndarray) -> Channels:
     """Motion at times (n,) in s, after its end as it was there."""
     places, rates = path.states[:, 0], path.states[:, 1]
     motion = {"x": places[:, 0], "y": places[:, 1], "yaw": places[:, 2], "speed": np.hypot(rates[:, 0], rates[:, 1])}
@@ -132,12 +132,12 @@ def channels(path: Path, times: np.ndarray) -> Channels:
     return {name: np.interp(times, path.times, values) for name, values in motion.items()}
 
 
-def whole(path: Path, times: np.ndarray) -> Channels:
+def whole(path: BrakingPath, times: np.ndarray) -> Channels:
     """Motion, and the stopping distance (1,) of a run that stands."""
     return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
 
 
-def _others(path: Path, steps: int, again: Callable[[int, float], Path]) -> list[Path]:
+def _others(path: BrakingPath, steps: int, again: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
     """Runs with half of the steps, and over a part with a quarter of them; of a single one, with two over a part."""
     last = float(path.times[-1])
     if steps == 1:
@@ -146,7 +146,7 @@ def _others(path: Path, steps: int, again: Callable[[int, float], Path]) -> list
     return [first, again(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
 
 
-def _by_fewer(path: Path, steps: int, finer_runs: list[Path], step: float) -> dict[str, Estimate]:
+def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:
     """Error estimates by runs in half and a quarter of the steps; the stopping distance errs by no less than the motion
     along the road."""
     fine, coarse, counts = whole(path, path.times), whole(finer_runs[0], path.times), [steps, steps // 2, steps // 4]
@@ -176,7 +176,7 @@ def observed(fine: float, coarse: float, counts: list[int]) -> float:
     return float(orders[np.argmin(np.abs(ratios - math.log(coarse / fine)))])
 
 
-def _by_twice(path: Path, other: Path, step: float) -> dict[str, Estimate]:
+def _by_twice(path: BrakingPath, other: BrakingPath, step: float) -> dict[str, Estimate]:
     """Error estimates by a run in twice as many steps over the first part, whose share of error is taken for that of
     the whole."""
     part = path.times <= other.times[-1]
@@ -188,7 +188,7 @@ def _by_twice(path: Path, other: Path, step: float) -> dict[str, Estimate]:
     return told
 
 
-def _at(times: np.ndarray, path: Path, values: np.ndarray) -> np.ndarray:
+def _at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:
     """Columns (n, W) of a run at times (m,) in s."""
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 

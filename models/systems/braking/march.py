@@ -10,7 +10,7 @@ import numpy as np
 from models.brake.advance import AT_REST, ENDS, FINE, ending
 from models.brake.brake import Brakes
 from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
-from models.brake.plane_records import Motion, Report
+from models.brake.plane_records import PlaneMotion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.port.ask import STATES, WITH_SLOW, ask
 from models.brake.port.sensors import Sensed
@@ -25,7 +25,7 @@ MOST = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class BrakingPath:
     """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
@@ -92,7 +92,7 @@ class Braked:
         state[1, 0] = speed
         return Start(state, speed / self.plane.radius)
 
-    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
+    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> BrakingPath:
         """March the vehicle from a start, or from steady rolling along x at a speed (m/s); the brake switch closes at
         ``switch``.
 
@@ -141,7 +141,7 @@ class Braked:
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
-        self, commands: Commands, record: Record, now: Row, motion: Motion
+        self, commands: Commands, record: Record, now: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
         """The vehicle as it is ``now`` and in ``motion``, moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
@@ -187,9 +187,9 @@ def _take(rows: list[np.ndarray], record: Record) -> None:
     record.left[0] = 0
 
 
-def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:
+def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
     all_of = parts(rows, now)
-    return Path(
+    return BrakingPath(
         all_of.time[:, 0],
         all_of.state,
         all_of.turning,

@@ -13,10 +13,10 @@ from models.brake.plane_records import motion_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
-from models.brake.steering import Response, Steering, response
+from models.brake.steering import Steering, YawResponse, response
 from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError
-from models.systems.braking.march import Braked, Path, Start
+from models.systems.braking.march import Braked, BrakingPath, Start
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
 from models.systems.braking.scene import BrakingScene, Procedure
 
@@ -59,7 +59,7 @@ def steering_of(procedure: Procedure, vehicle: Braked) -> Steering:
     return Steering(times, angles, steered(vehicle, 1.0))
 
 
-def step_steer(scene: BrakingScene, name: str) -> Response | None:
+def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
     """Step response of a J-turn's yaw rate without brakes; None where no yaw rate is steady."""
     vehicle, start = ready(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
@@ -81,7 +81,7 @@ def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ..
     )
 
 
-def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:
+def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> BrakingPath:
     """One run from a start with the scene's controller in the loop, or with what stands behind the port instead; of
     the engine only the name is needed, for files."""
     usual = controller_of(scene, vehicle.plane.wheels, name)

@@ -10,7 +10,7 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.systems.braking.assumptions import assumptions
 from models.systems.braking.errors import OtherRuns, with_error
-from models.systems.braking.march import Braked, Path, Start
+from models.systems.braking.march import Braked, BrakingPath, Start
 from models.systems.braking.of_scene import on_springs
 from models.systems.braking.procedures import answers, engines_of, looped, ready
 from models.systems.braking.scene import BrakingScene
@@ -24,7 +24,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     """Drive a procedure, the first of the scene's if none is named, whatever stands behind the port.
 
     engine : the usual one of such a vehicle if none is named; error : whether that of the steps is estimated, by
-    further runs. What the run assumes is judged always. The result's detail is its ``Path``. Raises InputError,
+    further runs. What the run assumes is judged always. The result's detail is its ``BrakingPath``. Raises InputError,
     Refused, or RunFailed, whose ``partial`` is the result until then, None where nothing was recorded.
     """
     name = procedure or next(iter(scene.procedures))
@@ -60,17 +60,17 @@ def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, e
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
-    def again(steps: int, until: float) -> Path:
+    def again(steps: int, until: float) -> BrakingPath:
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": until})})
         return looped(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
-    def answered(path: Path, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
         return answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
 
     return OtherRuns(again, answered)
 
 
-def _labelled(scene: BrakingScene, name: str, engine: str, path: Path, seconds: float) -> Result:
+def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
     """Motion by coordinate, and by wheel its turning, pressure and torque, with its forces, load and slips."""
     units = ", ".join("rad" if place.split()[-1][0] in "hr" else "m" for place in path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
-from models.systems.braking.march import Path
+from models.systems.braking.march import BrakingPath
 
 WHEELS = (
     "front left",
@@ -34,7 +34,7 @@ class Stop:
     times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
     """
 
-    path: Path
+    path: BrakingPath
 
     @property
     def times(self) -> np.ndarray:

@@ -125,7 +125,7 @@ def without_grid(grids: list[Array]) -> tuple[Array, float]:
 
 
 @dataclass(frozen=True)
-class Way:
+class TheorySettings:
     """A theory with its choices: ``rolled(case, cells)`` gives a function of the motion, all else computed before."""
 
     name: str
@@ -158,19 +158,19 @@ def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
 FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
 """Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
 WAYS = (
-    Way("linear theory", (1,), _of(Linear)),
-    Way("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
-    Way("FASTSIM, plain march", FINE, _fastsim(march="plain")),
-    Way("FASTSIM", FAST, _fastsim()),
-    Way("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
-    Way("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
-    Way("theory of 1983", NET, _simplified),
-    Way("exact theory", GRID, _of(ExactOnEllipse)),
+    TheorySettings("linear theory", (1,), _of(Linear)),
+    TheorySettings("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
+    TheorySettings("FASTSIM, plain march", FINE, _fastsim(march="plain")),
+    TheorySettings("FASTSIM", FAST, _fastsim()),
+    TheorySettings("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
+    TheorySettings("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
+    TheorySettings("theory of 1983", NET, _simplified),
+    TheorySettings("exact theory", GRID, _of(ExactOnEllipse)),
 )
 
 
 @dataclass(frozen=True)
-class Point:
+class TheoryPoint:
     """A theory on a number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
     range : the least and the most of them."""
 
@@ -191,14 +191,14 @@ class Point:
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure(theory: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
+def measure(theory: TheorySettings, cells: int, cases: list[Case], repeats: int = 3) -> TheoryPoint:
     """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
     errors, seconds = [], []
     for case in cases:
         answer, taken = _timed(theory.rolled(case, cells), case.motion, repeats)
         errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
         seconds.append(taken)
-    return Point(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
+    return TheoryPoint(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
 
 
 def force_of(answer: Any) -> Array:
@@ -223,7 +223,7 @@ def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
     return answer, float(np.median(taken))
 
 
-def cheapest(points: list[Point], target: float, error: Callable[[Point], float]) -> Point | None:
+def cheapest(points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]) -> TheoryPoint | None:
     """The fastest of all whose error is at most ``target``; None if there is none."""
     meets = [point for point in points if error(point) <= target]
     return min(meets, key=lambda point: point.seconds, default=None)
@@ -251,7 +251,7 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
     """
     hertz, built = hertz_of(scene), built_of(scene)
     cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
-    known, points = list[Case](), list[Point]()
+    known, points = list[Case](), list[TheoryPoint]()
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))
         known.append(exact(case))
@@ -275,7 +275,7 @@ TARGETS = (0.05, 0.02, 0.01, 0.005)
 """Errors by mu N that are asked for."""
 
 
-def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
+def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
     """For every target error: the cheapest theory that meets it in the mean, and the cheapest that does in 95 of 100
     cases."""
     errors = attrgetter("mean"), attrgetter("most")
@@ -285,7 +285,7 @@ def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
     ]
 
 
-def _told(point: Point | None, error: Callable[[Point], float]) -> str:
+def _told(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
     if point is None:
         return "none"
     seconds = cost((point.seconds, *point.range))

@@ -38,7 +38,7 @@ FAST = 60e3
 
 
 @dataclass(frozen=True)
-class Group:
+class ClockGroup:
     """Mapped signals of one group of one file, with their timing on the common time.
 
     The file's clock was slowed down by its drift, and its shift added.
@@ -60,7 +60,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Grid:
+class ClockGrid:
     """Times start + i period, i < count, s of the common time."""
 
     start: float
@@ -129,7 +129,7 @@ def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns)
                 columns.put((moment,), 0, values[:, None])
 
 
-def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
+def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Finding:
     """A finding on how all channels were brought onto one clock."""
     ways: dict[str, list[str]] = {}
     for group in groups:
@@ -156,7 +156,7 @@ def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float]
     return offsets, None, [Finding("start", "doubt" if several else "note", unsaid, f"{text}.")]
 
 
-def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[Group]:
+def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
     """Groups of a file of which any channel is mapped."""
     of = {channel.name: channel.group for channel in source.channels}
     mapped = dict[int, list[Signal]]()
@@ -167,10 +167,10 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
         where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {first.channel} ..."
         clock = timing(times, where, (first.name,))
         slowed = replace(clock, times=clock.times / (1 + drift) + shift, period=clock.period / (1 + drift))
-        yield Group(source, (first, *others), slowed)
+        yield ClockGroup(source, (first, *others), slowed)
 
 
-def _of_group(group: Group) -> Iterator[Finding]:
+def _of_group(group: ClockGroup) -> Iterator[Finding]:
     """Findings on the times of a group, and on whether they seem to be in another unit."""
     yield from group.timing.findings
     clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
@@ -189,7 +189,7 @@ def _of_group(group: Group) -> Iterator[Finding]:
     yield Finding("times", weight, where, text, clock.period, "s", (group.signals[0].name,))
 
 
-def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
+def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
     """Times of the recording; InputError for a clock that the wheel forces do not bear out."""
     settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
     fastest = min(timings, key=lambda timing: timing.period)
@@ -210,10 +210,10 @@ def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
     if count < LEAST:
         few = f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
         raise InputError(file, "clock", None, few)
-    return Grid(start, period, count)
+    return ClockGrid(start, period, count)
 
 
-def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding]:
+def _outside(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> Iterator[Finding]:
     """Say, or refuse, that a group does not cover the recording."""
     begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
     late, early = begin - grid.start, end - group.timing.end
@@ -231,7 +231,7 @@ def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding
 
 
 def _columns(
-    folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid
+    folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
 ) -> Columns:
     """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
@@ -244,7 +244,7 @@ def _columns(
     return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
 
 
-def _even(group: Group, grid: Grid) -> bool:
+def _even(group: ClockGroup, grid: ClockGrid) -> bool:
     """Whether the samples of a group are those of the clock."""
     clock = group.timing
     at = grid.places(clock.times)
@@ -255,7 +255,7 @@ def _even(group: Group, grid: Grid) -> bool:
     )
 
 
-def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
     """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
     names, done, absurd = tuple(signal.name for signal in group.signals), 0, list[Finding]()
 
@@ -283,7 +283,7 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Fi
     return absurd
 
 
-def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+def _resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
     """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
     absurd."""
     clock, absurd = group.timing, list[Finding]()

@@ -14,7 +14,7 @@ from models.drift.score import rms
 from models.fatigue.counting import Counted
 from models.measured.channel import BLOCK
 from models.measured.formats import write
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import ChannelGroup
 from models.systems.measured.section_run import Outcome
 from models.systems.measured.sections import Answer
 
@@ -46,7 +46,7 @@ def hand_on(
     return [
         write(
             folder / f"{FILES}.{form}",
-            [Group(names, units, comments, outcome.period, outcome.done, blocks())],
+            [ChannelGroup(names, units, comments, outcome.period, outcome.done, blocks())],
             start,
             comment,
         )

@@ -30,7 +30,7 @@ WINDOW, OVERLAP = 4096, 96
 
 
 @dataclass(frozen=True)
-class Grid:
+class StepGrid:
     """Steps of a run on a recording's clock.
 
     A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``skip`` samples apart.
@@ -167,7 +167,7 @@ class Inputs:
 class Prescribed:
     """Roll and pitch to be enforced: smoothed, and a quintic spline through stretches of samples that never move."""
 
-    def __init__(self, inputs: Inputs, grid: Grid, bandwidth: float, file: str = "") -> None:
+    def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
         """``bandwidth`` : Hz, of the low-pass over the whole recording; InputError where an angle is missing."""
         whole = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(whole).all():

@@ -13,7 +13,7 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted, quantity
 from models.drift.score import Limits
 from models.measured.axle_balance import AXLES
-from models.measured.signal import Frame, Place, Places, Quantity
+from models.measured.signal import Frame, Places, Quantity, TransducerPlace
 from models.systems.measured.pitch_plane import CHASSIS, SPRINGS
 from models.systems.measured.sections import names
 from models.systems.measured.verdict import LIMITS
@@ -163,9 +163,12 @@ class MeasuredScene(SceneFile):
         return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
 
     @property
-    def places(self) -> dict[str, Place]:
+    def places(self) -> dict[str, TransducerPlace]:
         """Where sensors sit."""
-        return {name: Place(s.body, (s.position[0], s.position[1], s.position[2])) for name, s in self.sensors.items()}
+        return {
+            name: TransducerPlace(s.body, (s.position[0], s.position[1], s.position[2]))
+            for name, s in self.sensors.items()
+        }
 
     def plane(self) -> Parameters | None:
         """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""

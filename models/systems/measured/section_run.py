@@ -25,7 +25,7 @@ from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, silent
 from models.multibody.cut_table import Drive, table
-from models.systems.measured.inputs import Grid, Inputs, Prescribed
+from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
 from models.systems.measured.sections import Answer, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
 
@@ -71,9 +71,9 @@ class SectionRun:
     file: str = ""
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> StepGrid:
         """Steps on the recording's clock."""
-        return Grid(self.step or self.recording.period, self.recording.period)
+        return StepGrid(self.step or self.recording.period, self.recording.period)
 
     @property
     def count(self) -> int:

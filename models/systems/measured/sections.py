@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.signal import HUB, Place, Quantity, Signal
+from models.measured.signal import HUB, Quantity, Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, felt
 from models.multibody.cut_table import Joints, joints
@@ -55,7 +55,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Point:
+class AccelerometerPoint:
     """Where an accelerometer sits: name, body, place (m) in the design position; whether it feels gravity."""
 
     name: str
@@ -74,7 +74,7 @@ class Sections:
 
     vehicle: CutVehicle
     frame: str = "body"
-    points: tuple[Point, ...] = ()
+    points: tuple[AccelerometerPoint, ...] = ()
     wanted: tuple[str, ...] | None = None
     answers: tuple[Answer, ...] = field(init=False)
     columns: np.ndarray = field(init=False)
@@ -119,7 +119,7 @@ def guided(vehicle: CutVehicle) -> tuple[str, ...]:
     return tuple(body.name for body in vehicle.whole.bodies if body.name != vehicle.chassis)
 
 
-def _answers(vehicle: CutVehicle, frame: str, points: tuple[Point, ...]) -> Iterator[Answer]:
+def _answers(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]) -> Iterator[Answer]:
     """Every column of the kernel's row."""
     chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:
@@ -177,16 +177,18 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
     return last, np.array(rows).reshape(len(last), len(owners))
 
 
-def points(vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, Place]) -> tuple[Point, ...]:
+def points(
+    vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, TransducerPlace]
+) -> tuple[AccelerometerPoint, ...]:
     """Where accelerations are measured: at sensors, which ``places`` knows, and at centres of bodies."""
-    section_points = dict[str, Point]()
+    section_points = dict[str, AccelerometerPoint]()
     for signal in (signal for signal in signals if signal.quantity == "acceleration"):
         if signal.at in places:
-            section_points[signal.at] = Point(
+            section_points[signal.at] = AccelerometerPoint(
                 signal.at, places[signal.at].body, places[signal.at].position, signal.gravity
             )
         elif signal.at in {body.name for body in vehicle.whole.bodies}:
-            section_points[signal.at] = Point(
+            section_points[signal.at] = AccelerometerPoint(
                 signal.at, signal.at, vehicle.whole.body(signal.at).position, signal.gravity
             )
     return tuple(section_points.values())

@@ -99,7 +99,7 @@ class Drift:
 
 def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
     """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
-    body, law = rigid(vehicle), _Law(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
+    body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
     noise = period * body.turning(level.deviations(vehicle))
     spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
     means = dict[str, np.ndarray]()
@@ -131,7 +131,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 
 
 @dataclass(frozen=True)
-class _Law:
+class _AngleResponse:
     """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
 
     rigid: Rigid

@@ -21,7 +21,7 @@ from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured
 from models.measured.faults_of_measurement import check as check_faults
 from models.measured.formats import write
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording
 from models.measured.signal import HUB, Quantity, Signal
 from models.sensors.rotations import from_cardan, matrix
@@ -191,13 +191,13 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     )
 
 
-def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
+def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
     """Samples (n, signals), SI, in the units of the file that they are written to."""
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
     names, units = tuple(s.channel for s in signals), tuple(s.unit for s in signals)
-    return Group(names, units, comments, period, len(samples), blocks)
+    return ChannelGroup(names, units, comments, period, len(samples), blocks)
 
 
 def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:

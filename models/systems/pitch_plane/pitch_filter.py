@@ -133,7 +133,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class PitchEstimate:
     """Estimates of the pitch filter or smoother at times i ``period`` (s), n of them.
 
     states : (n, 7), see above
@@ -223,7 +223,7 @@ def estimate(
     start_deviation: float = 0.0,
     inertia_deviation: float = 0.0,
     smoother: bool = False,
-) -> Estimate:
+) -> PitchEstimate:
     """Filter the pitch of a force-excited assembly over its run.
 
     deviation : N, standard deviation of the noise of each force sample, white
@@ -243,7 +243,7 @@ def estimate(
     return _smoothed(estimated, steps) if smoother else estimated
 
 
-def _march(filtered: PitchFilter) -> tuple[Estimate, _Steps]:
+def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
     """Predict over each step, take in what was measured at its end, and keep everything."""
     n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
     every, width = round(measured.period / period), len(measured.columns)
@@ -263,11 +263,11 @@ def _march(filtered: PitchFilter) -> tuple[Estimate, _Steps]:
     pending *= math.sqrt(filtered.intensity)
     used = np.count_nonzero(np.isfinite(innovations), axis=1)
     surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
-    estimated = Estimate(period, states, covariances, pending, used, missed, surprises, innovations)
+    estimated = PitchEstimate(period, states, covariances, pending, used, missed, surprises, innovations)
     return estimated, _Steps(predictions, transitions, noises)
 
 
-def _smoothed(filtered: Estimate, steps: _Steps) -> Estimate:
+def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
     """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
     It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.

@@ -13,7 +13,7 @@ from pydantic import Field
 from models.core.result import Result
 from models.core.strict import Strict, quantity, read
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.trust import Curve
+from models.systems.pitch_plane.trust import GrowthCurve
 from models.systems.pitch_plane.virtual_measurement import (
     PAPER,
     check_road,
@@ -79,7 +79,7 @@ def row(engine: str, name: str, measured: Result, run: Result) -> dict[str, Any]
     figures: dict[str, Any] = {
         "engine": engine,
         "run": name,
-        "drift-off": Curve(run.times, np.abs(error(measured, run, "pitch"))).passes(DRIFT),
+        "drift-off": GrowthCurve(run.times, np.abs(error(measured, run, "pitch"))).passes(DRIFT),
         "heave error": float(np.abs(error(measured, run, "z3")).max()),
     }
     if "enforced_moment" in run.data:

@@ -136,7 +136,7 @@ def march_along(compile_march: Any, mode: str, geometry: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Path:
+class TangentPath:
     """A force-excited run as errors are carried along it: by fixed steps that divide the sampling period.
 
     per_sample : steps from one sample of the forces to the next; samples : periods that the run covers.
@@ -194,14 +194,14 @@ class Path:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(assembly: Assembly, longest: float = STEP) -> Path:
+def path_of(assembly: Assembly, longest: float = STEP) -> TangentPath:
     """The path of a free force-excited run; raises ValueError for any other."""
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(assembly.scene.run.duration / forces.period)
-    return Path(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
+    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
 
 
 def tilted(assembly: Assembly) -> np.ndarray:
@@ -215,7 +215,7 @@ def tilted(assembly: Assembly) -> np.ndarray:
     return np.array([[*shape, *np.zeros(4)], [*np.zeros(4), *shape]])
 
 
-def tilt_map(path: Path) -> np.ndarray:
+def tilt_map(path: TangentPath) -> np.ndarray:
     """Matrix that maps tilt and tilt rate at the start of a path to those at its end, shape (2, 2).
 
     The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
@@ -225,7 +225,7 @@ def tilt_map(path: Path) -> np.ndarray:
     return columns[-1][:, [3, 7]].T
 
 
-def measured_growth(path: Path) -> tuple[float, float]:
+def measured_growth(path: TangentPath) -> tuple[float, float]:
     """Growth rate (1/s) of a tilt error along a path, and its uncertainty (1/s), which falls with the length.
 
     The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
@@ -236,7 +236,7 @@ def measured_growth(path: Path) -> tuple[float, float]:
     return float(np.log(np.abs(np.linalg.eigvals(tilting)).max())) / duration, math.sqrt(off) / duration
 
 
-def swing(path: Path) -> float:
+def swing(path: TangentPath) -> float:
     """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
     half = 0.5 * float(np.trace(tilt_map(path)))
     return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0
@@ -268,7 +268,7 @@ def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> C
     return Covariance(path.forces.period * np.arange(path.samples + 1), carried(path, deviation))
 
 
-def carried(path: Path, deviation: float) -> np.ndarray:
+def carried(path: TangentPath, deviation: float) -> np.ndarray:
     """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
     matrices = np.zeros((path.samples + 1, 8, 8))
     stages = np.arange(2 * path.per_sample + 1) / (2 * path.per_sample)

@@ -18,7 +18,7 @@ from models.core.result import Result
 from models.core.signals import Sampled, Smooth
 from models.drift.growth import MEDIAN, growth_rate, growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.tangent import STEP, Path, path_of
+from models.systems.pitch_plane.tangent import STEP, TangentPath, path_of
 from models.vehicles.pitch_plane import Parameters
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Growth:
 
 
 @dataclass(frozen=True)
-class Curve:
+class GrowthCurve:
     """Size of the pitch error (rad) that one source makes, at ``times`` (n,) in s, as long as it is small."""
 
     times: np.ndarray
@@ -82,20 +82,20 @@ def growth(assembly: Assembly) -> Growth:
     return Growth(times, growth_rate(*arguments), growth_until(*arguments))
 
 
-def _covering(path: Path) -> np.ndarray:
+def _covering(path: TangentPath) -> np.ndarray:
     """Samples (n + 1, 2) of the run; where held ones end with it, the last one stands twice."""
     values = path.forces.values[: path.samples + 1]
     return values if len(values) > path.samples else np.vstack([values, values[-1:]])
 
 
-def noise(assembly: Assembly, deviation: float) -> Curve:
+def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
     """Median size over paths, for white samples of ``deviation`` (N) each."""
     growing, period = growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
-    return Curve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, intensity)))
+    return GrowthCurve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, intensity)))
 
 
-def interpolation_error(path: Path) -> np.ndarray:
+def interpolation_error(path: TangentPath) -> np.ndarray:
     """Error (3 steps, 2) in N of the scene's rule between the samples, by a quintic spline through the same ones.
 
     At the start, the middle and the end of each step. Linear samples err by f'' t (T - t) / 2, on average by
@@ -110,13 +110,13 @@ def interpolation_error(path: Path) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation(assembly: Assembly, longest: float = STEP) -> Curve:
+def interpolation(assembly: Assembly, longest: float = STEP) -> GrowthCurve:
     """Error of the rule between the samples alone; 0 for a run of too few samples to tell."""
     path = path_of(assembly, longest)
     return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
-def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> Curve:
+def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> GrowthCurve:
     """Error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
@@ -129,18 +129,22 @@ def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STE
     return _carried(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
 
 
-def _carried(path: Path, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None) -> Curve:
+def _carried(
+    path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
+) -> GrowthCurve:
     pushes = None if errors is None else errors[:, None, :]
     _, columns = path.carry(np.zeros((1, 8)), pushes, wrong_parameters)
-    return Curve(path.times, np.abs(columns[:, 0, 3]))
+    return GrowthCurve(path.times, np.abs(columns[:, 0, 3]))
 
 
-def rounding(assembly: Assembly) -> Curve:
+def rounding(assembly: Assembly) -> GrowthCurve:
     """Median size of what rounding alone does, each step rounding the pitch rate anew: a floor for every solver."""
     growing, path = growth(assembly), path_of(assembly)
     rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
-    return Curve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, each**2 / path.step)))
+    return GrowthCurve(
+        growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, each**2 / path.step))
+    )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 from models.core.assumptions import Assumption, Gaussian, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import AXES, GRAVITY, Motion, static_loads
+from models.systems.ride.watched import AXES, GRAVITY, WatchedMotion, static_loads
 from models.vehicles.spatial import NONE, Curve, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Kinematics, linearise
 
@@ -35,7 +35,7 @@ UPRIGHT = 0.7
 
 
 def assumptions(
-    scene: RideScene, vehicle: SpatialVehicle, motion: Motion | None = None, replaced: bool = False
+    scene: RideScene, vehicle: SpatialVehicle, motion: WatchedMotion | None = None, replaced: bool = False
 ) -> list[Assumption]:
     """Assumptions of a vehicle in a scene of ride; ``motion`` of a run, which is judged by it.
 

@@ -23,7 +23,7 @@ FEW = 5
 """Speeds at which a sweep is judged, its ends among them."""
 
 
-class Motion(Protocol):
+class WatchedMotion(Protocol):
     """Motion of a vehicle's parts in a run, by the names of ``watched``."""
 
     def of(self, name: str) -> np.ndarray | Gaussian:

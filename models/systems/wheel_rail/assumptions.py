@@ -7,7 +7,7 @@ import numpy as np
 from models.contact.limits import FAST_SLIP, HALF_SPACE, SMALL_CREEPAGE, YIELDS, yields
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.rail.contact_table import Place
+from models.rail.contact_table import PatchReport
 from models.systems.wheel_rail.scene import WheelRailScene
 
 WHEELS = ("right", "left")
@@ -23,7 +23,7 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     return listed
 
 
-def _places(value: Callable[[Place], float], largest: bool = True) -> Callable[[Result], Watched]:
+def _places(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
     """The largest or least value among the patches of each wheel, over the positions."""
     worst = max if largest else min
 
@@ -38,7 +38,7 @@ def _places(value: Callable[[Place], float], largest: bool = True) -> Callable[[
 
 
 def _half_space() -> Assumption:
-    def share(place: Place) -> float:
+    def share(place: PatchReport) -> float:
         return max(0.5 * place.length * place.curvature_x, 0.5 * place.width * place.curvature_y)
 
     return Assumption(
@@ -55,7 +55,7 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
     """The way (mm) from a patch to the nearer end of the rail or to the wheel's outer face."""
     side = scene.profiles.side(scene.wheelset.radius)
 
-    def free(place: Place) -> float:
+    def free(place: PatchReport) -> float:
         ends = place.y - side.rail.y[0], side.rail.y[-1] - place.y, side.wheel.y[-1] - place.wheel_centre
         return float(1e3 * (min(ends) - 0.5 * place.width))
 
@@ -81,7 +81,7 @@ def _elastic() -> Assumption:
 
 
 def _small_creepage() -> Assumption:
-    def largest(place: Place) -> float:
+    def largest(place: PatchReport) -> float:
         return max(abs(place.xi_x), abs(place.xi_y), 0.5 * max(place.length, place.width) * abs(place.spin))
 
     return Assumption(

@@ -13,7 +13,7 @@ from models.core.assumptions import judged
 from models.core.discretisation import by_cells, not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
-from models.rail.contact_table import Contact, Place, Placed, rolling_radius_difference
+from models.rail.contact_table import Contact, PatchReport, Placed, rolling_radius_difference
 from models.systems.wheel_rail.assumptions import WHEELS, assumptions
 from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
 
@@ -51,7 +51,7 @@ PATCH: dict[str, tuple[str, float, str]] = {
     "spin": ("1/m", 1.0, "spin"),
     "approach": ("um", 1e6, "approach"),
 }
-"""Quantities of a patch: unit, factor to it and attribute of ``Place``."""
+"""Quantities of a patch: unit, factor to it and attribute of ``PatchReport``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
     return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
 
 
-def patches(placed: Placed, wheel: str) -> tuple[Place, ...]:
+def patches(placed: Placed, wheel: str) -> tuple[PatchReport, ...]:
     """The patches of one wheel, the one that carries most first."""
     return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
 

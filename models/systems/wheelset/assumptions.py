@@ -9,7 +9,7 @@ from models.contact.limits import FAST_SLIP, HALF_SPACE, NO_SLIP, YIELDS, yields
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail import wheel_forces as wf
-from models.rail.equations import ROLL, YAW, Equations, Path, Y
+from models.rail.equations import ROLL, YAW, Equations, WheelsetPath, Y
 from models.rail.flange_climbing import nadal, shares
 from models.rail.wheelset import Wheelset
 
@@ -64,11 +64,11 @@ def by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
     return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
 
 
-def _of_path(watched: Callable[[Path], Watched]) -> Callable[[Result], Watched]:
+def _of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
     """Watch function for a result whose detail is its path, or a periodic motion that has one."""
 
     def of_result(run: Result) -> Watched:
-        return watched(run.detail if isinstance(run.detail, Path) else run.detail.path())
+        return watched(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
 
     return of_result
 
@@ -76,7 +76,7 @@ def _of_path(watched: Callable[[Path], Watched]) -> Callable[[Result], Watched]:
 def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     """The largest value among the patches of each wheel that carry something, 0 where none does."""
 
-    def of_path(path: Path) -> Watched:
+    def of_path(path: WheelsetPath) -> Watched:
         each, load = path.contacts.shape[1] // 2, path.contacts["load"]
         values = np.where(load > 0.0, np.abs(watched(path.contacts)), 0.0)
         return {"right wheel": values[:, :each].max(axis=1), "left wheel": values[:, each:].max(axis=1)}
@@ -164,7 +164,7 @@ def _slow_slip(equations: Equations) -> Assumption:
 
 
 def _no_slip(wheelset: Wheelset) -> Assumption:
-    def watched(path: Path) -> Watched:
+    def watched(path: WheelsetPath) -> Watched:
         contacts = path.contacts
         creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
         used = shares(creep, wheelset.friction * limit)
@@ -181,7 +181,7 @@ def _no_slip(wheelset: Wheelset) -> Assumption:
 
 
 def _travel(wheelset: Wheelset) -> Assumption:
-    def watched(path: Path) -> Watched:
+    def watched(path: WheelsetPath) -> Watched:
         along, up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
         return {"along": np.abs(along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(up)}
 
@@ -196,7 +196,7 @@ def _travel(wheelset: Wheelset) -> Assumption:
 
 
 def _climbs(wheelset: Wheelset) -> Assumption:
-    def watched(path: Path) -> Watched:
+    def watched(path: WheelsetPath) -> Watched:
         part = shares(path.contacts["flange_force"], path.contacts["load"])
         return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
 
@@ -227,7 +227,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
     side = wheelset.profiles.side(wheelset.radius)
     tip, outer = float(side.wheel.y[np.argmax(side.wheel.z)]), float(side.wheel.y[-1])
 
-    def watched(path: Path) -> Watched:
+    def watched(path: WheelsetPath) -> Watched:
         contacts = path.contacts
         load, half = contacts["load"], contacts["b"]
         wheel, rail = np.abs(_along_axle(path)) - side.wheelset.arm, np.abs(_across_track(path))
@@ -248,13 +248,13 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
     )
 
 
-def _along_axle(path: Path) -> Array:
+def _along_axle(path: WheelsetPath) -> Array:
     """Places (n, patches) of the contacts along the axle from its middle (m)."""
     roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
     x, y, z = (contacts[name] for name in "xyz")
     return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
 
 
-def _across_track(path: Path) -> Array:
+def _across_track(path: WheelsetPath) -> Array:
     """Places (n, patches) of the contacts from the middle of the track (m)."""
     return np.asarray(path.states[:, Y, None] + path.contacts["y"])

@@ -16,7 +16,7 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, joined, result
 from models.core.told import gathered
 from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
-from models.rail.equations import ROLL, SPIN, YAW, Path, Y, Z
+from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
 from models.rail.limit_cycle import Orbit, Unknown, attained, beside, bifurcation, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_or_why
 from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
@@ -42,7 +42,7 @@ ORBIT = {
 
 
 def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error: bool = False) -> Result:
-    """The path at a speed (m/s), the first of the scene's if none is given; the detail is its ``Path``.
+    """The path at a speed (m/s), the first of the scene's if none is given; the detail is its ``WheelsetPath``.
 
     error : whether the error of steps and cells is estimated, by further paths. What the path assumes is judged always.
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
@@ -55,19 +55,19 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     return with_error(labelled, scene, lambda other: path(other, engine, speed)) if error else labelled
 
 
-def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: Path, **more: Any) -> Result:
+def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **more: Any) -> Result:
     """A motion as the result of a scene at a speed (m/s), which says what assumptions it breaks."""
     equations, _ = started(scene, engine, speed)
     return judged(_labelled(scene, engine, motion, **more), assumptions(equations))
 
 
-def path(scene: WheelsetScene, engine: str, speed: float) -> Path:
+def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     """The motion at a speed (m/s) from the scene's displacement and yaw, every step of it, and nothing else."""
     equations, start = started(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
-def _labelled(scene: WheelsetScene, engine: str, motion: Path, **more: Any) -> Result:
+def _labelled(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: Any) -> Result:
     steps, times = len(motion.times) - 1, Channel("time", motion.times, "s")
     channels = {name: Channel("time", motion.states[:, k], unit) for name, (k, unit) in STATES.items()}
     channels |= {

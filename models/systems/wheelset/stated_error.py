@@ -25,7 +25,7 @@ from models.core.discretisation import (
 )
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
-from models.rail.equations import YAW, Path, Y
+from models.rail.equations import YAW, WheelsetPath, Y
 from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.assumptions import by_wheel
 from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
@@ -40,7 +40,7 @@ SHORT = 0.1
 """Share of the path that half the step repeats where twice the step cannot be."""
 FEWEST = 5
 """Cells from which on half of them are a net."""
-March = Callable[[WheelsetScene], Path]
+March = Callable[[WheelsetScene], WheelsetPath]
 """The path of a scene, by one engine at one speed."""
 
 
@@ -62,7 +62,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     return stated(run, told, f"a path on {other} cells and some steps of other length")
 
 
-def series(path: Path) -> Series:
+def series(path: WheelsetPath) -> Series:
     """The principal channels of a path."""
     forces = {name: np.stack([*by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")}
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})

@@ -13,7 +13,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import ChannelGroup
 
 Wanted = Literal["right", "named", "refused"]
 """Read right, read right as far as it goes with a sentence about it, or refused with a reason."""
@@ -151,7 +151,7 @@ def _apart(read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray,
 def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
     """Write the usual file, or other channels, in the format of the extension of ``path``."""
     table = np.column_stack((FZ, FX)) if values is None else values
-    group = Group(names, ("N",) * len(names), ("",) * len(names), PERIOD, len(table), [table])
+    group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), PERIOD, len(table), [table])
     return write(path, [group])
 
 
@@ -197,7 +197,9 @@ def two_rates(extension: str) -> Make:
     clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW, FX))
 
     def make(folder: Path) -> Path:
-        groups = [Group((name,), ("N",), ("",), period, COUNT, [samples[:, None]]) for name, period, samples in clocks]
+        groups = [
+            ChannelGroup((name,), ("N",), ("",), period, COUNT, [samples[:, None]]) for name, period, samples in clocks
+        ]
         return write(folder / f"odd{extension}", groups)
 
     return make

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.contact.theories import beyond_friction
-from models.systems.contact.work_precision import WAYS, Way, force_of
+from models.systems.contact.work_precision import WAYS, TheorySettings, force_of
 from validation.contact.contact_set import read
 
 EVERY = 23
@@ -96,7 +96,7 @@ class ContactAlone:
         off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
         return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
 
-    def _run(self, theory: Way, cells: int) -> Result:
+    def _run(self, theory: TheorySettings, cells: int) -> Result:
         forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}

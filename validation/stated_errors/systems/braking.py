@@ -12,7 +12,7 @@ from models.core.discretisation import errors_of
 from models.core.errors import RunFailed
 from models.systems.braking import ENGINES
 from models.systems.braking.errors import whole
-from models.systems.braking.march import Braked, Path
+from models.systems.braking.march import Braked, BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
 from validation.stated_errors.sample import Sample, drawn
@@ -120,7 +120,7 @@ def counted() -> Iterator[list[float]]:
     """Steps of every run within the block."""
     calls, march = list[float](), Braked.run
 
-    def counting(vehicle: Braked, *given: Any) -> Path:
+    def counting(vehicle: Braked, *given: Any) -> BrakingPath:
         path = march(vehicle, *given)
         calls.append(float(vehicle.substeps * (len(path.times) - 1)))
         return path

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.discretisation import Series, errors_of, rows_at
 from models.core.result import Result
-from models.rail.equations import Path
+from models.rail.equations import WheelsetPath
 from models.systems.wheelset import run as system
 from models.systems.wheelset.of_scene import equations_of
 from models.systems.wheelset.scene import WheelsetScene, build
@@ -62,7 +62,7 @@ def _drawn(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
 def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample:
     marched, march = list[float](), system.path
 
-    def counted(other: WheelsetScene, engine: str, speed: float) -> Path:
+    def counted(other: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
         path = march(other, engine, speed)
         marched.append((len(path.times) - 1) * _cells(other))
         return path
@@ -81,7 +81,7 @@ def _cells(scene: WheelsetScene) -> float:
     return scene.contact.cells**2 if scene.contact.law == "fastsim" else 1.0
 
 
-def _true(scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], Path]) -> Mapping[str, float]:
+def _true(scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]) -> Mapping[str, float]:
     """Errors by the channels of the estimates, of steps and of cells."""
     fine = series(run.detail)
     true = _apart(fine, series(march(changed(scene, 1.0 / FINER))))

@@ -9,7 +9,7 @@ from models.advice.price import Answer, Ladder
 from models.advice.price.meshed import chosen, part_of
 from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.march import Path
+from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
@@ -31,15 +31,15 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 
 @dataclass(frozen=True)
-class OwnBraking:
-    """See ``models.advice.price.OwnScene``. name : of the procedure."""
+class PricedBraking:
+    """See ``models.advice.price.PricedScene``. name : of the procedure."""
 
     scene: BrakingScene
     name: str
     quantity: str
     engines: tuple[str, ...]
     note: str
-    cell = 0.0
+    kink_period = 0.0
 
     @property
     def title(self) -> str:
@@ -78,7 +78,7 @@ class OwnBraking:
         """None, as there is no second method: a stop with valves in the loop has one method."""
         return None
 
-    def solve(self, setting: Setting, duration: float) -> tuple[int, Path]:
+    def solve(self, setting: Setting, duration: float) -> tuple[int, BrakingPath]:
         """Substeps and the procedure, driven; RunFailed where it does not end at rest."""
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
@@ -87,7 +87,7 @@ class OwnBraking:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path
 
-    def answer(self, solution: tuple[int, Path]) -> Answer:
+    def answer(self, solution: tuple[int, BrakingPath]) -> Answer:
         """One number, as a history that does not change; every step asks for the forces of each wheel once."""
         substeps, path = solution
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
@@ -102,7 +102,7 @@ class OwnBraking:
         ]
 
 
-def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnBraking:
+def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedBraking:
     """The scene with a quantity, PROCEDURE.QUANTITY; the first procedure where none is named."""
     if scene.port is not None:
         raise InputError(
@@ -115,4 +115,4 @@ def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, 
     chosen(asked, QUANTITIES)
     others = [procedure for procedure in scene.procedures if procedure != name]
     note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
-    return OwnBraking(scene, name, asked, engines_of(scene, engines), note)
+    return PricedBraking(scene, name, asked, engines_of(scene, engines), note)

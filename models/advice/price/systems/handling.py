@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part, part_of
+from models.advice.price.meshed import TIGHT, MeshedScene, chosen, first_part, part_of
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
@@ -35,7 +35,7 @@ def _with_cells(handling: Handling, cells: int) -> Handling:
 
 
 @dataclass(frozen=True)
-class OwnHandling(Meshed):
+class PricedHandling(MeshedScene):
     """A manoeuvre."""
 
     scene: HandlingScene
@@ -82,7 +82,7 @@ class OwnHandling(Meshed):
         ]
 
 
-def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnHandling:
+def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedHandling:
     """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
     name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)
@@ -92,7 +92,7 @@ def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str,
         [each for each in scene.manoeuvres if each != name],
     )
     note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
-    return OwnHandling(
+    return PricedHandling(
         scene.title,
         asked,
         QUANTITIES[asked][1],

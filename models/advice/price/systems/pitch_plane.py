@@ -47,8 +47,8 @@ TIGHT = 1e-10
 
 
 @dataclass(frozen=True)
-class OwnPitchPlane:
-    """See ``models.advice.price.OwnScene``. channels : of the quantity; base : step (s) whose parts all divide
+class PricedPitchPlane:
+    """See ``models.advice.price.PricedScene``. channels : of the quantity; base : step (s) whose parts all divide
     the run and its samples."""
 
     assembly: Assembly
@@ -80,7 +80,7 @@ class OwnPitchPlane:
         return signal is not None and signal.period is not None and len(signal.knots(self.whole)) > 0
 
     @property
-    def cell(self) -> float:
+    def kink_period(self) -> float:
         """The sampling period of an input with a kink at every sample."""
         return self.base if self.sampled else 0.0
 
@@ -169,12 +169,12 @@ def _outside(setting: Setting) -> list[str]:
     )
 
 
-def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
+def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> PricedPitchPlane:
     """The scene with a quantity: channels of its result, with commas between them, of one unit."""
     assembly = assemble(scene)
     channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))
     base, first = _lengths(assembly)
-    asked = OwnPitchPlane(assembly, engines, channels, "", base, first)
+    asked = PricedPitchPlane(assembly, engines, channels, "", base, first)
     return replace(asked, unit=_unit(asked))
 
 
@@ -191,7 +191,7 @@ def _lengths(assembly: Assembly) -> tuple[float, float]:
     return base, min(length, base * math.ceil(FIRST / base * (1 - 1e-9)))
 
 
-def _unit(scene: OwnPitchPlane) -> str:
+def _unit(scene: PricedPitchPlane) -> str:
     """The one unit of the quantity's channels; InputError for what is no channel, or several units."""
     step = float(scene.assembly.scene.settings("reference").step or 0.0)
     settings = Settings("RK4", min(step, scene.base), scene.base)

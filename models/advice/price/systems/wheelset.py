@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part
+from models.advice.price.meshed import TIGHT, MeshedScene, chosen, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
-from models.rail.equations import STIFF, Equations, Path
+from models.rail.equations import STIFF, Equations, WheelsetPath
 from models.systems.wheelset.of_scene import path_speeds, started, wheelset_of
 from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
@@ -21,7 +21,7 @@ QUANTITIES = {**STATES, **CONTACTS}
 
 
 @dataclass(frozen=True)
-class OwnWheelset(Meshed):
+class PricedWheelset(MeshedScene):
     """The paths of a scene at all its speeds."""
 
     scene: WheelsetScene
@@ -33,16 +33,16 @@ class OwnWheelset(Meshed):
         run = self.scene.run.model_copy(update={"step": step, "duration": duration})
         return self.scene.model_copy(update={"contact": contact, "run": run})
 
-    def run(self, engine: str, cells: int, step: float, duration: float) -> list[Path]:
+    def run(self, engine: str, cells: int, step: float, duration: float) -> list[WheelsetPath]:
         """A path for every speed."""
         return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
-    def exact(self, cells: int, step: float, duration: float) -> list[Path]:
+    def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
         """The paths of the wheelset by DOP853, an accurate reference."""
         scene = self._scene(cells, step, duration)
         return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
 
-    def read(self, run: list[Path]) -> tuple[np.ndarray, np.ndarray, int]:
+    def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity of all paths side by side; each is judged."""
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
             judged_path(self.scene, self.reference_engine, speed, wheelset_run)
@@ -60,7 +60,7 @@ class OwnWheelset(Meshed):
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
-def _exact(equations: Equations, start: np.ndarray, step: float, duration: float) -> Path:
+def _exact(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
     """A path by a Runge-Kutta method of order 8 with steps of its own; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start), 1e-3)
@@ -76,10 +76,10 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     if not done.success:
         raise RunFailed("reference", done.message)
     states = np.ascontiguousarray(done.y.T)
-    return Path(times, states, contacts=equations.at(states)[1])
+    return WheelsetPath(times, states, contacts=equations.at(states)[1])
 
 
-def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> OwnWheelset:
+def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
     """The scene with a quantity: a state or a force of the contacts, of its paths at all speeds."""
     asked, wheelset, contact = chosen(quantity or USUAL, QUANTITIES), wheelset_of(scene), scene.contact
     speeds, run = tuple(path_speeds(scene)), scene.run
@@ -88,7 +88,7 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     )
     longest, cells = 0.95 * STIFF / fastest, contact.cells if contact.law == "fastsim" else 0
     note = f"all paths together, at {' and '.join(f'{speed:g}' for speed in speeds)} m/s"
-    return OwnWheelset(
+    return PricedWheelset(
         scene.title,
         asked,
         QUANTITIES[asked][1],

@@ -31,7 +31,7 @@ from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
 
 if TYPE_CHECKING:
-    from models.systems.pitch_plane.pitch_filter import Estimate, Measurement
+    from models.systems.pitch_plane.pitch_filter import Measurement, PitchEstimate
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
@@ -159,7 +159,7 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     return _LATEST[key]
 
 
-def _read(assembly: Assembly, estimated: "Estimate", measured: "Measurement") -> Guide:
+def _read(assembly: Assembly, estimated: "PitchEstimate", measured: "Measurement") -> Guide:
     from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
