@@ -40,6 +40,7 @@ OTHER_TABLES = (
     ("Vehicle files", "models.vehicles.vehicle_tables", "VehicleTable"),
     ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "Parameters"),
     ("Parameters of a wheelset", "models.rail.wheelset", "Wheelset"),
+    ("Parameters of a bicycle", "models.bicycle.whipple", "Whipple"),
     ("Parameters of a braked vehicle", "models.brake.plane_vehicle", "Truck"),
 )
 

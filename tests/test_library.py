@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[1]
 SHORT = {
     "pitch-plane": ("study_road", {"run.duration": 0.1}, {}),
     "handling": ("handling", {"manoeuvres.brake_in_curve.duration": 0.02}, {"manoeuvre": "brake_in_curve"}),
+    "bicycle": ("bicycle", {"run.duration": 0.02}, {}),
     "wheelset": ("wheelset", {"run.duration": 0.02, "contact.law": "linear"}, {"speed": 20.0}),
     "contact": ("contact_ellipse", {"method.cells": 11}, {}),
     "hub-forces": ("hub_forces", {"run.duration": 0.05}, {}),
@@ -28,7 +29,7 @@ SHORT = {
     "braking": ("braking", {"procedures.straight.speed": 1.0}, {"procedure": "straight"}),
 }
 """A shipped scene of each system, shortened, and what its run takes."""
-USUAL = {"handling": "exudyn", "measured": "mujoco", "contact": "", "wheel-rail": ""}
+USUAL = {"handling": "exudyn", "bicycle": "exudyn", "measured": "mujoco", "contact": "", "wheel-rail": ""}
 """Engines that run where none is named, if not the reference."""
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pandas", "pydantic", "matplotlib", "mujoco", "exudyn", "typer", "rich")
 

@@ -2,6 +2,7 @@
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
+from models.core.scene_effects import check as check_effects
 from models.core.scene_effects import lines as effect_lines
 from models.systems.bicycle.run import REFERENCE, assumptions
 from models.systems.bicycle.scene import BicycleScene
@@ -9,6 +10,7 @@ from models.systems.bicycle.scene import BicycleScene
 
 def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, parameters that are no bicycle."""
+    check_effects(scene)
     if set(engines) != {REFERENCE}:
         try:
             scene.rolling()

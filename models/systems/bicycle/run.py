@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 
 from models.bicycle import rolling_tyres as rt
-from models.bicycle.ideal_rolling import IdealBicycle
+from models.bicycle.ideal_rolling import FALLEN, IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.bicycle.whipple import Whipple
 from models.core.assumptions import Assumption, judged
@@ -29,6 +29,8 @@ MOVED = 1e-7
 """m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
 SHOWN = ("lean", "steer", "yaw")
 """Channels whose error is told."""
+OPEN = 1e-3
+"""Share of the energy that a run may leave unaccounted for: below 0.1 m/s tyres are stiff, and long steps wander."""
 ROWS_APART = 0.01
 """s between rows, at most."""
 LARGEST_LEAN = 1.0
@@ -106,7 +108,7 @@ def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*rolling.straight(run.speed, run.lean_rate))
-    fallen = np.abs(path.positions[:, rt.LEAN]) > np.pi / 2.0
+    fallen = np.abs(path.positions[:, rt.LEAN]) > FALLEN
     if fallen.any():
         raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
     tyres, ledger = rolling.report(path.times, path.positions, path.rates)
@@ -117,7 +119,11 @@ def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None
     motion = [
         plain.energy(_to_ideal(q_row, rolling.bicycle), v_row[TO_IDEAL]) for q_row, v_row in zip(q, v, strict=True)
     ]
-    return Ride(path.times[kept], q, v, motion + ledger[kept, rt.POTENTIAL], work[kept], steps, tyres[kept])
+    ride = Ride(path.times[kept], q, v, motion + ledger[kept, rt.POTENTIAL], work[kept], steps, tyres[kept])
+    if not ride.unaccounted() < OPEN:
+        why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
+        raise RunFailed(engine, why, float(path.times[-1]))
+    return ride
 
 
 def _to_ideal(q: np.ndarray, bicycle: Whipple) -> np.ndarray:
