@@ -186,7 +186,12 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
     amplitudes = [1e3 * row.amplitude for row in rows]
     right.plot(amplitudes, [row.equivalent for row in rows], "o-", color=BLUE, label="EN 15302")
     right.plot(amplitudes, [row.harmonic for row in rows], "s--", color=VERMILION, label="first harmonic")
-    right.set(xlabel="amplitude, half of peak to peak [mm]", ylabel="conicity", title="Conicity", ylim=(0, None))
+    right.set(
+        xlabel="amplitude, half of peak to peak [mm]",
+        ylabel="equivalent conicity [-]",
+        title="Conicity",
+        ylim=(0, None),
+    )
     right.legend()
     heading(figure, title, {"conicity": run})
     save(figure, path)

@@ -8,7 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from models.core.errors import InputError
-from models.rail import equivalent_conicity as conicity
+from models.core.tables import write_table
+from models.rail import equivalent_conicity as module
 from models.rail.equivalent_conicity import (
     RollingRadiusTable,
     conicity_row,
@@ -17,6 +18,10 @@ from models.rail.equivalent_conicity import (
     klingel_wave,
 )
 from models.rail.rolling_radius_table import read_rolling_radii
+from models.systems.wheelset import conicity as system
+from models.systems.wheelset.of_scene import wheelset_of
+from models.systems.wheelset.scene import build
+from studies import conicity as study
 
 Y = np.linspace(-8.0, 8.0, 161)
 
@@ -197,7 +202,78 @@ def test_planted_faults_are_seen(fault):
 
 
 def test_a_wrong_factor_in_a_piece_is_seen(monkeypatch):
-    times = conicity._times
-    monkeypatch.setattr(conicity, "_times", lambda way, slope: times(way, 1.01 * slope))
+    times = module._times
+    monkeypatch.setattr(module, "_times", lambda way, slope: times(way, 1.01 * slope))
     with pytest.raises(AssertionError):
         test_two_slopes(5.0)
+
+
+def scene(**tables):
+    """A wheelset scene that asks for conicities."""
+    base = {"title": "t", "system": "wheelset", "study": "conicity", "speeds": {"values": [20.0]}}
+    return build(base | tables, "s.toml")
+
+
+def test_scene_with_a_table(tmp_path):
+    """The table of a scene; an amplitude without a wave is told, the others stand."""
+    path = tmp_path / "own.csv"
+    write_table(path, {"y": ("mm", Y), "dr": ("mm", 0.1 * (Y + 1.0))})
+    asked = scene(conicity={"amplitudes": [2e-3, 9e-3], "table": str(path)})
+    got = system.run(asked)
+    assert got["equivalent"][0] == pytest.approx(0.05, rel=1e-9)
+    assert got["centre"][0] == pytest.approx(-1e-3, abs=1e-12)
+    assert got["wavelength"][0] == pytest.approx(2.0 * math.pi * math.sqrt(0.46 * 0.75 / 0.05), rel=1e-9)
+    assert math.isnan(got["equivalent"][1])
+    assert "half of peak to peak" in "".join(system.lines(got.detail))
+    study.run(asked, ("reference",), tmp_path, lambda *_: None)
+    again = read_rolling_radii(tmp_path / "rolling_radii.csv")
+    np.testing.assert_array_equal(again.differences, got.detail.table.differences)
+    assert (tmp_path / "conicity.png").is_file()
+    with pytest.raises(InputError, match=r"own.csv: conicity.amplitudes.*half of peak to peak"):
+        study.run(scene(conicity={"amplitudes": [9e-3], "table": str(path)}), (), tmp_path, lambda *_: None)
+
+
+def test_scene_with_cones_of_unequal_radius():
+    """920 and 918 mm: the cone's own conicity, about where both radii are equal."""
+    asked = scene(conicity={"right_radius": 0.460, "left_radius": 0.459})
+    row = system.run(asked).detail.rows[0]
+    slope = wheelset_of(asked).equivalent_conicity
+    assert row.equivalent == pytest.approx(slope, rel=1e-9)
+    assert row.centre == pytest.approx(-1e-3 / (2.0 * slope), rel=1e-9)
+
+
+def test_scene_with_profiles_of_unequal_radius():
+    """S1002 on UIC 60: as the usual value of this pair, and another about another centre for 920 and 918 mm."""
+    table = {"spacing": 5e-4, "reach": 9e-3}
+    same = system.run(scene(profiles={}, conicity=table)).detail.rows[0]
+    assert same.equivalent == pytest.approx(0.18, abs=0.01)
+    assert abs(same.centre) < 1e-9
+    unequal = {"right_radius": 0.460, "left_radius": 0.459}
+    other = system.run(scene(profiles={}, conicity=table | unequal)).detail.rows[0]
+    assert other.centre == pytest.approx(-2.35e-3, abs=2e-4)
+    assert other.equivalent == pytest.approx(0.27, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"conicity": {"amplitudes": []}}, "conicity.amplitudes"),
+        ({"conicity": {"amplitudes": [0.0]}}, "amplitudes.0.*above 0"),
+        ({"conicity": {"amplitudes": [3.0]}}, "at most 0.02 m"),
+        ({"conicity": {"left_wheel": "S1002"}}, "needs .profiles."),
+        ({"conicity": {"table": "a.csv", "left_radius": 0.4}}, "beside a table"),
+        ({"conicity": {"left_radius": 4.0}}, "from 0.1 to 1.5 m"),
+        ({"conicity": {"reach": 0.01, "spacing": 0.01}, "profiles": {}}, "1/4 of reach"),
+        ({"conicity": {"tabel": "a.csv"}}, "did you mean 'table'"),
+    ],
+)
+def test_scene_that_cannot_be(tables, said):
+    with pytest.raises(InputError, match=said):
+        scene(**tables)
+
+
+def test_scene_names_what_is_not_there():
+    with pytest.raises(InputError, match=r"conicity.table.*nowhere.csv"):
+        system.check(scene(conicity={"table": "nowhere.csv"}))
+    with pytest.raises(InputError, match=r"built in.*did you mean 'S1002'"):
+        system.check(scene(profiles={}, conicity={"left_wheel": "S1001"}))

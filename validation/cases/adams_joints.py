@@ -192,7 +192,7 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     speed = np.linalg.norm(theirs.velocity, axis=1)
     fastest = np.maximum(speed[starts], speed[starts + WINDOW])
     lost = np.abs(whole[starts + WINDOW] - whole[starts]) / (mechanism.mass * fastest) * (WINDOW * EVERY * STEP)
-    why = "from one state of the file to another, less its digits and what its loss of energy explains"
+    why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
     return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE, why, "published")

@@ -180,7 +180,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.fill_between(of["amplitude"], of["lower"], of["upper"], color="0.85", label="limits of EN 15302")
         axis.plot(of["amplitude"], of["seen"], color=BLUE, label="Klingel's wave")
         axis.plot(of["amplitude"], of["harmonic"], "--", color=VERMILION, label="first harmonic")
-        axis.set(title=name, xlabel="amplitude [mm]", ylabel="equivalent conicity")
+        axis.set(title=name, xlabel="amplitude [mm]", ylabel="equivalent conicity [-]")
     legend_below(figure, axes[0])
     heading(figure, "Equivalent conicity of the standard's reference profiles")
     return [("Equivalent conicity over the amplitude, within the limits of EN 15302.", figure)]

@@ -142,9 +142,7 @@ def _check_conicity(scene: WheelsetScene) -> None:
             allowed = "needs [profiles]: without them both wheels are cones"
             raise InputError(scene.file, f"conicity.{key}", getattr(asked, key), allowed)
     if not (asked.reach <= LARGEST_SHIFT and asked.reach / MOST_PLACES <= asked.spacing <= asked.reach / 4.0):
-        allowed = (
-            f"must be at most a quarter of reach, at least a {MOST_PLACES}th of it; reach at most {LARGEST_SHIFT:g} m"
-        )
+        allowed = f"must be from 1/{MOST_PLACES} to 1/4 of reach, and reach at most {LARGEST_SHIFT:g} m"
         raise InputError(scene.file, "conicity.spacing", asked.spacing, allowed)
     for key in ("right_radius", "left_radius"):
         radius = getattr(asked, key)
