@@ -62,6 +62,7 @@ CASES = (
     "wheelset",
     "contact_bridges",
     "handling",
+    "race_car",
     "written_equations",
     "braking_stop",
     "braking_limits",
