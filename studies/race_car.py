@@ -6,8 +6,7 @@ Without either the study runs on a drive that was made by the car on four wheels
 """
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,38 +15,15 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.core.tables import write_table
-from models.identification.bands import Bands, ErrorModel, bands, error_model
-from models.identification.fit import Fit, fit
-from models.identification.of_scene import problem_of
-from models.identification.problem import Problem
-from models.identification.uncertainty import Uncertainty, uncertainty
+from models.identification.held_out import Identified, Search, identified
+from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
 from models.systems.single_track.scene import SingleTrackScene, build
 from studies.command.identify import as_dict, lines
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
-COLUMNS = {
-    "time": ("t", "s"),
-    "steer": ("delta", "rad"),
-    "speed": ("vx", "m/s"),
-    "yaw rate": ("yawRate", "rad/s"),
-    "lateral acceleration": ("ayCG", "m/s^2"),
-    "side slip": ("beta_true", "rad"),
-}
-"""Name here -> column and unit of the race's file."""
-EVERY = 2
-"""Samples of the race's file of which one is kept, after a low-pass at a quarter of its rate."""
 AIMS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
 """Rms error by the rms of the measurement that is asked for."""
-GUESSED = {"drag": 0.4, "front_brake": 0.65}
-"""Of the race car: a drag area of 0.65 m^2, and a share of the brakes. Both act through the friction ellipse alone."""
-RACE_CAR = {
-    "vehicle": {"mass": 982.0, "front": 1.33, "rear": 1.07, "yaw_inertia": 1250.0, "centre_height": 0.05, **GUESSED},
-    "front": {"stiffness": 15.0, "friction": 1.3},
-    "rear": {"stiffness": 19.0, "friction": 1.3, "sharpness": 3.0},
-}
-"""Published: mass and lengths. The rest is where the search begins."""
 
 
 class Options(Strict):
@@ -61,37 +37,11 @@ class Options(Strict):
     low_pass: float = Field(5.0, gt=0, le=50, description="Hz, of run and measurement alike, without phase")
     blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
     parameters: list[str] = Field(
-        [
-            "vehicle.yaw_inertia=300:3000",
-            "vehicle.centre_height=0:0.6",
-            "front.stiffness=5:50",
-            "front.friction=0.5:3",
-            "front.sharpness=1:12",
-            "front.side=-0.3:0.3",
-            "rear.stiffness=5:50",
-            "rear.friction=0.5:3",
-            "rear.sharpness=1:12",
-            "rear.side=-0.3:0.3",
-            "sensors.steer_offset=-0.02:0.02",
-            "sensors.side_slip_offset=-0.02:0.02",
-            "sensors.acceleration_offset=-1:1",
-        ],
-        min_length=1,
-        description="keys that are identified, each KEY or KEY=LOW:HIGH",
+        list(PARAMETERS), min_length=1, description="keys that are identified, each KEY or KEY=LOW:HIGH"
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """What one vehicle gives: the fit, errors that it makes on parts that it was not fitted on, the prediction."""
-
-    known: Uncertainty
-    errors: list[ErrorModel]
-    crossed: np.ndarray
-    bands: Bands
-
-
-SIMPLER = {
+SIMPLER: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
 }
@@ -114,7 +64,9 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 
     options = read(Options, scene.options, scene.file, "options")
     first, second = stretches(scene, options, folder)
-    chosen = identified(first, second, options, options.parameters, progress)
+    chosen = identified(
+        first, second, Search(options.parameters, list(AIMS), options.low_pass, options.blocks), progress
+    )
     others = {name: simpler(first, second, options, name, progress) for name in SIMPLER}
     draw(chosen, others, scene.title, folder / "race_car.png")
     answer = figures(chosen)
@@ -138,10 +90,10 @@ def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[
     if not options.measurement:
         whole, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
-        path = _plain(_found(scene, options.measurement, "options.measurement"), folder / "measured.csv")
+        path = plain(_found(scene, options.measurement, "options.measurement"), folder / "measured.csv")
         whole = _on(scene, path, RACE_CAR)
     if options.prediction:
-        other = _plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
+        other = plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
         return whole, _on(scene, other, RACE_CAR)
     from models.systems.single_track.drive import read_drive
 
@@ -157,46 +109,6 @@ def _found(scene: SingleTrackScene, name: str, place: str) -> Path:
     return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
 
 
-def _plain(source: Path, target: Path) -> Path:
-    """The race's file as a table that scenes take: one of EVERY samples, nothing of what those cannot show."""
-    raw = _raw(source)
-    period = float(np.median(np.diff(raw["t"])))
-    columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
-    from models.core.smoothing import smoothed
-    from models.measured.outliers import without_outliers
-
-    for name, (column, unit) in list(COLUMNS.items())[1:]:
-        kept = without_outliers(raw[column])
-        known = np.isfinite(kept)
-        whole = np.interp(raw["t"], raw["t"][known], kept[known])
-        columns[name] = (unit, smoothed(whole[:, None], period, 0.25 / period, str(source), column)[::EVERY, 0])
-    write_table(target, columns)
-    return target
-
-
-def _raw(source: Path) -> dict[str, np.ndarray]:
-    """Columns of the race's file, packed or not; InputError where one is missing, or times do not rise."""
-    import csv
-    import gzip
-
-    with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
-        head, *rows = list(csv.reader(file))
-    for column, _ in COLUMNS.values():
-        if column not in head:
-            raise InputError(source, column, None, "no such column in the race's file", tuple(head))
-    try:
-        table = np.array(rows, float)
-    except ValueError as error:
-        raise InputError(source, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
-    raw = {column: table[:, head.index(column)] for column, _ in COLUMNS.values()}
-    falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
-    if len(falls):
-        raise InputError(
-            source, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
-        )
-    return raw
-
-
 def _on(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
     """The scene with the race car and a drive."""
     table = {"title": scene.title, "system": SYSTEM, **car, "drive": {"file": path.name, "low_pass": 10.0}}
@@ -207,62 +119,18 @@ def _stretched(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
     return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": ends}), "options": {}})
 
 
-def identified(
-    first: SingleTrackScene, second: SingleTrackScene, options: Options, parameters: Sequence[str], progress: Progress
-) -> Identified:
-    """Fit on the first stretch, errors on parts left out of it, prediction of the second with bands."""
-    problem = _problem(first, parameters, options)
-    solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
-    known = uncertainty(solved)
-    crossed = cross_validated(solved, options.blocks, progress)
-    predicted = problem.predicted(solved.values)
-    errors = [
-        error_model(row[channel.used], model[channel.used])
-        for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
-    ]
-    progress("the prediction", 0.9)
-    return Identified(known, errors, crossed, bands(_problem(second, parameters, options), known, errors))
-
-
-def _problem(scene: SingleTrackScene, parameters: Sequence[str], options: Options) -> Problem:
-    whole = problem_of(scene, scene.path(scene.drive.file), parameters, low_pass=options.low_pass)
-    channels = {channel.name: channel for channel in whole.channels}
-    missing = next((name for name in AIMS if name not in channels), None)
-    if missing:
-        raise InputError(scene.drive.file, missing, None, "the study compares this channel: it must be in the file")
-    return replace(whole, channels=[channels[name] for name in AIMS])
-
-
-def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
-    """(channels, n): prediction less measurement of each part of the stretch, by the fit on all others."""
-    problem, times = solved.problem, solved.problem.clock.times
-    target = np.array([channel.values for channel in problem.channels])
-    answer = np.empty_like(target)
-    part = np.minimum((count * np.arange(len(times))) // len(times), count - 1)
-    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside(solved), strict=True)]
-    for k in range(count):
-        progress(f"part {k + 1} of {count}, predicted from the others", 0.4 + 0.5 * k / count)
-        others = Problem(problem.model, starts, problem.channels, problem.clock, part != k)
-        there = fit(others)
-        answer[:, part == k] = (problem.predicted(there.values) - target)[:, part == k]
-    return answer
-
-
-def _inside(solved: Fit) -> np.ndarray:
-    low, high = solved.problem.bounds
-    margin = 1e-3 * solved.problem.scale
-    return np.clip(solved.values, low + margin, high - margin)
-
-
 def simpler(
     first: SingleTrackScene, second: SingleTrackScene, options: Options, name: str, progress: Progress
 ) -> Identified:
     """The same with a vehicle of fewer numbers."""
     holds, kept = SIMPLER[name]
     parameters = [text for text in options.parameters if any(word in text for word in kept)]
-    scenes = [_with(scene, holds) for scene in (first, second)]
-    few = options.model_copy(update={"blocks": 2})
-    return identified(*scenes, few, parameters, lambda text, share: progress(f"{name}: {text}", 0.95))
+    few = Search(parameters, list(AIMS), options.low_pass, blocks=2)
+
+    def tell(text: str, share: float) -> None:
+        progress(f"{name}: {text}", 0.95)
+
+    return identified(_with(first, holds), _with(second, holds), few, tell)
 
 
 def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
@@ -312,7 +180,7 @@ def where_wrong(chosen: Identified) -> dict[str, dict[str, float]]:
     clock = problem.clock.times
     lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
     speed = np.interp(clock, model.times, model.detail.speed)
-    causes = {
+    causes: dict[str, tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]] = {
         "magnitude with |lateral acceleration|": (np.abs, np.abs(lateral)),
         "magnitude with speed": (np.abs, speed),
         "magnitude with braking": (np.abs, -np.minimum(ahead, 0.0)),

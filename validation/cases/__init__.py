@@ -64,6 +64,7 @@ CASES = (
     "contact_bridges",
     "handling",
     "bicycle",
+    "race_car",
     "written_equations",
     "adams_joints",
     "braking_stop",

@@ -20,7 +20,7 @@ System = Literal[
 ]
 Independence = Literal["native", "handed over", "shared kernel", "closed form", "published", "measured", "none"]
 """How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
-exact answer, a published figure, a measured vehicle, or no second side."""
+exact answer, a published figure, what was measured on a real vehicle, or no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
 """In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is a
 stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
@@ -109,7 +109,7 @@ class Observed:
         """Row that reports the figure beside a published one without judging it."""
         return self._row(expected, None, why, independence, "reported")
 
-    def aim(self, bound: float, why: str, side: Side = "at most") -> Row:
+    def aim(self, bound: float, why: str, side: Side = "at most", independence: Independence = "none") -> Row:
         """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
 
         So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known
@@ -118,7 +118,7 @@ class Observed:
         reached = self.value <= bound if side == "at most" else self.value >= bound
         wanted = f"{side} {bound:,.4g}"
         missed = f"{self.value:,.4g}{f' {self.unit}' if self.unit else ''}; the aim is {wanted}"
-        return self._row(wanted, None, why, "none", *(("reported", "") if reached else ("missed", missed)))
+        return self._row(wanted, None, why, independence, *(("reported", "") if reached else ("missed", missed)))
 
     def _row(
         self,

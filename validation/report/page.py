@@ -33,7 +33,7 @@ KINDS = {
     "shared kernel": "both sides call the same force code: nothing is learned about that code",
     "closed form": "the other side is an exact answer",
     "published": "the other side is a figure from the literature",
-    "measured": "a vehicle was measured: model and measurement share no number but its parameters",
+    "measured": "the other side was measured on a real vehicle",
     "none": "there is no second side: a behaviour, or a count",
 }
 assert set(KINDS) == set(get_args(Independence))
@@ -101,6 +101,14 @@ def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
         kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
         lines.append((name, drawn[name]["title"], [kinds.count(kind) for kind in KINDS]))
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
+
+
+def evidence(rows: list[Saved]) -> list[tuple[str, list[int]]]:
+    """Per system, how many rows rest on which kind of second side, in the order of KINDS; rows that ran."""
+    ran = [row for row in rows if row["status"] != "not run"]
+    names = dict.fromkeys(row["system"] for row in ran)
+    kinds = {name: [row["independence"] for row in ran if row["system"] == name] for name in names}
+    return [(name, [each.count(kind) for kind in KINDS]) for name, each in kinds.items()]
 
 
 NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
@@ -205,6 +213,8 @@ def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -
         silent=silent_systems(results["rows"]),
         shares=shares(results),
         independence=independence(results, drawn),
+        evidence=evidence(results["rows"]),
+        measured_rows=sum(row["independence"] == "measured" and row["status"] != "not run" for row in results["rows"]),
         allowances=allowances(results["rows"]),
         blind=blind_spots(),
         conventions=conventions(),

@@ -1,0 +1,82 @@
+"""A stretch that took no part: a fit on one stretch, its errors between parts of it, and the prediction of another."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.identification.bands import Bands, ErrorModel, bands, error_model
+from models.identification.fit import Fit, fit
+from models.identification.of_scene import problem_of
+from models.identification.problem import Problem
+from models.identification.uncertainty import Uncertainty, uncertainty
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Search:
+    """parameters : KEY or KEY=LOW:HIGH; channels that are compared; low_pass (Hz); blocks : parts of the first stretch,
+    each predicted from the others."""
+
+    parameters: Sequence[str]
+    channels: Sequence[str]
+    low_pass: float = 0.0
+    blocks: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What one vehicle gives: the fit, errors that it makes on parts that it was not fitted on, the prediction."""
+
+    known: Uncertainty
+    errors: list[ErrorModel]
+    crossed: np.ndarray
+    bands: Bands
+
+
+def identified(first: Any, second: Any, search: Search, progress: Progress = lambda text, share: None) -> Identified:
+    """Fit on the first stretch, errors on parts left out of it, prediction of the second with bands."""
+    problem = _problem(first, search)
+    solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
+    known = uncertainty(solved)
+    crossed = cross_validated(solved, search.blocks, progress)
+    predicted = problem.predicted(solved.values)
+    errors = [
+        error_model(row[channel.used], model[channel.used])
+        for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
+    ]
+    progress("the prediction", 0.9)
+    return Identified(known, errors, crossed, bands(_problem(second, search), known, errors))
+
+
+def _problem(scene: Any, search: Search) -> Problem:
+    whole = problem_of(scene, scene.path(scene.drive.file), search.parameters, low_pass=search.low_pass)
+    channels = {channel.name: channel for channel in whole.channels}
+    missing = next((name for name in search.channels if name not in channels), None)
+    if missing:
+        raise InputError(scene.drive.file, missing, None, "this channel is compared: it must be in the file")
+    return replace(whole, channels=[channels[name] for name in search.channels])
+
+
+def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
+    """(channels, n): prediction less measurement of each part of the stretch, by the fit on all others."""
+    problem, times = solved.problem, solved.problem.clock.times
+    target = np.array([channel.values for channel in problem.channels])
+    answer = np.empty_like(target)
+    part = np.minimum((count * np.arange(len(times))) // len(times), count - 1)
+    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside(solved), strict=True)]
+    for k in range(count):
+        progress(f"part {k + 1} of {count}, predicted from the others", 0.4 + 0.5 * k / count)
+        others = Problem(problem.model, starts, problem.channels, problem.clock, part != k)
+        there = fit(others)
+        answer[:, part == k] = (problem.predicted(there.values) - target)[:, part == k]
+    return answer
+
+
+def _inside(solved: Fit) -> np.ndarray:
+    low, high = solved.problem.bounds
+    margin = 1e-3 * solved.problem.scale
+    return np.clip(solved.values, low + margin, high - margin)

@@ -1,0 +1,84 @@
+"""The file of a measured race car as a table that scenes take, and what is published of the car."""
+
+import csv
+import gzip
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.smoothing import smoothed
+from models.core.tables import write_table
+from models.measured.outliers import without_outliers
+
+COLUMNS = {
+    "time": ("t", "s"),
+    "steer": ("delta", "rad"),
+    "speed": ("vx", "m/s"),
+    "yaw rate": ("yawRate", "rad/s"),
+    "lateral acceleration": ("ayCG", "m/s^2"),
+    "side slip": ("beta_true", "rad"),
+}
+"""Name here -> column and unit of the race's file."""
+EVERY = 2
+"""Samples of the race's file of which one is kept, after a low-pass at a quarter of its rate."""
+GUESSED = {"drag": 0.4, "front_brake": 0.65}
+"""Of the race car: a drag area of 0.65 m^2, and a share of the brakes. Both act through the friction ellipse alone."""
+RACE_CAR = {
+    "vehicle": {"mass": 982.0, "front": 1.33, "rear": 1.07, "yaw_inertia": 1250.0, "centre_height": 0.05, **GUESSED},
+    "front": {"stiffness": 15.0, "friction": 1.3},
+    "rear": {"stiffness": 19.0, "friction": 1.3, "sharpness": 3.0},
+}
+"""Published: mass and lengths. The rest is where the search begins."""
+
+
+PARAMETERS = (
+    "vehicle.yaw_inertia=300:3000",
+    "vehicle.centre_height=0:0.6",
+    "front.stiffness=5:50",
+    "front.friction=0.5:3",
+    "front.sharpness=1:12",
+    "front.side=-0.3:0.3",
+    "rear.stiffness=5:50",
+    "rear.friction=0.5:3",
+    "rear.sharpness=1:12",
+    "rear.side=-0.3:0.3",
+    "sensors.steer_offset=-0.02:0.02",
+    "sensors.side_slip_offset=-0.02:0.02",
+    "sensors.acceleration_offset=-1:1",
+)
+"""What is identified of it."""
+
+
+def plain(source: Path, target: Path) -> Path:
+    """The race's file as a table that scenes take: one of EVERY samples, nothing of what those cannot show."""
+    raw = _raw(source)
+    period = float(np.median(np.diff(raw["t"])))
+    columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
+    for name, (column, unit) in list(COLUMNS.items())[1:]:
+        kept = without_outliers(raw[column])
+        known = np.isfinite(kept)
+        whole = np.interp(raw["t"], raw["t"][known], kept[known])
+        columns[name] = (unit, smoothed(whole[:, None], period, 0.25 / period, str(source), column)[::EVERY, 0])
+    write_table(target, columns)
+    return target
+
+
+def _raw(source: Path) -> dict[str, np.ndarray]:
+    """Columns of the race's file, packed or not; InputError where one is missing, or times do not rise."""
+    with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
+        head, *rows = list(csv.reader(file))
+    for column, _ in COLUMNS.values():
+        if column not in head:
+            raise InputError(source, column, None, "no such column in the race's file", tuple(head))
+    try:
+        table = np.array(rows, float)
+    except ValueError as error:
+        raise InputError(source, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
+    raw = {column: table[:, head.index(column)] for column, _ in COLUMNS.values()}
+    falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
+    if len(falls):
+        raise InputError(
+            source, f"t, row {falls[0] + 3}", float(raw["t"][falls[0] + 1]), "times must rise from row to row"
+        )
+    return raw
