@@ -38,7 +38,7 @@ def page(twins: Twins) -> str:
         twins=twins,
         title=" and ".join(twins.names),
         verdicts=[verdict(each) for each in twins.examined],
-        tables=[_rows(list(elements(each.file.own.model).values())) for each in twins.examined],
+        tables=[_rows(list(elements(each.file.twin.model).values())) for each in twins.examined],
         hashes=[sha256(each.file.document.path.read_bytes()).hexdigest() for each in twins.examined],
         command=" ".join(sys.argv),
         versions={name: version(name) for name in ("twinrig", "mujoco", "exudyn", "numpy")},

@@ -15,7 +15,7 @@ from models.own_model.certificate import certificate
 from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
-from models.own_model.file import OwnFile, read
+from models.own_model.file import ModelFile, read
 from models.own_model.path import paths
 from models.own_model.urdf import misread
 from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
@@ -27,19 +27,19 @@ def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
     return path
 
 
-def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...] = ()) -> OwnFile:
+def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...] = ()) -> ModelFile:
     return read(_file(folder, text, name), without)
 
 
 @pytest.mark.parametrize("text", [JOINTED, CART, chain(8), tree(9, 4)], ids=["jointed", "cart", "chain", "tree"])
 def test_every_build_moves_as_the_file_does(tmp_path, text):
-    for row in certificate(_read(tmp_path, text).own, 20):
+    for row in certificate(_read(tmp_path, text).twin, 20):
         assert max(row.mass, row.force, row.acceleration) < 1e-11, row  # rounding by a condition of about 100
 
 
 def test_urdf_is_built_and_its_xml_says_the_same(tmp_path):
     file = _read(tmp_path, ARM_URDF, "arm.urdf")
-    assert all(row.acceleration < 1e-12 for row in certificate(file.own, 20))
+    assert all(row.acceleration < 1e-12 for row in certificate(file.twin, 20))
     assert misread(file) == []
     assert file.limited == ("joint 'shoulder'",)
     assert "1 shapes" in file.notes[0]
@@ -47,9 +47,9 @@ def test_urdf_is_built_and_its_xml_says_the_same(tmp_path):
 
 def test_inertia_rotation_lost_by_a_parser_is_told(tmp_path):
     file = _read(tmp_path, ARM_URDF, "arm.urdf")
-    body = file.own.model.body("upper").id
-    file.own.model.body_iquat[body] = 1.0, 0.0, 0.0, 0.0
-    file.own.model.body_sameframe[:] = 0
+    body = file.twin.model.body("upper").id
+    file.twin.model.body_iquat[body] = 1.0, 0.0, 0.0, 0.0
+    file.twin.model.body_sameframe[:] = 0
     (lost,) = misread(file)
     assert (lost.kind, lost.owner) == ("inertia", "body 'upper'")
     assert "in the file" in lost.sentence()
@@ -62,18 +62,18 @@ def test_an_element_that_a_build_lacks_is_named(tmp_path, monkeypatch, kind):
     owner = {"damping": "joint 'x'"}.get(kind, "joint 'tilt'")
     honest = equations
 
-    def forgetful(own, build):
-        vehicle = own.driven.vehicle
+    def forgetful(twin, build):
+        vehicle = twin.driven.vehicle
         forgotten = {"armature": "inertia"}.get(field, field)
         rows = tuple(replace(e, **{forgotten: 0.0}) if e.name == owner else e for e in vehicle.joint_elements)
-        driven = replace(own.driven, vehicle=replace(vehicle, joint_elements=rows))
-        return honest(replace(own, driven=driven) if build == "plain" else own, build)
+        driven = replace(twin.driven, vehicle=replace(vehicle, joint_elements=rows))
+        return honest(replace(twin, driven=driven) if build == "plain" else twin, build)
 
     monkeypatch.setattr(certifying, "equations", forgetful)
     monkeypatch.setattr("models.own_model.explain.equations", forgetful)
-    exudyn, engine, plain = certificate(file.own, 5)
+    exudyn, engine, plain = certificate(file.twin, 5)
     assert exudyn.alike and engine.alike and not plain.alike
-    assert [(element.kind, element.owner) for element, _ in culprits(file.own, "plain", 5)] == [(kind, owner)]
+    assert [(element.kind, element.owner) for element, _ in culprits(file.twin, "plain", 5)] == [(kind, owner)]
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def original(tmp_path_factory):
 @pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED)
 def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old, new, kind, owner, size):
     other = _read(tmp_path, changed(JOINTED, name, old, new), "b.xml")
-    comparison = compare(original.own, other.own, 3)
+    comparison = compare(original.twin, other.twin, 3)
     assert not comparison.alike
     first = comparison.influential[0]
     said = first.sentence(("a.xml", "b.xml"))
@@ -94,7 +94,7 @@ def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old
 
 def test_difference_without_influence_is_listed_as_such(tmp_path, original):
     text = JOINTED.replace('ctrlrange="1 2"', 'ctrlrange="1 3"')
-    comparison = compare(original.own, _read(tmp_path, text, "b.xml").own, 3)
+    comparison = compare(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
     assert comparison.alike and comparison.influential == ()
     assert [(each.kind, each.owner) for each in comparison.differences] == [("control range", "actuator 'push'")]
 
@@ -108,47 +108,47 @@ def test_a_difference_in_what_is_off_is_listed_as_not_compared(tmp_path):
         "b.xml",
         ("friction_loss",),
     )
-    comparison = compare(first.own, second.own, 3)
+    comparison = compare(first.twin, second.twin, 3)
     assert comparison.alike and comparison.silent == ()
     assert {each.kind for each in comparison.not_compared} == {"friction loss", "range"}
 
 
 def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, original):
     text = JOINTED.replace("</actuator>", '<position name="hold" joint="hinge" kp="4"/></actuator>')
-    comparison = compare(original.own, _read(tmp_path, text, "b.xml").own, 3)
+    comparison = compare(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
     assert {each.owner for each in comparison.influential} == {"actuator 'hold'"}
     assert comparison.unexplained < 1e-10
 
 
 def test_joints_without_a_partner_are_named(tmp_path, original):
-    comparison = compare(original.own, _read(tmp_path, CART, "cart.xml").own, 3)
+    comparison = compare(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
     assert comparison.apart is None and "joint 'hinge' of a has no partner" in comparison.unmatched
 
 
 def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
     """The same arm as MuJoCo itself writes it: its numbers are rounded to six digits there, and no more."""
     arm = _read(tmp_path, ARM_URDF, "arm.urdf")
-    mujoco.mj_saveLastXML(str(tmp_path / "arm.xml"), arm.own.model)
-    comparison = compare(arm.own, read(tmp_path / "arm.xml").own, 3)
+    mujoco.mj_saveLastXML(str(tmp_path / "arm.xml"), arm.twin.model)
+    comparison = compare(arm.twin, read(tmp_path / "arm.xml").twin, 3)
     assert comparison.apart is not None and comparison.apart.acceleration < 1e-4
 
 
 def test_paths_of_all_builds_agree_and_the_ledger_closes(tmp_path):
-    report = paths(_read(tmp_path, CART).own)
+    report = paths(_read(tmp_path, CART).twin)
     assert report.alike and not report.failed and not report.quaternions
     assert report.energy < 1e-9  # Simpson's rule at steps of 2 ms
 
 
 def test_path_with_quaternions_differs_by_the_error_of_the_step(tmp_path):
-    own = _read(tmp_path, JOINTED).own
-    coarse, fine = (paths(own, step).distances["the file's own model"] for step in (4e-3, 2e-3))
+    twin = _read(tmp_path, JOINTED).twin
+    coarse, fine = (paths(twin, step).distances["the file's own model"] for step in (4e-3, 2e-3))
     assert 8.0 < coarse / fine < 32.0  # order 4: 16
 
 
 def test_thirty_joints_are_certified_in_time(tmp_path):
-    own = _read(tmp_path, chain(30)).own
+    twin = _read(tmp_path, chain(30)).twin
     start = perf_counter()
-    rows = certificate(own, 100)
+    rows = certificate(twin, 100)
     spent = perf_counter() - start
     assert all(row.alike for row in rows)
     assert spent < 200.0  # 20 s are wanted on an idle machine; a shared one may be ten times as slow
@@ -176,7 +176,7 @@ def test_content_without_an_equal_is_refused_by_name_and_line(tmp_path, kind, el
     assert said in str(error.value) and f"--without {kind}" in str(error.value)
     file = read(path, (kind,))
     assert [content.kind for content in file.left_out] == [kind]
-    assert all(row.alike for row in certificate(file.own, 5))
+    assert all(row.alike for row in certificate(file.twin, 5))
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_a_hundred_spoilt_files_are_answered(tmp_path):
         path = tmp_path / f"spoilt{i}.xml"
         path.write_bytes(bytes(content))
         try:
-            certificate(read(path, ("contact", "equality", "bent_law")).own, 1)
+            certificate(read(path, ("contact", "equality", "bent_law")).twin, 1)
         except InputError as error:
             assert path.name in str(error) or "--without" in str(error)
         answered += 1
@@ -233,7 +233,7 @@ def test_angular_velocity_of_the_angles():
 
 
 def test_elements_have_names_units_and_values(tmp_path):
-    listed = elements(_read(tmp_path, JOINTED).own.model)
+    listed = elements(_read(tmp_path, JOINTED).twin.model)
     assert listed["armature", "joint 'hinge'"].unit == "kg m^2"
     assert listed["damping", "joint 'slide'"].unit == "N s/m"
     assert np.allclose(listed["inertia", "body 'arm'"].value, (0.3, 0.4, 0.5, 0.02, 0.03, 0.04))

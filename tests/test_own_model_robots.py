@@ -39,7 +39,7 @@ def _path(name: str) -> Path:
 
 @pytest.mark.parametrize("name", MUJOCO)
 def test_mjcf_of_others_is_certified(name):
-    for row in certificate(read(_path(name), OUTSIDE).own, STATES):
+    for row in certificate(read(_path(name), OUTSIDE).twin, STATES):
         assert row.acceleration < 1e-10, row
 
 
@@ -47,7 +47,7 @@ def test_mjcf_of_others_is_certified(name):
 def test_urdf_of_others_is_certified_and_nothing_of_it_lost(name):
     file = read(_path(name), OUTSIDE)
     assert misread(file) == []
-    for row in certificate(file.own, STATES):
+    for row in certificate(file.twin, STATES):
         assert row.acceleration < 1e-10, row
 
 

@@ -134,8 +134,8 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
     part = replace(built.vehicle, bodies=tuple(bodies))
     rows, places, ends = joints(part), part.coordinates(), {body.name: anchor(part, body.name) for body in bodies}
     links, zero = [Link() for _ in places], [0.0] * len(places)
-    own, below = frames(part), rows[:, 1].astype(int)
-    base = np.array([own[i] if i >= 0 else np.eye(3) for i in below])
+    axes, below = frames(part), rows[:, 1].astype(int)
+    base = np.array([axes[i] if i >= 0 else np.eye(3) for i in below])
     for body in bodies:
         last, origin = ends[body.name]
         links[last].load(body, np.subtract(body.position, origin))
@@ -153,15 +153,15 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
             gravity=[0, 0, -built.vehicle.gravity],
             jointTypes=[JOINTS[freedom] for _, freedom in places],
             linkParents=below.tolist(),
-            jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(own, base, strict=True)]),
+            jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(axes, base, strict=True)]),
             jointOffsets=lists.Vector3DList([b.T @ arm for arm, b in zip(rows[:, 2:], base, strict=True)]),
-            linkInertiasCOM=lists.Matrix3DList([a.T @ link.inertia @ a for a, link in zip(own, links, strict=True)]),
-            linkCOMs=lists.Vector3DList([a.T @ link.centre for a, link in zip(own, links, strict=True)]),
+            linkInertiasCOM=lists.Matrix3DList([a.T @ link.inertia @ a for a, link in zip(axes, links, strict=True)]),
+            linkCOMs=lists.Vector3DList([a.T @ link.centre for a, link in zip(axes, links, strict=True)]),
             linkMasses=[link.mass for link in links],
         )
     )
     built.links |= {name: (tree, *end) for name, end in ends.items()}
-    built.frames |= {name: own[end[0]] for name, end in ends.items()}
+    built.frames |= {name: axes[end[0]] for name, end in ends.items()}
     built.places |= {place: (node, i) for i, place in enumerate(places)}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.engines.free_vehicle import ENGINES, free_model
 from models.multibody.plain.joint_elements import PlainTree
-from models.own_model.reading import OwnModel, controls
+from models.own_model.reading import TwinModel, controls
 
 PLAIN = "plain"
 BUILDS = (*ENGINES, PLAIN)
@@ -26,9 +26,9 @@ Equations = Callable[[np.ndarray, np.ndarray], Moved]
 """Of coordinates and rates (n,)."""
 
 
-def equations(own: OwnModel, build: str) -> Equations:
+def equations(twin: TwinModel, build: str) -> Equations:
     """The description in "exudyn", "mujoco" or "plain"."""
-    built: Any = plain_tree(own) if build == PLAIN else free_model(build, own.driven)
+    built: Any = plain_tree(twin) if build == PLAIN else free_model(build, twin.driven)
     mass_and_force = built.mass_and_force
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
@@ -38,22 +38,22 @@ def equations(own: OwnModel, build: str) -> Equations:
     return move
 
 
-def plain_tree(own: OwnModel) -> PlainTree:
+def plain_tree(twin: TwinModel) -> PlainTree:
     """The plain equations of the description."""
-    loads = [(spring.body, spring.point, spring.load) for spring in own.driven.ground_springs]
-    return PlainTree(own.driven.vehicle, own.driven.gravity, loads)
+    loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads)
 
 
-def as_parsed(own: OwnModel) -> Equations:
+def as_parsed(twin: TwinModel) -> Equations:
     """The file's own model as MuJoCo parsed it."""
-    model, data, coordinates = own.model, mujoco.MjData(own.model), own.coordinates
+    model, data, coordinates = twin.model, mujoco.MjData(twin.model), twin.coordinates
     data.ctrl[:] = controls(model)
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         state = coordinates.to_mujoco(q, v)
         data.qpos[:], data.qvel[:], data.time = state.qpos, state.qvel, 0.0
         mujoco.mj_forward(model, data)
-        own_mass, j = np.empty((own.size, own.size)), state.jacobian
+        own_mass, j = np.empty((twin.size, twin.size)), state.jacobian
         mujoco.mj_fullM(model, data, own_mass)
         mass = j.T @ own_mass @ j
         force = j.T @ (data.qfrc_smooth + data.qfrc_constraint - own_mass @ state.rest)

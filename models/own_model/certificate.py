@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.own_model.builds import BUILDS, Equations, Moved, as_parsed, equations
-from models.own_model.reading import OwnModel
+from models.own_model.reading import TwinModel
 from models.own_model.states import COUNT, random_states
 
 ALIKE = 1e-10
@@ -50,13 +50,13 @@ class Agreement:
         return self.acceleration <= self.bound
 
 
-def certificate(own: OwnModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
+def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
     """Every build of the description beside the file's own model."""
-    states = list(zip(*random_states(own.model, count), strict=True))
-    expected = moved_at(as_parsed(own), states)
+    states = list(zip(*random_states(twin.model, count), strict=True))
+    expected = moved_at(as_parsed(twin), states)
     rows = list[Agreement]()
     for i, build in enumerate(BUILDS):
-        rows.append(agreement(build, expected, moved_at(equations(own, build), states), own))
+        rows.append(agreement(build, expected, moved_at(equations(twin, build), states), twin))
         told((i + 1) / len(BUILDS))
     return tuple(rows)
 
@@ -69,12 +69,12 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
         raise RunFailed("twin", "the mass matrix is singular: something without inertia can move") from None
 
 
-def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], own: OwnModel) -> Agreement:
+def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], twin: TwinModel) -> Agreement:
     """Largest differences over all states of a model."""
     mass = max(_share(a.mass, b.mass) for a, b in zip(expected, seen, strict=True))
     force = max(_share(a.force, b.force) for a, b in zip(expected, seen, strict=True))
     largest = max(float(np.abs(a.acceleration).max()) for a in expected)
-    least = QUIET * max(largest, float(np.linalg.norm(own.driven.gravity)))
+    least = QUIET * max(largest, float(np.linalg.norm(twin.driven.gravity)))
     shares = [_share(a.acceleration, b.acceleration, least) for a, b in zip(expected, seen, strict=True)]
     at = int(np.nanargmax(shares)) if np.isfinite(shares).any() else 0
     apart = np.abs(seen[at].acceleration - expected[at].acceleration)
@@ -82,7 +82,7 @@ def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], own:
     bound = max(ALIKE, ROUNDING * max(_condition(a.mass) for a in expected))
     size = float(np.abs(expected[at].acceleration[i]))
     worst = max(shares) if np.isfinite(shares).all() else np.inf
-    return Agreement(build, mass, force, worst, own.names[i], float(apart[i]), size, bound)
+    return Agreement(build, mass, force, worst, twin.names[i], float(apart[i]), size, bound)
 
 
 def _share(expected: np.ndarray, seen: np.ndarray, least: float = 0.0) -> float:

@@ -16,7 +16,7 @@ from models.core.errors import RunFailed
 from models.own_model.builds import PLAIN, Moved, as_parsed, equations
 from models.own_model.certificate import Agreement, agreement, moved_at
 from models.own_model.elements import Element, drop, elements, put, tensor_of
-from models.own_model.reading import OwnModel, coordinate_names, described
+from models.own_model.reading import TwinModel, described
 from models.own_model.states import random_states
 
 STATES = 20
@@ -81,16 +81,16 @@ class Comparison:
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
 
-def compare(first: OwnModel, second: OwnModel, count: int = STATES) -> Comparison:
+def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Comparison:
     """Two files at states within the ranges of the first."""
     unmatched = _unmatched(first, second)
     if unmatched:
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
     order = [second.names.index(name) for name in first.names]
     states = list(zip(*random_states(first.model, count), strict=True))
-    own = moved_at(as_parsed(first), states)
+    twin = moved_at(as_parsed(first), states)
     other = [_permuted(each, order) for each in moved_at(as_parsed(second), _in_order(states, order))]
-    apart = agreement("the second file", own, other, first)
+    apart = agreement("the second file", twin, other, first)
     base = moved_at(equations(first, PLAIN), states)
     trial = _Trial(first, states, base)
     back = _Trial(second, _in_order(states, order), moved_at(equations(second, PLAIN), _in_order(states, order)))
@@ -111,20 +111,20 @@ def _importance(difference: Difference) -> float:
 class _Trial:
     """The first file with elements as the second has them."""
 
-    own: OwnModel
+    twin: TwinModel
     states: States
     base: list[Moved]
 
     def influence(self, model: mujoco.MjModel) -> float | None:
         """Largest relative change of accelerations by a changed model; None where it cannot be built."""
         try:
-            return agreement("", self.base, self.moved(model), self.own).acceleration
+            return agreement("", self.base, self.moved(model), self.twin).acceleration
         except RunFailed:
             return None
 
     def with_all(self, values: dict[Key, Element], differences: Sequence[Difference]) -> mujoco.MjModel:
         """The file with all elements that it has as the other has them."""
-        model = copy(self.own.model)
+        model = copy(self.twin.model)
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
             key = (each.kind, each.owner)
             if each.first is not None:
@@ -133,20 +133,20 @@ class _Trial:
 
     def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
         """The file with another value of one element."""
-        model = copy(self.own.model)
+        model = copy(self.twin.model)
         put(model, key, value)
         return model
 
     def without(self, keys: Sequence[Key]) -> mujoco.MjModel:
         """The file without those elements that it can be without."""
-        model = copy(self.own.model)
+        model = copy(self.twin.model)
         for key in keys:
             drop(model, key)
         return model
 
     def moved(self, model: mujoco.MjModel) -> list[Moved]:
         """What a changed model does at the states."""
-        return moved_at(equations(described(model, self.own.name), PLAIN), self.states)
+        return moved_at(equations(described(model, self.twin.name), PLAIN), self.states)
 
 
 def _in_order(states: States, order: list[int]) -> States:
@@ -160,52 +160,52 @@ def _permuted(moved: Moved, order: list[int]) -> Moved:
     return Moved(moved.mass[np.ix_(order, order)], moved.force[order], moved.acceleration[order])
 
 
-def _unmatched(first: OwnModel, second: OwnModel) -> list[str]:
+def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
     """Coordinates of one file that the other does not have."""
-    names = [(own.name, coordinate_names(own.model)) for own in (first, second)]
+    names = [(twin.name, twin.names) for twin in (first, second)]
     rows = list[str]()
-    for (file, own), (_, others) in (names, names[::-1]):
-        rows += [f"{name} of {file} has no partner" for name in own if name not in others]
+    for (file, listed), (_, others) in (names, names[::-1]):
+        rows += [f"{name} of {file} has no partner" for name in listed if name not in others]
     return rows
 
 
-def _differences(first: OwnModel, second: OwnModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
+def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
     """Elements that differ; trials : of the first and of the second file, None where there are no common states."""
-    rows, own, others = list[Difference](), elements(first.model), elements(second.model)
-    for key in dict.fromkeys((*own, *others)):
-        one, other = own.get(key), others.get(key)
-        if one is not None and other is not None and one.same(other):
+    rows, listed, others = list[Difference](), elements(first.model), elements(second.model)
+    for key in dict.fromkeys((*listed, *others)):
+        element, other = listed.get(key), others.get(key)
+        if element is not None and other is not None and element.same(other):
             continue
-        there = one if one is not None else other
-        if there is None or _says_nothing(there, one, other):
+        there = element if element is not None else other
+        if there is None or _says_nothing(there, element, other):
             continue
-        influence = _influence(trials, key, one, other) if trials is not None else None
-        first_value, second_value = (None if each is None else each.value for each in (one, other))
-        kind = "orientation of the inertia" if _only_turned(key[0], one, other) else key[0]
+        influence = _influence(trials, key, element, other) if trials is not None else None
+        first_value, second_value = (None if each is None else each.value for each in (element, other))
+        kind = "orientation of the inertia" if _only_turned(key[0], element, other) else key[0]
         rows.append(Difference(*key, there.unit, first_value, second_value, influence, kind))
     return rows
 
 
-def _influence(trials: tuple[_Trial, _Trial], key: Key, one: Element | None, other: Element | None) -> float | None:
+def _influence(trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None) -> float | None:
     """By taking the other's value over, or by leaving the element out of the second file, which alone has it."""
     first, second = trials
-    if one is None:
+    if element is None:
         return second.influence(second.without([key]))
-    value = np.zeros_like(one.value) if other is None else other.value
-    return first.influence(first.with_one(key, value)) if value.shape == one.value.shape else None
+    value = np.zeros_like(element.value) if other is None else other.value
+    return first.influence(first.with_one(key, value)) if value.shape == element.value.shape else None
 
 
-def _only_turned(kind: str, one: Element | None, other: Element | None) -> bool:
+def _only_turned(kind: str, element: Element | None, other: Element | None) -> bool:
     """Whether two inertias have the same principal moments."""
-    if kind != "inertia" or one is None or other is None:
+    if kind != "inertia" or element is None or other is None:
         return False
-    first, second = (np.linalg.eigvalsh(tensor_of(each.value)) for each in (one, other))
+    first, second = (np.linalg.eigvalsh(tensor_of(each.value)) for each in (element, other))
     return bool(np.abs(first - second).max() <= 1e-9 * first.max())
 
 
-def _says_nothing(there: Element, one: Element | None, other: Element | None) -> bool:
+def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
     """Whether an element that one file lacks is zero in the other."""
-    return (one is None or other is None) and not there.value.any()
+    return (element is None or other is None) and not there.value.any()
 
 
 def _shown(value: np.ndarray | None, unit: str) -> str:
@@ -217,19 +217,19 @@ def _shown(value: np.ndarray | None, unit: str) -> str:
     return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
 
 
-def culprits(own: OwnModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
+def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
     """Elements without which a build moves as the file's own model does, when both are built without each of them.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """
-    states = list(zip(*random_states(own.model, count), strict=True))
+    states = list(zip(*random_states(twin.model, count), strict=True))
     rows = list[tuple[Element, float]]()
-    for key, element in elements(own.model).items():
-        model = copy(own.model)
+    for key, element in elements(twin.model).items():
+        model = copy(twin.model)
         if not element.value.any() or not drop(model, key):
             continue
-        less = described(model, own.name)
-        seen = agreement(build, moved_at(as_parsed(less), states), moved_at(equations(less, build), states), own)
+        less = described(model, twin.name)
+        seen = agreement(build, moved_at(as_parsed(less), states), moved_at(equations(less, build), states), twin)
         if seen.alike:
             rows.append((element, seen.acceleration))
     return sorted(rows, key=lambda row: row[1])

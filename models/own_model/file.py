@@ -11,12 +11,12 @@ import numpy as np
 from models.core.errors import InputError
 from models.engines.mujoco_quiet import quiet
 from models.own_model.content import Content, check_and_leave_out, ranges
-from models.own_model.reading import OwnModel, described
+from models.own_model.reading import TwinModel, described
 from models.own_model.xml_guard import Document, guarded
 
 
 @dataclass(frozen=True, eq=False)
-class OwnFile:
+class ModelFile:
     """A file that was read.
 
     document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out; limited :
@@ -25,20 +25,20 @@ class OwnFile:
     """
 
     document: Document
-    own: OwnModel
+    twin: TwinModel
     left_out: tuple[Content, ...]
     limited: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def read(path: Path, without: Collection[str] = ()) -> OwnFile:
+def read(path: Path, without: Collection[str] = ()) -> ModelFile:
     """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``."""
     document = guarded(path)
     model, notes = _compiled(document)
     _check_sane(model, path.name)
     left_out = check_and_leave_out(model, document, without)
-    own = described(model, path.stem)
-    return OwnFile(document, own, tuple(left_out), tuple(ranges(model)), tuple(notes))
+    twin = described(model, path.stem)
+    return ModelFile(document, twin, tuple(left_out), tuple(ranges(model)), tuple(notes))
 
 
 def _compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:

@@ -17,7 +17,7 @@ from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.own_model.builds import PLAIN, plain_tree
-from models.own_model.reading import OwnModel, controls
+from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
 
 DURATION = 1.0
@@ -64,22 +64,22 @@ class PathReport:
         return rows
 
 
-def paths(own: OwnModel, step: float | None = None) -> PathReport:
+def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     """Paths over 1 s; step (s): the file's unless given."""
-    step = DURATION / np.ceil(DURATION / (step or float(own.model.opt.timestep)) - 1e-9)
-    steps, (q,), (v,) = round(DURATION / step), *random_states(own.model, 1)
+    step = DURATION / np.ceil(DURATION / (step or float(twin.model.opt.timestep)) - 1e-9)
+    steps, (q,), (v,) = round(DURATION / step), *random_states(twin.model, 1)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
-        _march(build, partial(_by_build, own, build, (q, v), (steps, step)), built, failed)
-    _march(FILE, lambda: file_path(own, (q, v), (steps, step)), built, failed)
+        _march(build, partial(_by_build, twin, build, (q, v), (steps, step)), built, failed)
+    _march(FILE, lambda: file_path(twin, (q, v), (steps, step)), built, failed)
     first = built.pop(ENGINES[0], None)
     if first is None:
-        return PathReport(step, 0.0, {}, failed, bool(own.coordinates.turnings), None)
-    disturbed = _model(own, ENGINES[1]).march(q + DISTURBED, v, steps, step)
+        return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None)
+    disturbed = _model(twin, ENGINES[1]).march(q + DISTURBED, v, steps, step)
     rows = _rows(first, disturbed, steps)
-    distances = {name: _distance(own, name, first[:rows], path[:rows]) for name, path in built.items()}
-    energy = _ledger(own, first[:rows], step)
-    return PathReport(step, (rows - 1) * step, distances, failed, bool(own.coordinates.turnings), energy)
+    distances = {name: _distance(twin, name, first[:rows], path[:rows]) for name, path in built.items()}
+    energy = _ledger(twin, first[:rows], step)
+    return PathReport(step, (rows - 1) * step, distances, failed, bool(twin.coordinates.turnings), energy)
 
 
 def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
@@ -95,26 +95,26 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
         failed[name] = "the motion blows up at this step"
 
 
-def _by_build(own: OwnModel, build: str, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float]) -> np.ndarray:
+def _by_build(twin: TwinModel, build: str, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float]) -> np.ndarray:
     """States (steps + 1, 2 n) of a build from coordinates and rates, by so many steps of so many seconds."""
-    return _model(own, build).march(*start, *grid)
+    return _model(twin, build).march(*start, *grid)
 
 
-def _model(own: OwnModel, build: str) -> FreeModel:
+def _model(twin: TwinModel, build: str) -> FreeModel:
     if build != PLAIN:
-        return free_model(build, own.driven)
-    return Plain(PLAIN, plain_tree(own).acceleration, own.size)
+        return free_model(build, twin.driven)
+    return Plain(PLAIN, plain_tree(twin).acceleration, twin.size)
 
 
 def file_path(
-    own: OwnModel, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float], integrator: str = "RK4"
+    twin: TwinModel, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float], integrator: str = "RK4"
 ) -> np.ndarray:
     """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), by so many steps of
     so many seconds."""
-    (steps, step), model, data = grid, own.model, mujoco.MjData(own.model)
+    (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
-    state = own.coordinates.to_mujoco(*start)
+    state = twin.coordinates.to_mujoco(*start)
     held = np.tile(controls(model), (steps, 1)) if model.nu else np.empty((steps, 0))
     try:
         return march(model, data, np.concatenate((state.qpos, state.qvel)), held)
@@ -129,24 +129,24 @@ def _rows(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
     return max(2, int(grown[0])) if len(grown) else steps + 1
 
 
-def _distance(own: OwnModel, name: str, first: np.ndarray, path: np.ndarray) -> float:
+def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:
     if name == FILE:
-        n = own.size
-        states = [own.coordinates.to_mujoco(row[:n], row[n:]) for row in first]
+        n = twin.size
+        states = [twin.coordinates.to_mujoco(row[:n], row[n:]) for row in first]
         first = np.array([np.concatenate((state.qpos, state.qvel)) for state in states])
-        for turning in own.coordinates.turnings:  # a quaternion and its opposite are the same
+        for turning in twin.coordinates.turnings:  # a quaternion and its opposite are the same
             at = slice(turning.place, turning.place + 4)
             path = path.copy()
             path[:, at] *= np.sign(np.einsum("tk,tk->t", path[:, at], first[:, at]))[:, None]
     return float(np.abs(path - first).max() / max(1.0, np.abs(first).max()))
 
 
-def _ledger(own: OwnModel, path: np.ndarray, step: float) -> float | None:
+def _ledger(twin: TwinModel, path: np.ndarray, step: float) -> float | None:
     """Kinetic energy less the work of all forces by Simpson's rule, as a share; None for fewer than three states."""
-    n, rows = own.size, len(path) - 1 + len(path) % 2
+    n, rows = twin.size, len(path) - 1 + len(path) % 2
     if rows < 3:
         return None
-    plain = plain_tree(own)
+    plain = plain_tree(twin)
     kinetic, power = np.empty(rows), np.empty(rows)
     for i, row in enumerate(path[:rows]):
         q, v = row[:n], row[n:]

@@ -20,7 +20,7 @@ from models.core.errors import InputError, RunFailed
 from models.engines.catalogue import CATALOGUE
 from models.own_model.builds import plain_tree
 from models.own_model.path import DURATION, LARGEST, file_path
-from models.own_model.reading import OwnModel
+from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
 ALL = "all"
@@ -43,7 +43,7 @@ USUAL_STEP = 5e-3
 class PricedModel:
     """See ``models.advice.price.OwnScene``: 1 s from a random state, as the paths of the certificate."""
 
-    own: OwnModel
+    twin: TwinModel
     quantity: str
     where = "in the engine"
     whole = first = DURATION
@@ -53,18 +53,18 @@ class PricedModel:
     @property
     def title(self) -> str:
         """Name of the model."""
-        return self.own.name
+        return self.twin.name
 
     @cached_property
     def columns(self) -> list[int]:
         """Coordinates that the quantity is."""
-        places = named_coordinates(self.own)
+        places = named_coordinates(self.twin)
         return [i for name, i in places.items() if self.quantity in (ALL, name)]
 
     @property
     def unit(self) -> str:
         """rad, m, or both."""
-        kinds = {unit_of(self.own, i) for i in self.columns}
+        kinds = {unit_of(self.twin, i) for i in self.columns}
         return kinds.pop() if len(kinds) == 1 else "rad or m"
 
     @property
@@ -81,7 +81,10 @@ class PricedModel:
         ]
 
     def _default(self, engine: str, method: str) -> float:
-        defaults = {("mujoco", "Euler"): float(self.own.model.opt.timestep), ("exudyn", "GeneralizedAlpha"): USUAL_STEP}
+        defaults = {
+            ("mujoco", "Euler"): float(self.twin.model.opt.timestep),
+            ("exudyn", "GeneralizedAlpha"): USUAL_STEP,
+        }
         wanted = defaults.get((engine, method), 0.0)
         return min(STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
@@ -95,7 +98,7 @@ class PricedModel:
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
-        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.own.model, 1)
+        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin.model, 1)
         path = self._path(setting, (q, v), steps)
         if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
             raise RunFailed(setting.engine, "the motion blows up at this step")
@@ -104,19 +107,19 @@ class PricedModel:
 
     def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
         """Values (steps + 1, k) of the quantity."""
-        own, step = self.own, setting.value
+        twin, step = self.twin, setting.value
         if setting.engine == "mujoco":
-            states = file_path(own, start, (steps, step), setting.method)
-            return own.coordinates.positions(states)[:, self.columns]
+            states = file_path(twin, start, (steps, step), setting.method)
+            return twin.coordinates.positions(states)[:, self.columns]
         if setting.engine == "exudyn":
             from models.engines.free_vehicle_exudyn import FreeExudyn
 
-            path: np.ndarray = FreeExudyn(own.driven).march(*start, steps, step, setting.method)[:, self.columns]
+            path: np.ndarray = FreeExudyn(twin.driven).march(*start, steps, step, setting.method)[:, self.columns]
             return path
         return self._exact(start, steps, step)
 
     def _exact(self, start: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
-        tree, n = plain_tree(self.own), self.own.size
+        tree, n = plain_tree(self.twin), self.twin.size
 
         def rates(t: float, state: np.ndarray) -> np.ndarray:
             return np.concatenate((state[n:], tree.acceleration(t, state[:n], state[n:])))
@@ -141,19 +144,19 @@ class PricedModel:
         return [f"exudyn.DynamicSolverType.{setting.method}, steps of {setting.value:g} s"]
 
 
-def priced(own: OwnModel, tolerance: float, quantity: str | None) -> Recommendation:
+def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommendation:
     """The cheapest settings of a model; InputError for what cannot be asked."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
-    places = named_coordinates(own)
+    places = named_coordinates(twin)
     if not places:
-        raise InputError(own.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
-    return recommend(PricedModel(own, chosen(quantity or ALL, {ALL: None, **places})), tolerance)
+        raise InputError(twin.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
+    return recommend(PricedModel(twin, chosen(quantity or ALL, {ALL: None, **places})), tolerance)
 
 
-def named_coordinates(own: OwnModel) -> dict[str, int]:
+def named_coordinates(twin: TwinModel) -> dict[str, int]:
     """Coordinates that MuJoCo has, too, by the names of their joints."""
-    names, angles = own.names, {turning.first + i for turning in own.coordinates.turnings for i in range(3)}
+    names, angles = twin.names, {turning.first + i for turning in twin.coordinates.turnings for i in range(3)}
     return {_bare(name): i for i, name in enumerate(names) if i not in angles}
 
 
@@ -162,7 +165,7 @@ def _bare(name: str) -> str:
     return name.removeprefix("joint ").replace("'", "")
 
 
-def unit_of(own: OwnModel, coordinate: int) -> str:
+def unit_of(twin: TwinModel, coordinate: int) -> str:
     """ "rad" or "m"."""
-    _, freedom = own.driven.vehicle.coordinates()[coordinate]
+    _, freedom = twin.driven.vehicle.coordinates()[coordinate]
     return "rad" if freedom.startswith("r") else "m"

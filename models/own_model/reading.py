@@ -20,7 +20,7 @@ OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL: TURNS, FREE: FREEDOMS}
 
 
 @dataclass(frozen=True, eq=False)
-class OwnModel:
+class TwinModel:
     """A file as MuJoCo parsed it (``model``), without what was left out, and the same as a description (``driven``)."""
 
     name: str
@@ -39,7 +39,7 @@ class OwnModel:
         return coordinate_names(self.model)
 
 
-def described(model: mujoco.MjModel, name: str) -> OwnModel:
+def described(model: mujoco.MjModel, name: str) -> TwinModel:
     """The model as a description; what ``content`` finds without an equal must have been left out of it before."""
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
@@ -49,7 +49,7 @@ def described(model: mujoco.MjModel, name: str) -> OwnModel:
     gravity = np.zeros(3) if _disabled(model, "GRAVITY") else np.array(model.opt.gravity)
     loads = tuple(_lifted(model, design, gravity))
     driven = Driven(vehicle, gravity, np.zeros(1), None, None, joint_parts(vehicle), loads)
-    return OwnModel(name, model, driven, Coordinates(model, design))
+    return TwinModel(name, model, driven, Coordinates(model, design))
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:

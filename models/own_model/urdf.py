@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.own_model.file import OwnFile
+from models.own_model.file import ModelFile
 from models.own_model.reading import label
 from models.vehicles.spatial import steiner
 
@@ -65,10 +65,10 @@ class _Mass:
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 
-def misread(file: OwnFile) -> list[Misread]:
+def misread(file: ModelFile) -> list[Misread]:
     """Numbers of a URDF that MuJoCo's compiled model has otherwise, each with both values."""
     root = ElementTree.fromstring(file.document.path.read_bytes())
-    model, design = file.own.model, mujoco.MjData(file.own.model)
+    model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
     links, joints = _placed(root, file.document.path.name)

@@ -9,7 +9,7 @@ from models.core.errors import InputError
 from models.own_model.certificate import Agreement, certificate
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
-from models.own_model.file import OwnFile, read
+from models.own_model.file import ModelFile, read
 from models.own_model.path import PathReport, paths
 from models.own_model.states import COUNT
 from models.own_model.urdf import Misread, misread
@@ -39,7 +39,7 @@ class Examined:
     MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
     lines on what accuracy costs."""
 
-    file: OwnFile
+    file: ModelFile
     agreements: tuple[Agreement, ...]
     explained: dict[str, list[tuple[Element, float]]]
     misread: tuple[Misread, ...]
@@ -106,7 +106,7 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
     if len(examined) < 2:
         return Twins(tuple(examined), None)
     tell("comparing the files", len(files) / parts)
-    first, second = (each.file.own for each in examined)
+    first, second = (each.file.twin for each in examined)
     names = [each.name for each in examined]
     if names[0] == names[1]:
         names = [str(path) for path in files]
@@ -118,20 +118,20 @@ def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
     tell(what, (number + share) / parts)
 
 
-def _examined(file: OwnFile, wanted: Wanted, tell: Tell) -> Examined:
+def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
     """One file: the certificate is a third of the work, paths another one, the price the last."""
-    agreements = certificate(file.own, wanted.states, lambda share: tell("comparing accelerations", share / 3))
-    explained = {each.build: culprits(file.own, each.build) for each in agreements if not each.alike}
+    agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
+    explained = {each.build: culprits(file.twin, each.build) for each in agreements if not each.alike}
     lost = misread(file) if file.document.kind == "URDF" else []
     tell("marching", 1 / 3)
-    report = paths(file.own) if wanted.paths else None
+    report = paths(file.twin) if wanted.paths else None
     price: tuple[str, ...] = ()
     if wanted.tolerance is not None:
         from models.advice.price.text import lines as price_lines
         from models.own_model.price import priced
 
         tell("pricing", 2 / 3)
-        price = tuple(price_lines(priced(file.own, wanted.tolerance, wanted.quantity)))
+        price = tuple(price_lines(priced(file.twin, wanted.tolerance, wanted.quantity)))
     return Examined(file, agreements, explained, tuple(lost), report, price)
 
 
@@ -155,9 +155,9 @@ def verdict(each: Examined) -> str:
 
 
 def _file_lines(each: Examined) -> list[str]:
-    model, own = each.file.own.model, each.file.own
+    model, twin = each.file.twin.model, each.file.twin
     rows = [
-        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {own.size} coordinates, "
+        f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
         f"{model.ntendon} tendons, {model.nu} actuators",
         f"  {verdict(each)}",
     ]

@@ -7,7 +7,7 @@ from models.core.systems import SYSTEMS, load
 from models.own_model.certificate import Agreement, certificate
 from models.own_model.content import KINDS
 from models.own_model.explain import compare
-from models.own_model.file import OwnFile, read
+from models.own_model.file import ModelFile, read
 from models.own_model.path import ALIKE, paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
@@ -33,27 +33,27 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *_path(folder), _planted(folder, quick)], {}
 
 
-def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> OwnFile:
+def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> ModelFile:
     path = folder / f"{name}{'.urdf' if '<robot' in text else '.xml'}"
     path.write_text(text, encoding="utf-8")
     return read(path, without)
 
 
-def _exported(folder: Path, name: str) -> OwnFile:
+def _exported(folder: Path, name: str) -> ModelFile:
     scene = load(SCENES / f"{name}.toml")
     answer = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, "mujoco")
     return _read(folder, f"exported_{name}", answer.text, OUTSIDE)
 
 
-def _agreement(name: str, file: OwnFile, quick: bool) -> Row:
+def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
     """The worst of all builds."""
-    agreements = certificate(file.own, QUICK_STATES if quick else STATES)
+    agreements = certificate(file.twin, QUICK_STATES if quick else STATES)
     worst: Agreement = max(agreements, key=lambda each: each.acceleration)
     return Observed(
         f"twin_files.{name}",
         SYSTEM,
         f"largest difference of accelerations in Exudyn, MuJoCo and plain equations from the file as MuJoCo parsed it, "
-        f"{file.own.size} coordinates, {name}",
+        f"{file.twin.size} coordinates, {name}",
         worst.acceleration,
         "of the largest",
     ).at_most(worst.bound, "rounding, by the condition of the mass matrix; 1e-10 or more", "native")
@@ -61,7 +61,7 @@ def _agreement(name: str, file: OwnFile, quick: bool) -> Row:
 
 def _path(folder: Path) -> list[Row]:
     """Paths over 1 s of the cart, and the balance of energy and work."""
-    report = paths(_read(folder, "cart", CART).own)
+    report = paths(_read(folder, "cart", CART).twin)
     return [
         Observed(
             "twin_files.path",
@@ -82,10 +82,10 @@ def _path(folder: Path) -> list[Row]:
 
 def _planted(folder: Path, quick: bool) -> Row:
     """How many of the planted differences are named first, with their size."""
-    first, named = _read(folder, "original", JOINTED).own, 0
+    first, named = _read(folder, "original", JOINTED).twin, 0
     chosen = PLANTED[::5] if quick else PLANTED
     for name, old, new, kind, owner, size in chosen:
-        second = _read(folder, "planted", changed(JOINTED, name, old, new)).own
+        second = _read(folder, "planted", changed(JOINTED, name, old, new)).twin
         influential = compare(first, second, 3).influential
         said = influential[0].sentence(("original", "planted")) if influential else ""
         named += said.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in said
