@@ -47,7 +47,7 @@ class PricedModel:
     quantity: str
     where = "in the engine"
     whole = first = DURATION
-    cell = 0.0
+    kink_period = 0.0
     counted = "force calls"
 
     @property

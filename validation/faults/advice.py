@@ -53,7 +53,7 @@ CLOCK = _Clock()
 class Swing:
     """See ``models.advice.price.PricedScene``. The error has grown by the end, beyond what is searched."""
 
-    title, quantity, unit, cell, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
 
     def ladders(self) -> list[Ladder]:
