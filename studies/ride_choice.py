@@ -101,7 +101,7 @@ def _runs(scene: RideScene, rest: ReducedScene) -> dict[str, Result]:
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
     single = frozenset([effect])
-    return Alone(effect, chooser.predicted(single), chooser.confirm(single), illegal(single))
+    return Alone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
 
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from models.advice.choice.choose import Chooser as ChooserByRuns
 from models.advice.ride_choice.candidates import Set, largest
 from models.advice.ride_choice.choose import Choice, Chooser
 from models.advice.ride_choice.march import longest_step
-from models.advice.ride_choice.neighbourhood import OFF, changed, parameters
+from models.advice.ride_choice.parameters import OFF, changed, parameters
 from models.advice.ride_choice.reduced import Whole
 from models.advice.ride_choice.screen import confirmed
 from models.ride.frequency import spectra

@@ -11,8 +11,8 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import Reduced, Whole
-from models.advice.ride_choice.screen import Screen, confirmed, silent
+from models.advice.ride_choice.reduced import Reduced, Vehicles, Whole
+from models.advice.ride_choice.screen import Screen, confirmed, solved_in_motions, whole_variances
 from models.core.errors import InputError
 from models.core.runge_kutta import STAGES
 from models.systems.ride.omissions import effects_of
@@ -23,6 +23,8 @@ SCREENED = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
 CERTAIN = 1e-12
 """Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
+SAME = 1e-9
+"""By how much a variance by motions may differ from the one in extended precision."""
 
 Set = frozenset[Effect]
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -49,19 +51,24 @@ class Candidates:
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
         self.answers: dict[tuple[Any, ...], Any] = {}
-        self.wholes = [Whole(scene, float(speed)) for speed in speeds]
+        vehicles = Vehicles(scene.vehicle, float(speeds[0]))
+        self.wholes = [Whole(scene, float(speed), vehicles) for speed in speeds]
         names = self.wholes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
         self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
-        self.full = [confirmed(whole.full, self.rows) for whole in self.wholes]
-        for whole, variances in zip(self.wholes, self.full, strict=True):
-            for name, variance, least in zip(quantities, variances, silent(whole.full, self.rows), strict=True):
+        self._suspects, self.full = list(self.screened), list[np.ndarray]()
+        for whole in self.wholes:
+            variances, silent = whole_variances(whole.full, self.rows)
+            self.full.append(variances)
+            for name, variance, least in zip(quantities, variances, silent, strict=True):
                 if not least < variance < inf:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
-        self.near = Neighbourhood(scene, np.asarray(speeds, float), [self._plain(name) for name in quantities])
+        self.near = Neighbourhood(
+            scene, np.asarray(speeds, float), [self._plain(name) for name in quantities], vehicles
+        )
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
@@ -75,6 +82,7 @@ class Candidates:
         name, by = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), by
 
+    @remembered
     def rest(self, chosen: Set) -> ReducedScene:
         """The scene less these effects."""
         return without(self.scene, sorted(chosen, key=lambda effect: effect.name))
@@ -104,41 +112,63 @@ class Candidates:
     @remembered
     def predicted(self, chosen: Set) -> np.ndarray:
         """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
-        return self._worst(self.screened, chosen, self._predict)
+        return largest(np.array([self._predicted_at(whole, chosen) for whole in self.screened]))
 
+    @remembered
+    def _predicted_at(self, whole: Whole, chosen: Set) -> np.ndarray:
+        return self._change(whole, chosen, self._predict)
+
+    def share(self, chosen: Set) -> float:
+        """Largest predicted change by the tolerance; inf beyond it, by whichever speed shows so first."""
+        worst = 0.0
+        for i, whole in enumerate(self._suspects):
+            share = float(abs(self._predicted_at(whole, chosen)).max()) / self.tolerance
+            if not share <= 1.0:
+                self._suspects.insert(0, self._suspects.pop(i))  # what breaks it here is likely to break the next one
+                return inf
+            worst = max(worst, share)
+        return worst
+
+    @remembered
     def confirm(self, chosen: Set) -> np.ndarray:
         """The same by the exact solve, of all listed speeds."""
-        return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
+        exactly = (self._change(whole, chosen, lambda *asked: confirmed(asked[2], self.rows)) for whole in self.wholes)
+        return largest(np.array(list(exactly)))
 
-    def certified(self, chosen: Set) -> np.ndarray:
-        """What ``confirm`` finds; inf where it holds the tolerance, but the identity of covariance and adjoint, which
-        certifies it, is not exact at a screened speed."""
-        changes = self.confirm(chosen)
-        exact = not self.holds(changes) or all(self._exact(whole, chosen) for whole in self.screened)
-        return changes if exact else np.full(len(changes), inf)
+    @remembered
+    def solved(self, chosen: Set) -> np.ndarray:
+        """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
+        return largest(np.array([self._change(whole, chosen, self._solve) for whole in self.wholes]))
+
+    def certified(self, chosen: Set) -> bool:
+        """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
+        what the motions said of them."""
+        return all(self._exact(whole, chosen) for whole in self.screened)
 
     def _exact(self, whole: Whole, chosen: Set) -> bool:
         screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
         if screen is None or reduced is None:
             return False
         two, variance = screen.identity(reduced)
-        return bool((abs(two / variance - 1.0) <= CERTAIN).all())
+        by_motions = solved_in_motions(reduced, self.rows)
+        same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= SAME).all())
+        return same and bool((abs(two / variance - 1.0) <= CERTAIN).all())
 
     def _predict(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
         screen = self.screen(whole, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
-    def _worst(
-        self, wholes: Sequence[Whole], chosen: Set, variances: Callable[[Whole, Set, Reduced], np.ndarray]
-    ) -> np.ndarray:
-        changes = []
-        for whole in wholes:
-            reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
-            left = np.full(len(full), inf)
-            with suppress(InputError):  # unstable
-                left = left if reduced is None else variances(whole, chosen, reduced)
-            changes.append(np.sqrt(left / full) - 1.0)
-        return largest(np.array(changes))
+    def _solve(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
+        variances = solved_in_motions(reduced, self.rows)
+        return confirmed(reduced, self.rows) if variances is None else variances
+
+    def _change(self, whole: Whole, chosen: Set, variances: Callable[[Whole, Set, Reduced], np.ndarray]) -> np.ndarray:
+        """Changes (quantities,) at a speed; inf where there is no system, or an unstable one."""
+        reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
+        left = np.full(len(full), inf)
+        with suppress(InputError):  # unstable
+            left = left if reduced is None else variances(whole, chosen, reduced)
+        return np.asarray(np.sqrt(left / full) - 1.0)
 
     @remembered
     def between(self, chosen: Set) -> np.ndarray:
@@ -166,9 +196,15 @@ class Candidates:
     @remembered
     def cost(self, chosen: Set) -> Cost:
         """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
-        systems = [self.system(whole, chosen) for whole in self.screened]
-        costs = (Cost(0, 0.0, inf) if system is None else cost(system) for system in systems)
+        costs = [self._cost(whole, chosen) for whole in self.screened]
         return max(costs, key=lambda c: c.calls)
+
+    def _cost(self, whole: Whole, chosen: Set) -> Cost:
+        rest = self.rest(chosen)
+        try:
+            return cost(whole.vehicles.of(rest, whole.speed), whole.road(rest))
+        except InputError:
+            return Cost(0, 0.0, inf)
 
     @remembered
     def accurate(self, chosen: Set) -> Cost:
