@@ -11,7 +11,7 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import Reduced, Vehicles, Whole
+from models.advice.ride_choice.reduced import Reduced, Vehicles, Whole, of_speed
 from models.advice.ride_choice.screen import Screen, confirmed, solved_in_motions, whole_variances
 from models.core.errors import InputError
 from models.core.runge_kutta import STAGES
@@ -51,8 +51,8 @@ class Candidates:
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
         self.answers: dict[tuple[Any, ...], Any] = {}
-        vehicles = Vehicles(scene.vehicle, float(speeds[0]))
-        self.wholes = [Whole(scene, float(speed), vehicles) for speed in speeds]
+        self.vehicles, self.solved_equations = Vehicles(scene.vehicle, float(speeds[0])), 0
+        self.wholes = [Whole(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.wholes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
@@ -66,9 +66,8 @@ class Candidates:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
-        self.near = Neighbourhood(
-            scene, np.asarray(speeds, float), [self._plain(name) for name in quantities], vehicles
-        )
+        plain = [self._plain(name) for name in quantities]
+        self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
@@ -81,6 +80,11 @@ class Candidates:
         weighted = {f"{name} {by}": (name, by) for name, by in self.scene.ride.weighting.items()}
         name, by = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), by
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Vehicles that were made, each with an eigenvalue problem, and Lyapunov equations that were solved."""
+        return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
 
     @remembered
     def rest(self, chosen: Set) -> ReducedScene:
@@ -104,6 +108,7 @@ class Candidates:
     @remembered
     def _screen(self, whole: Whole, base: Set) -> Screen | None:
         reduced = self.system(whole, base)
+        self.solved_equations += 1 + len(self.rows)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
         except InputError:
@@ -132,8 +137,7 @@ class Candidates:
     @remembered
     def confirm(self, chosen: Set) -> np.ndarray:
         """The same by the exact solve, of all listed speeds."""
-        exactly = (self._change(whole, chosen, lambda *asked: confirmed(asked[2], self.rows)) for whole in self.wholes)
-        return largest(np.array(list(exactly)))
+        return largest(np.array([self._change(whole, chosen, self._confirm) for whole in self.wholes]))
 
     @remembered
     def solved(self, chosen: Set) -> np.ndarray:
@@ -149,6 +153,7 @@ class Candidates:
         screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
         if screen is None or reduced is None:
             return False
+        self.solved_equations += 1 + len(self.rows)
         two, variance = screen.identity(reduced)
         by_motions = solved_in_motions(reduced, self.rows)
         same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= SAME).all())
@@ -158,7 +163,12 @@ class Candidates:
         screen = self.screen(whole, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
+    def _confirm(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
+        self.solved_equations += 1
+        return confirmed(reduced, self.rows)
+
     def _solve(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
+        self.solved_equations += 1
         variances = solved_in_motions(reduced, self.rows)
         return confirmed(reduced, self.rows) if variances is None else variances
 
@@ -196,11 +206,12 @@ class Candidates:
     @remembered
     def cost(self, chosen: Set) -> Cost:
         """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
-        costs = [self._cost(whole, chosen) for whole in self.screened]
+        rest = self.rest(chosen)
+        alike = of_speed(rest.vehicle, 0.0) is None
+        costs = [self._cost(whole, rest) for whole in (self.screened[:1] if alike else self.screened)]
         return max(costs, key=lambda c: c.calls)
 
-    def _cost(self, whole: Whole, chosen: Set) -> Cost:
-        rest = self.rest(chosen)
+    def _cost(self, whole: Whole, rest: ReducedScene) -> Cost:
         try:
             return cost(whole.vehicles.of(rest, whole.speed), whole.road(rest))
         except InputError:

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, matrix_balance
 
 from models.ride.weighting import WEIGHTINGS
 
 PARALLEL = 1e6
-"""Sum of |V| |W| on the diagonal, by which rounding grows, beyond which motions are too much alike to tell."""
+"""Product of the sizes of a column of V and a row of W, by which rounding grows, beyond which motions are too much
+alike to tell."""
 INVERSE = 1e-9
 """By how much W V may differ from the unit matrix."""
 
@@ -29,11 +30,16 @@ class Modes:
     V: np.ndarray
     W: np.ndarray
 
-    @property
-    def told_apart(self) -> bool:
-        """Whether no two motions are so much alike that the form is of no use; scales of states have no part in it."""
-        off = abs(self.W @ self.V - np.eye(len(self.rates))).max(initial=0.0)
-        return bool(off <= INVERSE and (abs(self.V) * abs(self.W).T).sum(axis=1).max(initial=0.0) <= PARALLEL)
+    def of(self, A: np.ndarray) -> "Modes | None":
+        """These, if they are those of A and no two are so much alike that they are of no use; else None.
+
+        The states are scaled as they balance A, so that units have no part in it.
+        """
+        scale = matrix_balance(A, permute=False, separate=True)[1][0]
+        V, W = self.V / scale[:, None], self.W * scale
+        off = abs(W @ V - np.eye(len(A))).max(initial=0.0)
+        grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
+        return self if off <= INVERSE and grows <= PARALLEL else None
 
     def moved(self, time: float, B: np.ndarray) -> np.ndarray:
         """e^(A t) B (n, k), after a time (s)."""
@@ -58,10 +64,9 @@ def modes_of(A: np.ndarray) -> Modes | None:
     """Motions of x' = A x, A (n, n); None where they cannot be told apart."""
     rates, V = np.linalg.eig(A)
     try:
-        modes = Modes(rates, V, np.linalg.inv(V))
+        return Modes(rates, V, np.linalg.inv(V)).of(A)
     except np.linalg.LinAlgError:
         return None
-    return modes if modes.told_apart else None
 
 
 def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
@@ -82,15 +87,14 @@ def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> 
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
     """Motions of a vehicle behind its axles' filters F (m, m), the state (x, f), A that of both."""
-    n, each = len(A) - axles * len(F), _filter(F.tobytes(), len(F))
-    if each is None or vehicle is None:
+    n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
+    if road is None or vehicle is None:
         return None
-    road = Modes(np.tile(each.rates, axles), block_diag(*[each.V] * axles), block_diag(*[each.W] * axles))
     both = driven(road, A[:n, n:], vehicle)
     if both is None:
         return None
     order = np.roll(np.arange(len(A)), n)
-    return _told(Modes(both.rates, both.V[order], both.W[:, order]))
+    return Modes(both.rates, both.V[order], both.W[:, order]).of(A)
 
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
@@ -102,16 +106,16 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
     filters = [part for part in parts if part]
     V, W = (block_diag(*(getattr(part, key) for part in filters)) for key in ("V", "W"))
     together = Modes(np.concatenate([part.rates for part in filters]), V, W)
-    return _told(driven(system, A[n:, :n], together))
+    both = driven(system, A[n:, :n], together)
+    return None if both is None else both.of(A)
 
 
-def _told(modes: Modes | None) -> Modes | None:
-    return modes if modes is not None and modes.told_apart else None
-
-
-@lru_cache(maxsize=64)
-def _filter(F: bytes, size: int) -> Modes | None:
-    return modes_of(np.frombuffer(F).reshape(size, size))
+@lru_cache(maxsize=256)
+def _filters(F: bytes, size: int, axles: int) -> Modes | None:
+    each = modes_of(np.frombuffer(F).reshape(size, size))
+    if each is None:
+        return None
+    return Modes(np.tile(each.rates, axles), block_diag(*[each.V] * axles), block_diag(*[each.W] * axles))
 
 
 @lru_cache(maxsize=16)

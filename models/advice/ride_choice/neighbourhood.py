@@ -51,7 +51,10 @@ class Spectra:
 
 
 class Neighbourhood:
-    """A scene's quantities (outputs with the names of their weightings, or "") at all speeds (m/s) of its range."""
+    """A scene's quantities (outputs with the names of their weightings, or "") at all speeds (m/s) of its range.
+
+    off : vehicles with parameters off that were made.
+    """
 
     def __init__(
         self,
@@ -62,7 +65,8 @@ class Neighbourhood:
     ) -> None:
         self.scene, self.quantities = scene, quantities
         self.speeds = speeds_between(scene, listed)
-        self.vehicles = vehicles or Vehicles(scene.vehicle, float(self.speeds[0]))
+        self.vehicles = Vehicles(scene.vehicle, float(self.speeds[0])) if vehicles is None else vehicles
+        self.off = 0
         self.parameters = parameters(scene.vehicle)
         self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, FEW).round().astype(int))]
         self._shifts: dict[Hashable, Shifts] = {}
@@ -74,7 +78,9 @@ class Neighbourhood:
             return np.asarray(np.sqrt(self._variances(rest, self.vehicles) / self.whole) - 1.0)
         scene, rest = (replace(each, vehicle=changed(each.vehicle, factors)) for each in (self.scene, rest))
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]))
-        return np.asarray(np.sqrt(self._variances(rest, vehicles) / self._variances(scene, vehicles)) - 1.0)
+        changes = np.sqrt(self._variances(rest, vehicles) / self._variances(scene, vehicles)) - 1.0
+        self.off += len(vehicles)
+        return np.asarray(changes)
 
     def corners(self, rest: ReducedScene) -> list[dict[Parameter, float]]:
         """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few

@@ -86,6 +86,9 @@ class Vehicles:
         self._linear: dict[Hashable, LinearVehicle] = {}
         self.mass = self.linear(whole, speed).mass
 
+    def __len__(self) -> int:
+        return len(self._made)
+
     def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The vehicle of a scene at a speed (m/s); InputError where nothing sensible is left."""
         key = scene.vehicle, scene.limits, of_speed(scene.vehicle, speed)
@@ -119,7 +122,7 @@ class Whole:
 
     def __init__(self, scene: ReducedScene, speed: float, vehicles: Vehicles | None = None) -> None:
         self.scene, self.speed = scene, speed
-        self.vehicles = vehicles or Vehicles(scene.vehicle, speed)
+        self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
         self.linear = self.vehicles.linear(scene.vehicle, speed)
         self.excitation = scene.excitation()
         self._made: dict[Hashable, Reduced] = {}
