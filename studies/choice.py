@@ -137,7 +137,14 @@ def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
 def search(scene: Any) -> str:
     """Text on the number of runs that a search for a scene's choice may take."""
     if has_closed_form(scene):
-        return "  choice     by a closed form, without runs in time"
+        from models.advice.ride_choice.estimate import estimate
+
+        takes = estimate(scene)
+        return (
+            f"  choice     by a closed form, without runs in time: among {takes.effects} effects, "
+            f"{takes.states} states and {takes.speeds} speeds, about {takes.seconds:.1g} s of the processor "
+            "to a factor of two"
+        )
     runs = Variants(scene, engine_of(scene, ()))
     return (
         f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUNS} runs of the "

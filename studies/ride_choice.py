@@ -78,7 +78,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         write(chooser.rest(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
     results = _runs(scene, chooser.rest(frozenset(choice.left_out)))
-    _save(scene, alone, choice, watts, results, folder)
+    _save(scene, alone, choice, watts, (results, chooser.counts), folder)
     choice_figure(scene, alone, choice, watts, results, folder / "choice.png")
     return {
         "scene": scene.title,
@@ -101,7 +101,7 @@ def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
     single = frozenset([effect])
-    return Alone(effect, chooser.predicted(single), chooser.confirm(single), illegal(single))
+    return Alone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
 
 
 def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
@@ -135,13 +135,14 @@ def _save(
     alone: list[Alone],
     choice: RideChoice,
     watts: dict[str, float],
-    results: dict[str, Result],
+    runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
     """Save the changes by leaving out each effect alone, predicted and confirmed, and whether it was left out; a CSV of
     these and one of the energy activity of every element beside."""
     import pandas as pd
 
+    results, counts = runs
     told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in alone]}
     changes = {
         part: np.array([getattr(each, part) for each in alone]).reshape(-1, len(scene.quantities))
@@ -156,7 +157,7 @@ def _save(
         channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
         {name: Channel(name, values) for name, values in axes.items()},
         engine="reference",
-        counts={"confirmations": choice.rounds},
+        counts={"confirmations": choice.rounds} | counts,
     )
     inherited(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
     told |= {

@@ -8,9 +8,11 @@ import pytest
 import xarray
 
 from models.advice.ride_choice.choose import Chooser
-from models.advice.ride_choice.march import March, stable_step
+from models.advice.ride_choice.march import March
 from models.advice.ride_choice.marched import confirms, marched
-from models.advice.ride_choice.neighbourhood import Neighbourhood, changed
+from models.advice.ride_choice.modes import stable_step
+from models.advice.ride_choice.neighbourhood import Neighbourhood
+from models.advice.ride_choice.parameters import changed
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.errors import InputError

@@ -9,7 +9,7 @@ of the response times its transpose, so obeys one Lyapunov equation for any numb
 Delays of zero make the axles one input; those without end make them independent.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -116,27 +116,37 @@ def hits(system: DelayedSystem) -> Hits:
     return Hits(B, D, delays, False)
 
 
-def _responses(A: np.ndarray, met: Hits) -> list[np.ndarray]:
+Moved = Callable[[float, np.ndarray], np.ndarray]
+"""e^(A t) B of a time (s) and B (n, k)."""
+
+
+def _responses(A: np.ndarray, met: Hits, moved: Moved | None = None) -> list[np.ndarray]:
     """F_j, the response just before each hit: zero for noise that no axle has met before."""
+    if moved is None:
+
+        def moved(time: float, B: np.ndarray) -> np.ndarray:
+            return np.asarray(expm(A * time) @ B)
+
     before = [np.zeros_like(met.B[0])]
     for j in range(1, len(met.B)):
         none = met.independent or len(A) == 0
         step = met.delays[j] - met.delays[j - 1]
-        before.append(np.zeros_like(met.B[0]) if none else expm(A * step) @ (before[-1] + met.B[j - 1]))
+        before.append(np.zeros_like(met.B[0]) if none else moved(step, before[-1] + met.B[j - 1]))
     return before
 
 
-def noise_of(system: DelayedSystem) -> np.ndarray:
+def noise_of(system: DelayedSystem, moved: Moved | None = None) -> np.ndarray:
     """``intensity`` of a system's own noise, in double precision."""
-    return intensity(system.A, hits(system)).astype(float)
+    return intensity(system.A, hits(system), moved).astype(float)
 
 
-def intensity(A: np.ndarray, met: Hits) -> np.ndarray:
+def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarray:
     """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact.
 
-    Squares in extended precision: where two axles' noises cancel in an output, so do the squares of their rounding.
+    ``moved`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
+    noises cancel in an output, so do the squares of their rounding.
     """
-    before, at = ([each.astype(np.longdouble) for each in part] for part in (_responses(A, met), met.B))
+    before, at = ([each.astype(np.longdouble) for each in part] for part in (_responses(A, met, moved), met.B))
     return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, at, strict=True)))
 
 

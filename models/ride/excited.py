@@ -15,7 +15,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle, Rows
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> Del
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
     if singular(vehicle.mass):
-        return first_order(vehicle, excitation, speed)[0]
+        return first_order(vehicle, vehicle_states(vehicle), excitation, speed)[0]
     n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
     by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     by_road = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
@@ -93,47 +93,76 @@ def singular(mass: np.ndarray) -> bool:
     return bool(_split(mass)[1].size)
 
 
+@dataclass(frozen=True)
+class VehicleStates:
+    """A vehicle under generalised forces g (n,), of first order: x' = A x + B g, q = Q x + direct g.
+
+    The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
+    inert, slow: a and b by q.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    Q: np.ndarray
+    direct: np.ndarray
+    inert: np.ndarray
+    slow: np.ndarray
+
+
+def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
+    """States of a vehicle whose mass may be singular; InputError where nothing holds a body without mass."""
+    Y, Z = _split(vehicle.mass)
+    V, E = (Z @ part for part in _split(Z.T @ vehicle.damping @ Z))
+    n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
+    q_a, v_a, q_b = np.split(np.eye(2 * a + b), [a, 2 * a])
+    q, direct = Y @ q_a + V @ q_b, np.zeros((n, n))
+    if E.shape[1]:
+        elastic = E.T @ vehicle.stiffness
+        direct = E @ _solved(elastic @ E, E.T)
+        q = q - direct @ (vehicle.stiffness @ q)
+    # forces by the state and by g, on what is inert and on what dampers hold back
+    force = np.hstack([-vehicle.stiffness @ q - vehicle.damping @ Y @ v_a, np.eye(n) - vehicle.stiffness @ direct])
+    slow = _solved(V.T @ vehicle.damping @ V, V.T @ force)
+    inert = _solved(Y.T @ vehicle.mass @ Y, Y.T @ (force - vehicle.damping @ V @ slow))
+    A, B = np.split(np.vstack([np.hstack([v_a, np.zeros((a, n))]), inert, slow]), [2 * a + b], axis=1)
+    back = np.linalg.inv(np.hstack([Y, V, E]))
+    return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
+
+
 def first_order(
-    vehicle: LinearVehicle, excitation: Excitation, speed: float
-) -> tuple[DelayedSystem, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """The system with state (a, a', b, f), r by its state (n, x), and a and b by r; the mass may be singular.
+    vehicle: LinearVehicle, states: VehicleStates, excitation: Excitation, speed: float
+) -> tuple[DelayedSystem, np.ndarray]:
+    """The system with state (a, a', b, f), and r by its state (n, x); the mass may be singular.
 
     C and D are without rounding; what would see the derivative of white noise has infinite D.
     """
-    Y, Z = _split(vehicle.mass)
-    V, E = (Z @ part for part in _split(Z.T @ vehicle.damping @ Z))
-    heights = np.hstack(excitation.heights)
-    a, b, k, axles = Y.shape[1], V.shape[1], excitation.G.shape[1], len(excitation.heights)
-    q_a, v_a, q_b, f = np.split(np.eye(2 * a + b + heights.shape[1]), [a, 2 * a, 2 * a + b])
-    path = speed * np.kron(np.eye(axles), excitation.F)
-    z, rate = heights @ f, heights @ path @ f
-    noise = [speed**0.5 * np.kron(np.eye(axles)[:, [i]], excitation.G) for i in range(axles)]
-    q = Y @ q_a + V @ q_b
-    if E.shape[1]:
-        elastic = E.T @ vehicle.stiffness
-        q = q + E @ _solved(elastic @ E, E.T @ vehicle.road_stiffness @ z - elastic @ q)
-    force: np.ndarray = vehicle.road_stiffness @ z + vehicle.road_damping @ rate - vehicle.stiffness @ q
-    direct = [vehicle.road_damping @ heights @ each for each in noise]
-    force = force - vehicle.damping @ Y @ v_a
-    damped, pull, inert = V.T @ vehicle.damping @ V, vehicle.damping @ V, Y.T @ vehicle.mass @ Y
-    slow, slow_noise = _solved(damped, V.T @ force), [_solved(damped, V.T @ each) for each in direct]
-    A = np.vstack([v_a, _solved(inert, Y.T @ (force - pull @ slow)), slow, path @ f])
-    B = [
-        np.vstack([np.zeros((a, k)), _solved(inert, Y.T @ (d - pull @ s)), s, w])
-        for d, s, w in zip(direct, slow_noise, noise, strict=True)
-    ]
-    back = np.linalg.inv(np.hstack([Y, V, E]))
-    read, v = vehicle.read, q @ A
-    C = read.displacement @ q + read.rate @ v + read.acceleration @ v @ A + read.road @ z
-    C = C + read.road_rate @ rate
-    D = []
-    for onto, w in zip(B, [heights @ each for each in noise], strict=True):
-        seen = read.rate @ q @ onto + read.acceleration @ v @ onto + read.road_rate @ w
-        size = abs(read.rate) @ abs(q) @ abs(onto) + abs(read.acceleration) @ abs(v) @ abs(onto)
-        told = abs(seen) > NOTHING * (size + abs(read.road_rate) @ abs(w))
-        worse = abs(read.acceleration @ (q @ onto)) > NOTHING * (abs(read.acceleration) @ abs(q) @ abs(onto))
-        D.append(np.where(worse, np.inf, np.where(told, seen, 0.0)))
-    return _system(vehicle, excitation, speed, A, B, C, D), q, (back[:a], back[a : a + b])
+    x, heights, axles = len(states.A), np.hstack(excitation.heights), len(excitation.heights)
+    m, k = excitation.G.shape
+    path, each = np.zeros((axles * m,) * 2), np.zeros((axles, axles * m, k))
+    for i in range(axles):
+        at = slice(i * m, (i + 1) * m)
+        path[at, at], each[i, at] = speed * excitation.F, speed**0.5 * excitation.G
+    stiff, rate = vehicle.road_stiffness @ heights, heights @ path
+    by_rate = states.B @ vehicle.road_damping
+    A = np.zeros((x + axles * m,) * 2)
+    A[:x, :x], A[x:, x:] = states.A, path
+    A[:x, x:] = states.B @ stiff + by_rate @ rate
+    noise = heights @ each
+    B = np.concatenate([by_rate @ noise, each], axis=1)
+    q, read = np.hstack([states.Q, states.direct @ stiff]), vehicle.read
+    v = q @ A
+    C = read.displacement @ q + read.rate @ v + read.acceleration @ v @ A
+    C[:, x:] += read.road @ heights + read.road_rate @ rate
+    return _system(vehicle, excitation, speed, A, B, C, _direct(read, q, v, B, noise)), q
+
+
+def _direct(read: Rows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
+    seen = read.rate @ q @ B + read.acceleration @ v @ B + read.road_rate @ noise
+    size = abs(read.rate) @ abs(q) @ abs(B) + abs(read.acceleration) @ abs(v) @ abs(B)
+    told = abs(seen) > NOTHING * (size + abs(read.road_rate) @ abs(noise))
+    worse = abs(read.acceleration @ (q @ B)) > NOTHING * (abs(read.acceleration) @ abs(q) @ abs(B))
+    return np.where(worse, np.inf, np.where(told, seen, 0.0))
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, without
 from validation.choice.judged import asked, changes_by_frequency, measured_step, worst_nearby
+from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.drawn_rides import Drawn, drawn
 
@@ -87,7 +88,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ]
     rows = [*_kept_rows(choices), _identity_row(choices), *_equal_rows(choices)]
     if not quick:
-        rows += [_prediction_row(choices), _saving_row(choices)]
+        rows += [_prediction_row(choices), _saving_row(choices), *_count_rows()]
     pair_rows, pair = _pair()
     return [*rows, *pair_rows, *_activity_rows()], {"scenes": [_shown(choice) for choice in choices], "pair": pair}
 
@@ -214,6 +215,27 @@ def _saving_row(choices: list[Judged]) -> Row:
         float(np.median(saved)),
         "times",
     ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
+
+
+def _count_rows() -> list[Row]:
+    """What the choice solves for a car of 19 degrees of freedom; seconds are on the page of prices."""
+    chooser = Chooser.of(whole_car())
+    chooser.choose()
+    pairs = len(chooser.effects) ** 2
+    return [
+        Observed(
+            f"choice_linear.{name.replace(' ', '_')}",
+            SYSTEM,
+            f"{name} of a choice for a car of 19 degrees of freedom, by the square of its {len(chooser.effects)} "
+            f"effects ({chooser.counts[name]:,})",
+            chooser.counts[name] / pairs,
+            "",
+        ).at_most(most, why, "none")
+        for name, most, why in (
+            ("eigenvalue problems", 1.0, "what is left of the vehicle is made once, for all its speeds and roads"),
+            ("Lyapunov equations", 2.0, "what is screened is not solved, and what is refused is not certified"),
+        )
+    ]
 
 
 def _paper() -> Chooser:

@@ -11,9 +11,9 @@ import numpy as np
 from models.advice.choice.choose import Choice as ChoiceByRuns
 from models.advice.choice.choose import Chooser as ChooserByRuns
 from models.advice.ride_choice.candidates import Set, largest
-from models.advice.ride_choice.choose import Chooser, RideChoice
+from models.advice.ride_choice.choose import Choice, Chooser
 from models.advice.ride_choice.march import longest_step
-from models.advice.ride_choice.neighbourhood import OFF, changed, parameters
+from models.advice.ride_choice.parameters import OFF, changed, parameters
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import confirmed
 from models.ride.frequency import spectra
@@ -29,11 +29,11 @@ OMEGA = np.geomspace(1e-2, 3e5, 3000)
 
 
 def asked(drawn: Drawn) -> Chooser:
-    """Chooser over a range of speeds about that of the scene."""
+    """Of a range of speeds about that of the scene."""
     return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
 
 
-def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
+def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
     """Changes (quantities,) of the worst listed speed."""
     left = without(chooser.scene, choice.left_out)
     ratios = [
@@ -43,10 +43,10 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     return largest(np.sqrt(ratios) - 1)
 
 
-def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+def _by_frequency(whole: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
-    rest = full_scene.reduced(scene)
-    densities = spectra(rest.vehicle, rest.excitation, full_scene.speed, OMEGA)[:, rows]
+    rest = whole.reduced(scene)
+    densities = spectra(rest.vehicle, rest.excitation, whole.speed, OMEGA)[:, rows]
     return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 

@@ -82,7 +82,7 @@ class Sampled:
         """Quantities by an axle's filters (q, m)."""
         m = len(self._rate)
         at = self.march.vehicle + axle * m
-        return self.march.heard(np.eye(self.march.reduced.states))[:, at : at + m]
+        return self.march.read[:, at : at + m]
 
     @cached_property
     def _grown(self) -> np.ndarray:

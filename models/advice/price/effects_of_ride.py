@@ -71,7 +71,7 @@ def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
 
 def _counts(system: Reduced) -> dict[str, int]:
     """States, and calls per second of motion at the step limit."""
-    of_run = cost(system)
+    of_run = cost(system.of_vehicle, system.excitation)
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 

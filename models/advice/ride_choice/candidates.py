@@ -1,4 +1,4 @@
-"""Changes and savings by leaving out any set of effects of a ride: predicted, confirmed, examined
+"""What any set of effects changes and costs that a scene's quantities may do without: predicted, confirmed, looked at
 nearby, and run."""
 
 from collections.abc import Callable, Sequence
@@ -11,8 +11,8 @@ import numpy as np
 
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.reduced import FullScene, Reduced
-from models.advice.ride_choice.screen import Screen, confirmed, silent
+from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, of_speed
+from models.advice.ride_choice.screen import Screen, confirmed, solved_in_motions, whole_variances
 from models.core.errors import InputError
 from models.core.runge_kutta import STAGES
 from models.systems.ride.omissions import effects_of
@@ -23,6 +23,8 @@ SCREENED = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
 CERTAIN = 1e-12
 """Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
+SAME = 1e-9
+"""By how much a variance by motions may differ from the one in extended precision."""
 
 Set = frozenset[Effect]
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -49,23 +51,27 @@ class Candidates:
     ) -> None:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
         self.answers: dict[tuple[Any, ...], Any] = {}
-        self.wholes = [FullScene(scene, float(speed)) for speed in speeds]
+        self.vehicles, self.solved_equations = Vehicles(scene.vehicle, float(speeds[0])), 0
+        self.wholes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.wholes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
         self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
-        self.full = [confirmed(whole.full, self.rows) for whole in self.wholes]
-        for whole, variances in zip(self.wholes, self.full, strict=True):
-            for name, variance, least in zip(quantities, variances, silent(whole.full, self.rows), strict=True):
+        self._suspects, self.full = list(self.screened), list[np.ndarray]()
+        for whole in self.wholes:
+            variances, silent = whole_variances(whole.full, self.rows)
+            self.full.append(variances)
+            for name, variance, least in zip(quantities, variances, silent, strict=True):
                 if not least < variance < inf:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
-        self.near = Neighbourhood(scene, np.asarray(speeds, float), [self._plain(name) for name in quantities])
+        plain = [self._plain(name) for name in quantities]
+        self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
-        """The candidate effects of a scene that asks for a choice."""
+        """Those of a scene that asks for a choice."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
@@ -75,27 +81,34 @@ class Candidates:
         name, by = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), by
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Vehicles that were made, each with an eigenvalue problem, and Lyapunov equations that were solved."""
+        return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
+
+    @remembered
     def rest(self, chosen: Set) -> ReducedScene:
-        """The reduced scene without these effects."""
+        """The scene less these effects."""
         return without(self.scene, sorted(chosen, key=lambda effect: effect.name))
 
     @remembered
-    def system(self, full_scene: FullScene, chosen: Set) -> Reduced | None:
-        """System matrices of the scene without these effects at a speed; None where no sensible vehicle remains."""
+    def system(self, whole: FullScene, chosen: Set) -> Reduced | None:
+        """The scene less these effects at a speed; None where nothing sensible is left."""
         try:
-            return full_scene.reduced(self.rest(chosen))
+            return whole.reduced(self.rest(chosen))
         except InputError:
             return None
 
-    def screen(self, full_scene: FullScene, chosen: Set) -> Screen | None:
+    def screen(self, whole: FullScene, chosen: Set) -> Screen | None:
         """Covariance and adjoints of the scene less the singular ones of these effects."""
         base = frozenset(effect for effect in chosen if effect.singular)
         needs = {name for effect in base for name in effect.needs}
-        return self._screen(full_scene, base | {effect for effect in chosen if effect.name in needs})
+        return self._screen(whole, base | {effect for effect in chosen if effect.name in needs})
 
     @remembered
-    def _screen(self, full_scene: FullScene, base: Set) -> Screen | None:
-        reduced = self.system(full_scene, base)
+    def _screen(self, whole: FullScene, base: Set) -> Screen | None:
+        reduced = self.system(whole, base)
+        self.solved_equations += 1 + len(self.rows)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
         except InputError:
@@ -104,41 +117,70 @@ class Candidates:
     @remembered
     def predicted(self, chosen: Set) -> np.ndarray:
         """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
-        return self._worst(self.screened, chosen, self._predict)
+        return largest(np.array([self._predicted_at(whole, chosen) for whole in self.screened]))
 
+    @remembered
+    def _predicted_at(self, whole: FullScene, chosen: Set) -> np.ndarray:
+        return self._change(whole, chosen, self._predict)
+
+    def share(self, chosen: Set) -> float:
+        """Largest predicted change by the tolerance; inf beyond it, by whichever speed shows so first."""
+        worst = 0.0
+        for i, whole in enumerate(self._suspects):
+            share = float(abs(self._predicted_at(whole, chosen)).max()) / self.tolerance
+            if not share <= 1.0:
+                self._suspects.insert(0, self._suspects.pop(i))  # what breaks it here is likely to break the next one
+                return inf
+            worst = max(worst, share)
+        return worst
+
+    @remembered
     def confirm(self, chosen: Set) -> np.ndarray:
-        """Relative changes by leaving effects out, from the exact solve at all listed speeds."""
-        return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
+        """The same by the exact solve, of all listed speeds."""
+        return largest(np.array([self._change(whole, chosen, self._confirm) for whole in self.wholes]))
 
-    def certified(self, chosen: Set) -> np.ndarray:
-        """Changes by ``confirm``; inf where it holds the tolerance, but the identity of covariance and adjoint, which
-        certifies it, is not exact at a screened speed."""
-        changes = self.confirm(chosen)
-        exact = not self.holds(changes) or all(self._exact(whole, chosen) for whole in self.screened)
-        return changes if exact else np.full(len(changes), inf)
+    @remembered
+    def solved(self, chosen: Set) -> np.ndarray:
+        """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
+        return largest(np.array([self._change(whole, chosen, self._solve) for whole in self.wholes]))
 
-    def _exact(self, full_scene: FullScene, chosen: Set) -> bool:
-        screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, chosen)
+    def certified(self, chosen: Set) -> bool:
+        """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
+        what the motions said of them."""
+        return all(self._exact(whole, chosen) for whole in self.screened)
+
+    def _exact(self, whole: FullScene, chosen: Set) -> bool:
+        screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
         if screen is None or reduced is None:
             return False
+        self.solved_equations += 1 + len(self.rows)
         two, variance = screen.identity(reduced)
-        return bool((abs(two / variance - 1.0) <= CERTAIN).all())
+        by_motions = solved_in_motions(reduced, self.rows)
+        same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= SAME).all())
+        return same and bool((abs(two / variance - 1.0) <= CERTAIN).all())
 
-    def _predict(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
-        screen = self.screen(full_scene, chosen)
+    def _predict(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+        screen = self.screen(whole, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
-    def _worst(
-        self, wholes: Sequence[FullScene], chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
+    def _confirm(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+        self.solved_equations += 1
+        return confirmed(reduced, self.rows)
+
+    def _solve(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+        self.solved_equations += 1
+        variances = solved_in_motions(reduced, self.rows)
+        return confirmed(reduced, self.rows) if variances is None else variances
+
+    def _change(
+        self, whole: FullScene, chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
     ) -> np.ndarray:
-        changes = []
-        for whole in wholes:
-            reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
-            left = np.full(len(full), inf)
-            with suppress(InputError):  # unstable
-                left = left if reduced is None else variances(whole, chosen, reduced)
-            changes.append(np.sqrt(left / full) - 1.0)
-        return largest(np.array(changes))
+        """Changes (quantities,) at a speed; inf where there is no system, or an unstable one."""
+        reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
+        left = np.full(len(full), inf)
+        with suppress(InputError):  # unstable
+            left = left if reduced is None else variances(whole, chosen, reduced)
+        return np.asarray(np.sqrt(left / full) - 1.0)
 
     @remembered
     def between(self, chosen: Set) -> np.ndarray:
@@ -150,7 +192,7 @@ class Candidates:
 
     @remembered
     def off(self, chosen: Set) -> np.ndarray:
-        """Relative changes with parameters varied to the corner that is worst for each quantity."""
+        """The same with parameters off, in the corner that is worst for each quantity."""
         rest = self.rest(chosen)
         return largest(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 
@@ -165,16 +207,21 @@ class Candidates:
 
     @remembered
     def cost(self, chosen: Set) -> Cost:
-        """Cost of a run without these effects at the longest stable step of the dearest screened speed; infinite where
-        no sensible vehicle remains."""
-        systems = [self.system(whole, chosen) for whole in self.screened]
-        costs = (Cost(0, 0.0, inf) if system is None else cost(system) for system in systems)
+        """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
+        rest = self.rest(chosen)
+        alike = of_speed(rest.vehicle, 0.0) is None
+        costs = [self._cost(whole, rest) for whole in (self.screened[:1] if alike else self.screened)]
         return max(costs, key=lambda c: c.calls)
+
+    def _cost(self, whole: FullScene, rest: ReducedScene) -> Cost:
+        try:
+            return cost(whole.vehicles.of(rest, whole.speed), whole.road(rest))
+        except InputError:
+            return Cost(0, 0.0, inf)
 
     @remembered
     def accurate(self, chosen: Set) -> Cost:
-        """Cost of a run at the longest step that keeps the tolerance at all screened speeds, what is left out and steps
-        together."""
+        """At the longest step that keeps the tolerance at all screened speeds, what is left out and steps together."""
         return self.at_step(chosen, longest_step(self.marches(chosen), self.exact(), self.tolerance))
 
     def exact(self) -> list[np.ndarray]:
@@ -193,5 +240,5 @@ class Candidates:
 
 
 def largest(changes: np.ndarray) -> np.ndarray:
-    """The largest change of each quantity among changes (n, quantities), with its sign."""
+    """Of changes (n, quantities) the largest of each quantity, with its sign."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

@@ -21,7 +21,7 @@ from math import inf, log
 
 import numpy as np
 
-from models.advice.ride_choice.candidates import Candidates, Set
+from models.advice.ride_choice.candidates import Candidates, Set, remembered
 from models.advice.ride_choice.march import Cost
 from models.advice.ride_choice.marched import confirms
 from models.systems.ride.omissions import TYRE_DAMPING
@@ -83,7 +83,7 @@ class Chooser(Candidates):
         """Whether the tolerance holds without these effects, wherever and whatever of them is left out."""
         if not chosen:
             return True
-        if not (self.holds(self.certified(chosen)) and self.holds(self.between(chosen))):
+        if not (self.holds(self.solved(chosen)) and self.holds(self.between(chosen))):
             return False
         why = self._cancels(chosen)
         off = np.zeros(len(self.rows)) if why else self.off(chosen)
@@ -91,7 +91,7 @@ class Chooser(Candidates):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
             self.refused[chosen] = why
-        return not why
+        return not why and self.certified(chosen)
 
     def _cancels(self, chosen: Set) -> str:
         """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
@@ -108,6 +108,7 @@ class Chooser(Candidates):
                 return f"holds by errors that cancel: {said} {self.told(changes)}"
         return ""
 
+    @remembered
     def _by_run(self, chosen: Set) -> Cost:
         """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
         step, marches = self.accurate(chosen).step, self.marches(chosen)
@@ -184,7 +185,7 @@ class Chooser(Candidates):
         """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
         would no longer matter. Only legal and finite ones."""
         changes = {
-            effect: float(abs(self.confirm(chosen | step)).max())
+            effect: float(abs(self.solved(chosen | step)).max())
             for effect, step in zip(self.effects, self.singles, strict=True)
             if effect not in chosen and not illegal(chosen | step)
         }
@@ -202,7 +203,8 @@ class Chooser(Candidates):
 
     def _calls_saved(self, chosen: Set, further: Set) -> float:
         """Logarithm, of savings worth the tolerance they take."""
-        saved = log(self.cost(chosen).calls / self.cost(further).calls)
+        then = self.cost(further).calls
+        saved = log(self.cost(chosen).calls / then) if then < inf else 0.0
         return saved if saved > WORTH else 0.0
 
     def _work_saved(self, chosen: Set, further: Set) -> float:
@@ -218,17 +220,16 @@ class Chooser(Candidates):
 
     def _best(self, chosen: Set, banned: set[Set], saved: Saved) -> Set:
         """The step that saves most for what it adds to the predicted error; empty if none is within the tolerance."""
-        best, most, now = frozenset[Effect](), 0.0, self._share(chosen)
+        best, most, now = frozenset[Effect](), 0.0, self.share(chosen)
         for step in self._steps():
             further = chosen | step
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
-            share = self._share(further)
-            score = saved(chosen, further) / max(share - now, LEAST) if share <= 1.0 else 0.0
+            saves = saved(chosen, further)
+            if saves <= LEAST * most:
+                continue  # whatever error it adds
+            share = self.share(further)
+            score = saves / max(share - now, LEAST) if share <= 1.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best
-
-    def _share(self, chosen: Set) -> float:
-        """Largest predicted change by the tolerance."""
-        return float(abs(self.predicted(chosen)).max()) / self.tolerance

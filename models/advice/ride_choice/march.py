@@ -11,26 +11,27 @@ A wave e^(i w t) of the road moves x by e^(i w h) - R, and what a run samples is
 its steps, w + 2 pi m / h: the variance is an integral from 0 to pi / h, and no run and no chance is in it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from models.advice.ride_choice.reduced import Reduced
-from models.advice.ride_choice.waves import at_axles, filtered, frequencies, weighting_factors
+from models.advice.ride_choice.reduced import Reduced, ReducedVehicle
+from models.advice.ride_choice.waves import Filters, frequencies, together, weighting_factors
 from models.core.runge_kutta import STAGES
+from models.road.excitation import Excitation
 
-REACH = np.linspace(0.0, 3.0, 601)[1:]
-"""Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
 ALIKE, BEYOND = 6, 6.0
 """Waves to either side that look alike at the steps, at least, and so many times the road's last corner; the last two
 stand for all beyond, which fall with their square."""
 LOWEST = 1e-4
 """Where panels of frequencies begin, by the highest frequency that steps can tell."""
-SHORTEST, STEPS, FINER = 1 / 32, 8, 6
-"""Shortest step that is tried, by the longest stable one; steps from there on, and halvings of what lies between."""
+SHORTEST, STEPS, FINE = 1 / 32, 8, 64
+"""Shortest step that is tried, by the longest stable one; steps from there on, and parts of what lies between two."""
+TINY = 1e-12
+"""An error, by the tolerance, that is none."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,14 @@ class March:
     @cached_property
     def motions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rates (n,) in 1/s, quantities by motions (q, n), motions by the road's filters and noise (n, m + k)."""
-        n, system = self.vehicle, self.reduced.system
-        rates, V = np.linalg.eig(system.A[:n, :n])
-        back = np.linalg.inv(V)
+        n, system, modes = self.vehicle, self.reduced.system, self.reduced.of_vehicle.modes
+        rates, V = (modes.rates, modes.V) if modes else np.linalg.eig(system.A[:n, :n])
+        back = modes.W if modes else np.linalg.inv(V)
         forced = np.hstack([system.A[:n, n : self.reduced.states], *(b[:n] for b in system.B)])
-        return rates, self._read[:, :n] @ V, back @ forced
+        return rates, self.read[:, :n] @ V, back @ forced
 
     @cached_property
-    def _read(self) -> np.ndarray:
+    def read(self) -> np.ndarray:
         """Quantities by states (q, n + m), before their weightings."""
         weighted, names = dict(self.weightings), self.reduced.system.names
         plain = [
@@ -66,35 +67,73 @@ class March:
         ]
         return self.reduced.system.C[plain, : self.reduced.states]
 
-    def heard(self, states: np.ndarray) -> np.ndarray:
-        """Quantities (q, ...), before their weightings, of states of vehicle and road (n + m, ...)."""
-        return self._read @ states
-
     @cached_property
     def longest(self) -> float:
         """Longest stable step (s)."""
-        return stable_step(self.motions[0])
+        return self.reduced.of_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of what a run in steps (s) samples."""
-        rates, seen, forced = self.motions
         omega, weights, apart = self._frequencies(step)
-        last = self._alike(step)
+        last, half = self._alike(step), np.exp(0.5j * step * omega)
         alike = np.arange(-last, last + 1)[:, None]
-        road, noise = self._road((omega + 2 * np.pi * alike / step).ravel(), np.tile(apart, len(alike)), step)
-        half = (np.exp(0.5j * step * omega) * (-1.0) ** alike).ravel()[:, None]
-        z = (step * rates)[:, None, None]
-        begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
-        grown = 1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))
-        m = self.reduced.states - self.vehicle
-        moved = (begin + middle * half + half**2) * np.tensordot(forced[:, :m], road, 1)
-        if forced[:, m:].any():
-            moved += (begin + middle + 1) * np.tensordot(forced[:, m:], noise, 1)
-        moved *= step / 6 / (half**2 - grown)
-        heard = np.tensordot(seen, moved, 1) + np.tensordot(self._read[:, self.vehicle :], road, 1)
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
-        total = ((abs(heard) ** 2).sum(axis=2).reshape(len(seen), len(alike), -1) * count).sum(axis=1)
-        return np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi)
+        total = np.zeros((len(omega), len(self.rows)))
+        for odd in (0, 1):
+            these = alike[:, 0] % 2 == odd
+            waves = omega + 2 * np.pi * alike[these] / step
+            total += self._met(self._gains((1 - 2 * odd) * half, step), waves, count[these], apart)
+        return np.sqrt(weights @ (total * abs(self._heard(omega).T) ** 2) / np.pi)
+
+    def _gains(self, half: np.ndarray, step: float) -> list[np.ndarray]:
+        """Quantities by the motions of every axle's filter (w, q, m), for waves that turn by ``half`` in half a step.
+
+        White noise is read as its mean over a step, as the filters' states at its begin, middle and end tell it.
+        """
+        rates, seen, forced = self.motions
+        road, z, end = self.reduced.excitation, step * rates, half**2
+        axles, (m, k) = len(road.heights), road.G.shape
+        begin, middle = 1 + z + z**2 / 2 + z**3 / 4, 4 + 2 * z + z**2 / 2
+        motions = step / 6 / (end[:, None] - (1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))))
+        by_road, by_noise = (
+            (seen.T[:, :, None] * part[:, None, :]).reshape(len(rates), -1)
+            for part in np.split(forced, [axles * m], axis=1)
+        )
+        at = half[:, None]
+        moved = motions @ (begin[:, None] * by_road) + at * (motions @ (middle[:, None] * by_road))
+        moved = (moved + at**2 * (motions @ by_road)).reshape(len(half), len(seen), axles, m)
+        moved += self.read[:, self.vehicle :].reshape(len(seen), axles, m)
+        if by_noise.any():
+            noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, axles * k)
+            moved += (noise.reshape(len(half), -1, k) @ self._mean_noise(half, step)).reshape(moved.shape)
+        turned = moved @ self.filters.V
+        return [turned[:, :, i] for i in range(axles)]
+
+    def _mean_noise(self, half: np.ndarray, step: float) -> np.ndarray:
+        """Mean noise of a step by the states of a filter at its begin (w, k, m)."""
+        road, at = self.reduced.excitation, half[:, None, None]
+        slope = (at**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * ((1 + 4 * at + at**2) / 6)
+        return np.asarray(np.linalg.pinv(self.speed**0.5 * road.G) @ slope)
+
+    def _met(self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray) -> np.ndarray:
+        """Densities (w, q) of quantities by all ``waves`` (a, w) that look alike, each with its ``count`` (a, 1)."""
+        road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
+        late = {}
+        for pair in self.filters.pairs:
+            density = count * pair.density(speeds, waves.ravel()).reshape(waves.shape)
+            own, shared = together(gains, pair, road.independent)
+            total = total + (density.sum(axis=0)[:, None] * own).real
+            for (i, j), met in shared.items():
+                length = road.lengths[i] - road.lengths[j]
+                if length not in late:
+                    late[length] = np.exp(-1j * waves * (length / self.speed)) * ~apart
+                total = total + ((density * late[length]).sum(axis=0)[:, None] * met).real
+        return np.asarray(total)
+
+    @cached_property
+    def filters(self) -> Filters:
+        """Of an axle."""
+        return Filters(self.reduced.excitation)
 
     def _alike(self, step: float) -> int:
         """Waves to either side up to which not all of them fall with their square."""
@@ -111,16 +150,6 @@ class March:
         """Factors (q, w) of the weightings."""
         names = dict(self.weightings)
         return weighting_factors([names.get(row, "") for row in self.rows], omega)
-
-    def _road(self, omega: np.ndarray, apart: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """States of all axles' filters by each noise (a m, w, a k), and the mean noise (a k, w, a k) of a run."""
-        road, speeds, s = self.reduced.excitation, np.array([self.speed]), 1j * omega[:, None, None]
-        states = filtered(road, speeds, omega)
-        end, half = np.exp(step * s), np.exp(step / 2 * s)
-        slope = (end - 1) / step * states - self.speed * road.F @ ((1 + 4 * half + end) / 6 * states)
-        mean = np.linalg.pinv(self.speed**0.5 * road.G) @ slope
-        met, noise = (at_axles(each, road, speeds, omega, apart)[0] for each in (states, mean))
-        return met.transpose(1, 0, 2), noise.transpose(1, 0, 2)
 
 
 class RunInSteps(Protocol):
@@ -139,27 +168,45 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 
     exact : of the whole scene, (q,) for each march. 0 where the shortest step that is looked at breaks it.
     """
-    stable, runs = min(march.longest for march in marches), list(zip(marches, exact, strict=True))
+    runs = list(zip(marches, exact, strict=True))
 
-    def kept(step: float) -> bool:
+    def share(step: float) -> float:
+        """Logarithm of the largest error by the tolerance; of the first march that breaks it."""
+        worst = -np.inf
         for i, (march, deviations) in enumerate(runs):
-            if not (abs(march.deviations(step) / deviations - 1.0) <= tolerance).all():
+            error = float(abs(march.deviations(step) / deviations - 1.0).max()) / tolerance
+            if not error <= 1.0:
                 runs.insert(0, runs.pop(i))  # what broke it here is likely to break it elsewhere
-                return False
-        return True
+                return float(np.log(error)) if error < np.inf else np.inf
+            worst = max(worst, float(np.log(max(error, TINY))))
+        return worst
 
-    low, high = 0.0, 0.999 * stable
-    for step in np.geomspace(SHORTEST * stable, high, STEPS):
-        if not kept(step):
-            high = step
-            break
-        low = step
-    if not low or low == high:
-        return float(low)
-    for _ in range(FINER):
-        middle = (low * high) ** 0.5
-        low, high = (middle, high) if kept(middle) else (low, middle)
-    return float(low)
+    high = 0.999 * min(march.longest for march in marches)
+    steps = np.geomspace(SHORTEST * high / 0.999, high, STEPS)
+    shares, low, broken = dict[int, float](), -1, STEPS
+    while broken - low > 1:
+        middle = (low + broken) // 2
+        shares[middle] = share(steps[middle])
+        low, broken = (middle, broken) if shares[middle] <= 0.0 else (low, middle)
+    if low < 0 or broken == STEPS:
+        return float(steps[low]) if low >= 0 else 0.0
+    return _between((steps[low], steps[broken]), (shares[low], shares[broken]), share)
+
+
+def _between(steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]) -> float:
+    """The last of ``FINE`` steps (s), on a logarithmic axis, before the share is above 0, as it is at the second end.
+
+    An error grows as a power of the step, so that a line tells where to look next.
+    """
+    (low, high), (below, above) = (0, FINE), shares
+    while high - low > 1:
+        guess = low + (high - low) * -below / (above - below) if np.isfinite(above) else (low + high) / 2
+        middle = int(np.clip(np.round(guess), low + 1, high - 1))
+        value = share(steps[0] * (steps[1] / steps[0]) ** (middle / FINE))
+        (low, below), (high, above) = (
+            ((middle, value), (high, above)) if value <= 0.0 else ((low, below), (middle, value))
+        )
+    return float(steps[0] * (steps[1] / steps[0]) ** (low / FINE))
 
 
 @dataclass(frozen=True)
@@ -181,18 +228,8 @@ class Cost:
         return self.calls * self.states
 
 
-def cost(reduced: Reduced) -> Cost:
-    """Cost of a system whose every motion dies out; a motion that grows has no stable step and costs without end."""
-    n = reduced.states - len(reduced.excitation.heights) * len(reduced.excitation.F)
-    step = stable_step(np.linalg.eigvals(reduced.system.A[:n, :n]))
-    return Cost(reduced.states, step, STAGES / step if step else np.inf)
-
-
-def stable_step(values: np.ndarray) -> float:
-    """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
-    values = values[abs(values) > 0]
-    z = values[:, None] / abs(values)[:, None] * REACH
-    grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
-    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(REACH))
-    reach = np.where(first > 0, REACH[np.maximum(first, 1) - 1], 0.0)
-    return float((reach / abs(values)).min(initial=np.inf))
+def cost(vehicle: ReducedVehicle, excitation: Excitation) -> Cost:
+    """Cost of a vehicle whose every motion dies out on its road; one that grows has no stable step and costs without
+    end."""
+    states, step = len(vehicle.states.A) + len(excitation.heights) * len(excitation.F), vehicle.stable_step
+    return Cost(states, step, STAGES / step if step else np.inf)

@@ -18,6 +18,8 @@ FINER = 4
 """Steps of the run beside it are so many times as short."""
 COPIES, LONGEST, STEPS = 48, 20.0, 1500
 """Copies; each runs for so many seconds (s), or for so many steps if that is shorter."""
+BLOCK = 250
+"""Steps whose states are kept before they are summed."""
 BEGIN = 0.2
 """Share of a run in which it forgets its beginning, and nothing counts."""
 SEED = 1
@@ -68,26 +70,33 @@ def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
 
 
 def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
-    """Mean squares (copies, q) of a run over a road at its half steps, and calls of the right-hand side."""
-    n, m, system = march.vehicle, road.shape[1], march.reduced.system
-    A, force = system.A[:n, :n], system.A[:n, n : n + m] @ road
-    noise = _noise(march, road, step)
-    copies = road.shape[2]
-    x, count, sums, calls = _begin(march, road[0]), 0, np.zeros((len(march.rows), copies)), 0
+    """Mean squares (copies, q) of a run over a road at its half steps, and calls of the right-hand side.
 
-    def rate(time: float, x: np.ndarray) -> np.ndarray:
-        nonlocal calls
-        calls += 1
-        return A @ x + acting[time]
+    A step of a linear system is a matrix, which a step on the unit matrix tells.
+    """
+    n, steps, (_, m, copies) = march.vehicle, len(road) // 2, road.shape
+    move, *weights = _step(march.reduced.system.A[:n, :n], step)
+    by_road = [weight @ march.reduced.system.A[:n, n : n + m] for weight in weights]
+    x, first, sums = _begin(march, road[0]), int(np.ceil(BEGIN * steps)), np.zeros((len(march.rows), copies))
+    for begin in range(0, steps, BLOCK):
+        here = road[2 * begin : 2 * min(begin + BLOCK, steps) + 1]
+        moved = by_road[0] @ here[:-2:2] + by_road[1] @ here[1::2] + by_road[2] @ here[2::2]
+        moved += sum(weights) @ _noise(march, here, step)
+        for i in range(len(moved)):
+            moved[i] += move @ x
+            x = moved[i]
+        counted = slice(max(first - begin, 0), None)
+        heard = march.read[:, :n] @ moved[counted] + march.read[:, n:] @ here[2::2][counted]
+        sums += (heard**2).sum(axis=0)
+    return (sums / (steps - first)).T, STAGES * steps
 
-    for i in range(len(road) // 2):
-        acting = dict(zip((0.0, 0.5 * step, step), force[2 * i : 2 * i + 3] + noise[i], strict=True))
-        x = step_on(rate, 0.0, x, step)
-        if i >= BEGIN * (len(road) // 2):
-            count += 1
-            sums += march.heard(np.concatenate([x, road[2 * i + 2]])) ** 2
-    assert calls == STAGES * (len(road) // 2)
-    return (sums / count).T, calls
+
+def _step(A: np.ndarray, step: float) -> list[np.ndarray]:
+    """What a step (s) makes of the state (n, n), and of forces at its begin, middle and end (n, n) each."""
+    n = len(A)
+    columns = np.eye(n, 4 * n)
+    acting = {share * step: np.roll(columns, (i + 1) * n, axis=1) for i, share in enumerate((0.0, 0.5, 1.0))}
+    return np.split(step_on(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
 
 
 def _begin(march: March, road: np.ndarray) -> np.ndarray:
@@ -107,7 +116,7 @@ def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
     roads, n = march.reduced.excitation, march.vehicle
     into = np.hstack([b[:n] for b in march.reduced.system.B])
     if not into.any():
-        return np.zeros((len(road) // 2, 1, 1))
+        return np.zeros((len(road) // 2, n, 1))
     begin, middle, end = road[:-2:2], road[1::2], road[2::2]
     path, back = (
         np.kron(np.eye(len(roads.heights)), each)

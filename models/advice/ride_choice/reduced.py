@@ -1,19 +1,22 @@
 """A scene less some effects as a system x' = A x + B w, with the way from its state to that of the whole scene.
 
 What rigid springs, locked freedoms and bodies without mass leave of the vehicle is said in
-``models.vehicles.spatial.Limits`` and ``models.ride.excited``.
+``models.vehicles.spatial.Limits`` and ``models.ride.excited``. The vehicle that is left is made once for all speeds and
+roads, if it does not depend on the speed.
 """
 
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from models.advice.ride_choice.modes import Modes, behind_road, behind_weightings, modes_of, stable_step
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
-from models.ride.excited import DelayedSystem, first_order
+from models.ride.covariance import noise_of
+from models.ride.excited import DelayedSystem, VehicleStates, first_order, vehicle_states
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
@@ -23,61 +26,145 @@ from models.vehicles.spatial_linear import limited, linearise
 
 
 @dataclass(frozen=True)
-class Reduced:
-    """``vehicle`` M, D, K in what coordinates are left (M may be singular), N (n, r) to those of the whole vehicle,
-    ``excitation`` and ``system``; T (n, x) from its state to (q, q', f, weightings) of the whole, ``left`` (x, n) a way
-    back that keeps momentum; ``states`` of vehicle and road, before those of the weightings."""
+class ReducedVehicle:
+    """``linear`` M, D, K in what coordinates are left (M may be singular), N (n, r) to those of the whole vehicle,
+    ``states`` of first order, ``behind`` (r, n) a way back to r that keeps momentum."""
 
-    vehicle: LinearVehicle
+    linear: LinearVehicle
     N: np.ndarray
+    states: VehicleStates
+    behind: np.ndarray
+
+    @cached_property
+    def modes(self) -> Modes | None:
+        """Motions of the states; None where they cannot be told apart."""
+        return modes_of(self.states.A)
+
+    @cached_property
+    def stable_step(self) -> float:
+        """Longest step (s) at which the classical Runge-Kutta method is stable; 0 for a motion that grows."""
+        return stable_step(self.modes.rates if self.modes else np.linalg.eigvals(self.states.A))
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """``of_vehicle`` what is left of it, ``excitation`` and ``system``; T (n, x) from its state to (q, q', f,
+    weightings) of the whole, ``left`` (x, n) a way back that keeps momentum; ``states`` of vehicle and road, before
+    those of the ``weightings`` (their names)."""
+
+    of_vehicle: ReducedVehicle
     excitation: Excitation
     system: DelayedSystem
     T: np.ndarray
     left: np.ndarray
     states: int
+    weightings: tuple[str, ...] = ()
+
+    @property
+    def vehicle(self) -> LinearVehicle:
+        """M, D, K of what is left."""
+        return self.of_vehicle.linear
+
+    @cached_property
+    def modes(self) -> Modes | None:
+        """Motions of the system; None where they cannot be told apart."""
+        A, axles, m = self.system.A[: self.states, : self.states], len(self.excitation.heights), len(self.excitation.F)
+        modes = behind_road(A, self.of_vehicle.modes, A[-m:, -m:], axles)
+        return behind_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """What the noise of all axles adds to the covariance per second (x, x)."""
+        return noise_of(self.system, self.modes.moved if self.modes else None)
+
+
+class Vehicles:
+    """What is left of a vehicle, made once: every choice keeps those that it has asked for."""
+
+    def __init__(self, whole: SpatialVehicle, speed: float) -> None:
+        self._made: dict[Hashable, ReducedVehicle] = {}
+        self._linear: dict[Hashable, LinearVehicle] = {}
+        self.mass = self.linear(whole, speed).mass
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+    def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
+        """The vehicle of a scene at a speed (m/s); InputError where nothing sensible is left."""
+        key = scene.vehicle, scene.limits, of_speed(scene.vehicle, speed)
+        made = self._made.get(key)
+        if made is None:
+            made = self._made[key] = self._make(scene, speed)
+        return made
+
+    def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+        """The vehicle without its limits."""
+        key = vehicle, of_speed(vehicle, speed)
+        if key not in self._linear:
+            self._linear[key] = linearise(vehicle, speed)
+        return self._linear[key]
+
+    def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
+        left, N = limited(self.linear(scene.vehicle, speed), scene.vehicle, scene.limits)
+        states = vehicle_states(left)
+        if not len(states.A):
+            raise InputError("", "effects", None, "nothing is left that could move")
+        return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
+
+
+def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:
+    """The speed (m/s) on which a vehicle's matrices depend; None where they do not."""
+    return speed if vehicle.side_forces or vehicle.drags else None
 
 
 class FullScene:
     """A scene with all its effects at a speed (m/s), from which systems without some of them are made."""
 
-    def __init__(self, scene: ReducedScene, speed: float) -> None:
+    def __init__(self, scene: ReducedScene, speed: float, vehicles: Vehicles | None = None) -> None:
         self.scene, self.speed = scene, speed
-        self.linear = linearise(scene.vehicle, speed)
+        self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
+        self.linear = self.vehicles.linear(scene.vehicle, speed)
         self.excitation = scene.excitation()
         self._made: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
-        """The scene without the effects; raises InputError where what remains has no equations of motion."""
-        key = (scene.vehicle, *_road(scene), scene.massless, scene.rigid, scene.locked)
-        if key not in self._made:
-            self._made[key] = self._make(scene)
-        rest, weightings = self._made[key], self.scene.ride.weighting
+        """What is left of the scene; raises InputError where it is no system."""
+        key = (scene.vehicle, *_road(scene), scene.limits)
+        made = self._made.get(key)
+        if made is None:
+            made = self._made[key] = self._weighted(self._make(scene))
+        return made
+
+    def _weighted(self, rest: Reduced) -> Reduced:
+        weightings = self.scene.ride.weighting
         if not weightings:
             return rest
         system = weighted(rest.system, weightings)
-        more = np.eye(len(system.A) - rest.states)
-        return replace(rest, system=system, T=block_diag(rest.T, more), left=block_diag(rest.left, more))
+        more, names = np.eye(len(system.A) - rest.states), tuple(weightings.values())
+        T, left = block_diag(rest.T, more), block_diag(rest.left, more)
+        return replace(rest, system=system, T=T, left=left, weightings=names)
 
     def _make(self, scene: ReducedScene) -> Reduced:
-        """The reduced system before the outputs are weighted."""
-        constrained, N = constrain(scene, self.speed)
-        excitation, Tf, left_f = self._heights(scene)
-        system, Tq, back = first_order(constrained, excitation, self.speed)
-        behind = np.linalg.solve(N.T @ self.linear.mass @ N, N.T @ self.linear.mass)
+        """Before weightings."""
+        vehicle, (excitation, Tf, left_f) = self.vehicles.of(scene, self.speed), self._heights(scene)
+        states, N = vehicle.states, vehicle.N
+        system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
-        inert, road = len(back[0]), x - Tf.shape[1]
-        if not road:
-            raise InputError("", "effects", None, "nothing is left that could move")
+        inert, road = len(states.inert), len(states.A)
         q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])
         left = np.zeros((x, 2 * n + m))
-        left[:inert, :n], left[inert : 2 * inert, n : 2 * n] = back[0] @ behind, back[0] @ behind
-        left[2 * inert : road, :n], left[road:, 2 * n :] = back[1] @ behind, left_f
-        return Reduced(constrained, N, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
+        left[:inert, :n] = left[inert : 2 * inert, n : 2 * n] = states.inert @ vehicle.behind
+        left[2 * inert : road, :n], left[road:, 2 * n :] = states.slow @ vehicle.behind, left_f
+        return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
+
+    def road(self, scene: ReducedScene) -> Excitation:
+        """The road that a scene has left."""
+        return self._heights(scene)[0]
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
-        """The reduced scene's road, and its relation to the whole road by ``_of_road``."""
+        """The road that is left, and ``_of_road`` of it."""
         key = _road(scene)
         if key not in self._roads:
             excitation = scene.excitation()
@@ -86,32 +173,22 @@ class FullScene:
 
 
 def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
-    """Key that is equal for reduced scenes with the same road."""
+    """What tells one road of a scene less some effects from another."""
     return scene.ride.road, tuple(tables_of(scene.ride))
 
 
-def constrain(scene: ReducedScene, speed: float) -> tuple[LinearVehicle, np.ndarray]:
-    """M, D, K and outputs in the coordinates that rigid springs and locked freedoms leave, and N with q = N r."""
-    return limited(_linear(scene.vehicle, speed), scene.vehicle, scene.limits)
-
-
-@lru_cache(maxsize=64)
-def _linear(vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
-    return linearise(vehicle, speed)
-
-
 def _of_road(
-    scene: ReducedScene, full: Excitation, less: ReducedScene, reduced: Excitation
+    scene: ReducedScene, whole: Excitation, less: ReducedScene, rest: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
-    count, cutoff = full.G.shape[1], scene.ride.road.cutoff
+    count, cutoff = whole.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
     if cutoff is not None and less.ride.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
-    added = np.eye(len(full.F) - len(onto), len(reduced.F) - len(back))
+    added = np.eye(len(whole.F) - len(onto), len(rest.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)
-    axles = len(full.heights)
-    if len(reduced.heights) == axles:
+    axles = len(whole.heights)
+    if len(rest.heights) == axles:
         return np.kron(np.eye(axles), onto), np.kron(np.eye(axles), back)
     return np.kron(np.ones((axles, 1)), onto), np.kron(np.eye(axles)[:1], back)

@@ -24,6 +24,8 @@ from models.ride.marginal import parts
 
 SLOWEST = 1e-9
 """Decay, by the fastest rate, below which a motion counts as one that does not die out."""
+HARDLY, TRUSTED = 1e-7, 1e-10
+"""The same below which motions are left to the exact solve, and the share of a variance that they may miss."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,8 @@ class Screen:
 
     def __init__(self, base: Reduced, rows: list[int]) -> None:
         self.base, self.rows = base, rows
-        A, C = base.system.A, base.system.C[rows]
-        if still(A):
+        A, C, modes = base.system.A, base.system.C[rows], base.modes
+        if still(modes.rates if modes else np.linalg.eigvals(A)):
             raise InputError(
                 "",
                 "vehicle",
@@ -64,8 +66,11 @@ class Screen:
                 "has a motion that nothing pulls back, as one that is free to drive "
                 "away: effects are chosen for vehicles of which every motion dies out",
             )
-        self.P = solve_continuous_lyapunov(A, -noise_of(base.system))
-        self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
+        if modes:
+            self.P, self.L = modes.covariance(base.noise), modes.adjoints(C)
+        else:
+            self.P = solve_continuous_lyapunov(A, -base.noise)
+            self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 
     @cached_property
     def solved(self) -> Solved:
@@ -77,7 +82,7 @@ class Screen:
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
-        rest = half + half.T + noise_of(system)
+        rest = half + half.T + reduced.noise
         J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, rest)
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
         return np.where(white, np.inf, np.maximum(J, 0.0))
@@ -94,18 +99,42 @@ class Screen:
         return variance.astype(float), covariance.variance.astype(float)
 
 
-def still(A: np.ndarray) -> bool:
-    """Whether x' = A x has a motion that does not die out, or not to speak of."""
-    values = np.linalg.eigvals(A)
-    return bool(values.real.max(initial=-np.inf) > -SLOWEST * abs(values).max(initial=0.0))
+def still(rates: np.ndarray, slowest: float = SLOWEST) -> bool:
+    """Whether motions of these rates (1/s) have one that does not die out, or not to speak of."""
+    return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
+
+
+def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
+    """Variances (quantities,) by the motions of the reduced system; None where the exact solve must tell.
+
+    J = C P C' + tr(L (A P + P A' + Q)), which is exact for any P: where the second term, of all outputs, is more than
+    rounding, where noise reaches a quantity at once, or where a motion hardly dies out, motions are not to be trusted.
+    """
+    system, modes = reduced.system, reduced.modes
+    if modes is None or still(modes.rates, HARDLY) or any(d[rows].any() for d in system.D):
+        return None
+    P, C = modes.covariance(reduced.noise), system.C
+    half = system.A @ P
+    rest = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
+    variance = ((C @ P) * C).sum(axis=1)
+    missing = (modes.adjoint_of_motions(C) * rest.T).sum(axis=(1, 2)).real
+    told = np.isfinite(system.D).all(axis=(0, 2)) & (variance > silence(C, P))
+    if not (abs(missing[told]) <= TRUSTED * variance[told]).all() or not told[rows].all():
+        return None
+    return np.asarray((variance + missing)[rows])
 
 
 def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
-    covariance: Covariance = stationary(reduced.system)
+    return of_rows(stationary(reduced.system), rows)
+
+
+def of_rows(covariance: Covariance, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,), inf where an output has none."""
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
 
-def silent(reduced: Reduced, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) up to which there is nothing but rounding."""
-    return silence(reduced.system.C[rows], stationary(reduced.system).P)
+def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """What ``confirmed`` finds, and variances (quantities,) up to which there is nothing but rounding."""
+    covariance = stationary(reduced.system)
+    return of_rows(covariance, rows), silence(reduced.system.C[rows], covariance.P)

@@ -1,6 +1,8 @@
 """Frequencies at which spectra of a vehicle on a road are summed, and the road's waves there at many speeds at once."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -61,6 +63,71 @@ def at_axles(
         if alone.any():
             rows[:, alone, :, i * k : (i + 1) * k] = late[:, alone]
     return out
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two corners (1/m) of an axle's filter, and what the noise gives to both (m, m), by the filter's motions."""
+
+    corners: tuple[complex, complex]
+    noise: np.ndarray
+
+    def density(self, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Density (v, w) at speeds (v,) in m/s and frequencies (w,) in rad/s; real where both corners are one."""
+        first, second = (speeds[:, None] * corner for corner in self.corners)
+        if self.corners[0] == self.corners[1] and not np.imag(self.corners[0]):
+            return np.asarray(speeds[:, None] / (omega**2 + first.real**2))
+        return np.asarray(speeds[:, None] / ((1j * omega - first) * (-1j * omega - second.conj())))
+
+
+class Filters:
+    """An axle's filter in its motions V (m, m), which meet pairs by pairs of corners."""
+
+    def __init__(self, excitation: Excitation) -> None:
+        corners, self.V = np.linalg.eig(excitation.F)
+        driven = np.linalg.solve(self.V, excitation.G + 0j)
+        noise = driven @ driven.conj().T
+        keys = dict.fromkeys((a, b) for i, a in enumerate(corners) for j, b in enumerate(corners) if noise[i, j])
+        met = {key: np.outer(corners == key[0], corners == key[1]) for key in keys}
+        self.pairs = [Pair((complex(a), complex(b)), np.where(met[a, b], noise, 0.0)) for a, b in keys]
+
+
+def together(
+    gains: Sequence[np.ndarray], pair: Pair, alone: bool
+) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
+    """What a quantity makes of a pair's density: (w, q) of every axle for itself, and of every two axles, if not all
+    are ``alone``, before the delay between them. gains: (w, q, m) by axle, of the filter's motions."""
+    axles = range(len(gains))
+    own = sum(_by(gains[i], pair, gains[i]) for i in axles)
+    return np.asarray(own), {} if alone else {
+        (i, j): 2.0 * _by(gains[i], pair, gains[j]) for i, j in combinations(axles, 2)
+    }
+
+
+def _by(first: np.ndarray, pair: Pair, second: np.ndarray) -> np.ndarray:
+    return np.asarray(((first @ pair.noise) * second.conj()).sum(axis=2))
+
+
+def variances(
+    gains: Sequence[np.ndarray], excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
+) -> np.ndarray:
+    """Variances (v, q) at speeds (v,): sums over frequencies (w,) of what axles meet after their delays.
+
+    gains : (w, q, m) of every axle, of its filter's motions, with the root of the weights of the sum. Axles that are
+    ``apart`` (w,), or independent, know nothing of one another.
+    """
+    total, near = np.zeros((len(speeds), gains[0].shape[1])), ~apart
+    late = {}
+    for pair in Filters(excitation).pairs:
+        density = pair.density(speeds, omega)
+        own, shared = together(gains, pair, excitation.independent)
+        total += (density @ own).real if np.iscomplexobj(density) else density @ own.real
+        for (i, j), met in shared.items():
+            length = excitation.lengths[i] - excitation.lengths[j]
+            if length not in late:
+                late[length] = np.exp(-1j * omega[near] * (length / speeds[:, None]))
+            total += ((density[:, near] * late[length]) @ met[near]).real
+    return total
 
 
 def weighting_factors(weightings: Sequence[str], omega: np.ndarray) -> np.ndarray:

@@ -1,0 +1,57 @@
+"""What a choice of effects will take, before it is made: by counts, and by what an eigenvalue problem takes here."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.advice.ride_choice.candidates import SCREENED
+from models.road.excitation import Excitation
+from models.systems.ride.of_scene import told_by
+from models.systems.ride.omissions import effects_of
+from models.systems.ride.reduced_scene import ReducedScene
+from models.systems.ride.scene import RideScene
+
+PROBLEMS = 6.0
+"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED`` speeds: fitted to 14
+scenes of 7 to 26 effects and 10 to 42 states, all of them within a factor of two."""
+FURTHER = 0.05
+"""What a further speed takes by one at which effects are screened: it is confirmed there, and nothing else."""
+SIZE, TIMES = 40, 9
+"""Size of the eigenvalue problem that is timed, and how many times."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Counts of a choice, and processor time (s) by them, good to a factor of two."""
+
+    effects: int
+    speeds: int
+    states: int
+    seconds: float
+
+
+def estimate(ride: RideScene) -> Estimate:
+    """Of a linear scene at constant speeds that asks for a choice."""
+    assert ride.speeds is not None
+    with told_by(ride):
+        scene = ReducedScene.complete(ride)
+        effects, speeds, states = len(effects_of(scene)), len(ride.speeds.all()), _states(scene, scene.excitation())
+    screened = min(speeds, SCREENED)
+    share = (1 + screened + FURTHER * (speeds - screened)) / (1 + SCREENED)
+    return Estimate(effects, speeds, states, PROBLEMS * effects * states * share * _eigenvalue_problem())
+
+
+def _states(scene: ReducedScene, road: Excitation) -> int:
+    """Of vehicle and road."""
+    return 2 * len(scene.vehicle.coordinates()) + len(road.heights) * len(road.F)
+
+
+def _eigenvalue_problem() -> float:
+    """Processor time (s) of an eigenvalue problem of ``SIZE`` states on this machine, now."""
+    A, seconds = np.random.default_rng(SIZE).standard_normal((SIZE, SIZE)), []
+    for _ in range(TIMES):
+        begun = time.process_time()
+        np.linalg.eig(A)
+        seconds.append(time.process_time() - begun)
+    return float(np.median(seconds))

@@ -1,0 +1,133 @@
+"""A linear system in its motions, A = V diag(rates) W: stationary covariances, adjoints and e^(A t) without a solve.
+
+What drives and what it drives have motions of their own; those of both follow from them by a division, so that the
+eigenvalue problem of a vehicle is solved once for all its roads and speeds.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import block_diag, matrix_balance
+
+from models.ride.weighting import WEIGHTINGS
+
+PARALLEL = 1e6
+"""Product of the sizes of a column of V and a row of W, by which rounding grows, beyond which motions are too much
+alike to tell."""
+INVERSE = 1e-9
+"""By how much W V may differ from the unit matrix."""
+
+REACH = np.linspace(0.0, 3.0, 601)[1:]
+"""Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """rates (n,) in 1/s; V (n, n) the state by the motions, W (n, n) its inverse."""
+
+    rates: np.ndarray
+    V: np.ndarray
+    W: np.ndarray
+
+    def of(self, A: np.ndarray) -> "Modes | None":
+        """These, if they are those of A and no two are so much alike that they are of no use; else None.
+
+        The states are scaled as they balance A, so that units have no part in it.
+        """
+        scale = matrix_balance(A, permute=False, separate=True)[1][0]
+        V, W = self.V / scale[:, None], self.W * scale
+        off = abs(W @ V - np.eye(len(A))).max(initial=0.0)
+        grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
+        return self if off <= INVERSE and grows <= PARALLEL else None
+
+    def moved(self, time: float, B: np.ndarray) -> np.ndarray:
+        """e^(A t) B (n, k), after a time (s)."""
+        return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
+
+    def covariance(self, Q: np.ndarray) -> np.ndarray:
+        """P (n, n) of A P + P A' + Q = 0."""
+        inner = -(self.W @ Q @ self.W.conj().T) / (self.rates[:, None] + self.rates.conj())
+        return np.asarray((self.V @ inner @ self.V.conj().T).real)
+
+    def adjoint_of_motions(self, C: np.ndarray) -> np.ndarray:
+        """Z (p, n, n) of every output c (p, n): its adjoint, A' L + L A + c' c = 0, is L = W* Z W."""
+        y = C @ self.V
+        return np.asarray(-(y.conj()[:, :, None] * y[:, None, :]) / (self.rates.conj()[:, None] + self.rates))
+
+    def adjoints(self, C: np.ndarray) -> np.ndarray:
+        """L (p, n, n) of every output."""
+        return np.asarray((self.W.conj().T @ self.adjoint_of_motions(C) @ self.W).real)
+
+
+def modes_of(A: np.ndarray) -> Modes | None:
+    """Motions of x' = A x, A (n, n); None where they cannot be told apart."""
+    rates, V = np.linalg.eig(A)
+    try:
+        return Modes(rates, V, np.linalg.inv(V)).of(A)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+    """Motions of u' = A_u u, x' = A_x x + coupling u together, the state (u, x); None where they are not told apart."""
+    if driver is None or system is None:
+        return None
+    apart = driver.rates - system.rates[:, None]
+    if not apart.all():
+        return None
+    met = (system.W @ coupling @ driver.V) / apart
+    corner = np.zeros((len(driver.rates), len(system.rates)))
+    return Modes(
+        np.concatenate([driver.rates, system.rates]),
+        np.block([[driver.V, corner], [system.V @ met, system.V]]),
+        np.block([[driver.W, corner], [-met @ driver.W, system.W]]),
+    )
+
+
+def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
+    """Motions of a vehicle behind its axles' filters F (m, m), the state (x, f), A that of both."""
+    n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
+    if road is None or vehicle is None:
+        return None
+    both = driven(road, A[:n, n:], vehicle)
+    if both is None:
+        return None
+    order = np.roll(np.arange(len(A)), n)
+    return Modes(both.rates, both.V[order], both.W[:, order]).of(A)
+
+
+def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
+    """Motions of a system before the weightings of its outputs, the state (x, w), A that of both."""
+    parts = [_weighting(name) for name in names]
+    if system is None or None in parts:
+        return None
+    n = len(system.rates)
+    filters = [part for part in parts if part]
+    V, W = (block_diag(*(getattr(part, key) for part in filters)) for key in ("V", "W"))
+    together = Modes(np.concatenate([part.rates for part in filters]), V, W)
+    both = driven(system, A[n:, :n], together)
+    return None if both is None else both.of(A)
+
+
+@lru_cache(maxsize=256)
+def _filters(F: bytes, size: int, axles: int) -> Modes | None:
+    each = modes_of(np.frombuffer(F).reshape(size, size))
+    if each is None:
+        return None
+    return Modes(np.tile(each.rates, axles), block_diag(*[each.V] * axles), block_diag(*[each.W] * axles))
+
+
+@lru_cache(maxsize=16)
+def _weighting(name: str) -> Modes | None:
+    return modes_of(WEIGHTINGS[name].matrices()[0])
+
+
+def stable_step(values: np.ndarray) -> float:
+    """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
+    values = values[abs(values) > 0]
+    z = values[:, None] / abs(values)[:, None] * REACH
+    grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
+    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(REACH))
+    reach = np.where(first > 0, REACH[np.maximum(first, 1) - 1], 0.0)
+    return float((reach / abs(values)).min(initial=np.inf))

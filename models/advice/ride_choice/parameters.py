@@ -1,0 +1,48 @@
+"""Parameters of a vehicle that may be off: every mass, inertia, stiffness and damping, each for itself."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from models.vehicles.spatial import SpatialVehicle
+
+OFF = 0.05
+"""Share by which every mass, inertia, stiffness and damping may be off, each for itself."""
+PARTS = {
+    "bodies": ("mass", "inertia"),
+    "springs": ("stiffness", "damping"),
+    "tyres": ("stiffness", "damping"),
+    "bars": ("stiffness", "damping"),
+}
+"""Parameters of a vehicle's parts."""
+
+Parameter = tuple[str, str, str]
+"""Group, name and key of a value, as in ("springs", "front left", "damping")."""
+
+
+def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
+    """All values that may be off."""
+    return [
+        (group, part.name, key)
+        for group, keys in PARTS.items()
+        for part in getattr(vehicle, group)
+        for key in keys
+        if np.any(getattr(part, key))
+    ]
+
+
+def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
+    """The vehicle with these values so many times as large; those that it has not are passed over."""
+
+    def part(group: str, before: Any) -> Any:
+        known = [key for key in PARTS[group] if (group, before.name, key) in factors]
+        return replace(before, **{k: _times(getattr(before, k), factors[group, before.name, k]) for k in known})
+
+    groups: dict[str, Any] = {group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARTS}
+    return replace(vehicle, **groups)
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(_times(each, factor) for each in value) if isinstance(value, tuple) else value * factor

@@ -1,0 +1,81 @@
+"""What each parameter of a vehicle, a few per cent off, adds to variances of its outputs, to first order.
+
+A parameter moves outputs by heights by dH = dC q + ddirect - (C / Z) (dZ q - dB): products of what the vehicle does
+without it and of differences of matrices, so that one sum over frequencies serves all parameters.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.advice.ride_choice.response import Read, Response
+from models.vehicles.linear_vehicle import LinearVehicle
+
+
+@dataclass(frozen=True)
+class Shifts:
+    """How each of many parameters (p) moves a vehicle: differences of stiffness, damping and mass (p, n, n), of what
+    heights and their rates do (p, n, wheels), of outputs by q, q', q'' (p, q, n) and by heights and their rates."""
+
+    stiffness: tuple[np.ndarray, ...]
+    by_heights: tuple[np.ndarray, ...]
+    by_motion: tuple[np.ndarray, ...]
+    by_road: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, vehicle: LinearVehicle, others: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
+        """Of other vehicles less this one, outputs of rows."""
+        before, *after = ([*_matrices(each, rows)] for each in (vehicle, *others))
+        moved = [np.array([each[i] for each in after]) - matrix for i, matrix in enumerate(before)]
+        return cls(tuple(moved[:3]), tuple(moved[3:5]), tuple(moved[5:8]), tuple(moved[8:]))
+
+    def only(self, there: np.ndarray) -> "Shifts":
+        """With nothing but zeros for parameters that are not ``there`` (p,)."""
+        parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
+        return Shifts(*(tuple(each * there[:, None, None] for each in part) for part in parts))
+
+
+def _matrices(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
+    read = Read.of(vehicle, rows)
+    yield from (vehicle.stiffness, vehicle.damping, vehicle.mass, vehicle.road_stiffness, vehicle.road_damping)
+    yield from (*read.by_motion, *read.by_road)
+
+
+class Sensitivity:
+    """Slopes of variances at speeds (v,), from heights (v, w, wheels, k), weights (w, q) of the sum, and N (n, r) from
+    the response's coordinates to those of the vehicle whose parameters are off."""
+
+    def __init__(self, response: Response, heights: np.ndarray, weights: np.ndarray, N: np.ndarray) -> None:
+        seen, powers = response.H @ heights, [response.s[:, None, None] ** k for k in range(3)]
+        met = 2.0 * weights[..., None] * (heights @ seen.conj().mT).mT  # (v, w, q, wheels)
+        q, back = response.coordinates()
+        moved = met @ (N @ q).mT  # (v, w, q, n)
+        back = back @ N.T
+        self.by_force = [_sums(back * s, moved) for s in powers]
+        self.by_column = [_sums(back * s, met) for s in powers[:2]]
+        self.by_row = [(moved * s).sum(axis=1).real for s in powers]
+        self.by_road = [(met * s).sum(axis=1).real for s in powers[:2]]
+
+    def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
+        """What each shift adds to variances (v, q, p), to first order; mass only of what is ``inert`` (p,)."""
+        stiffness = (*shifts.stiffness[:2], shifts.stiffness[2] * inert[:, None, None])
+        forces = [(self.by_force, stiffness, -1.0), (self.by_column, shifts.by_heights, 1.0)]
+        outputs = [(self.by_row, shifts.by_motion), (self.by_road, shifts.by_road)]
+        total = np.zeros((*self.by_road[0].shape[:2], len(inert)))
+        for sums, moved, sign in forces:
+            for each, matrices in zip(sums, moved, strict=True):
+                if matrices.any():
+                    total += sign * np.tensordot(each, matrices, ((2, 3), (1, 2)))
+        for sums, moved in outputs:
+            for each, matrices in zip(sums, moved, strict=True):
+                if matrices.any():
+                    total += np.einsum("vqj,pqj->vqp", each, matrices)
+        return total
+
+
+def _sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Real part of sums over frequencies of back (w, q, i) times moved (v, w, q, j): (v, q, i, j)."""
+    left = np.concatenate([back.real, -back.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
+    right = np.concatenate([moved.real, moved.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
+    return np.asarray(left @ right)
