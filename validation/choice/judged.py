@@ -11,7 +11,7 @@ import numpy as np
 from models.advice.choice.choose import Choice as ChoiceByRuns
 from models.advice.choice.choose import Chooser as ChooserByRuns
 from models.advice.ride_choice.candidates import Set, largest
-from models.advice.ride_choice.choose import Choice, Chooser
+from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.march import longest_step
 from models.advice.ride_choice.parameters import OFF, changed, parameters
 from models.advice.ride_choice.reduced import FullScene
@@ -33,7 +33,7 @@ def asked(drawn: Drawn) -> Chooser:
     return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
 
 
-def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
+def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     """Changes (quantities,) of the worst listed speed."""
     left = without(chooser.scene, choice.left_out)
     ratios = [
