@@ -157,7 +157,7 @@ def chosen(
 def _calls(fits: list[Fit], fullest: Fit, inflation: float) -> dict[str, tuple[float, float]]:
     """F and p of leaving each suspect out of the fullest subset, and both kinds of friction together."""
     by_names = {fit.names: fit for fit in fits}
-    leaving = {name: (name,) for name in fullest.names}
+    leaving: dict[str, tuple[str, ...]] = {name: (name,) for name in fullest.names}
     if {*FRICTIONS} <= {*fullest.names}:
         leaving["friction of either kind"] = FRICTIONS
     calls = {}
