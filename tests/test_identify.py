@@ -18,7 +18,6 @@ from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
 from studies.command.identify import identify
 
-TRUE = {"yaw_inertia": 1700.0}
 NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
 UNITS = {"yaw rate": "rad/s", "lateral acceleration": "m/s^2", "side slip": "rad"}
 TIMES = np.arange(0.0, 12.0, 0.02)
@@ -101,7 +100,7 @@ def test_noise_that_stays_widens_errors(scene: SingleTrackScene) -> None:
 
 
 def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
-    """Mass and friction of both axles scale together: the worst combination is theirs, and it is named."""
+    """Drag acts through the friction ellipse alone: the worst combination is its, and it is not determined."""
     keys = ["vehicle.mass", "vehicle.yaw_inertia", "vehicle.drag=-0.0:10.0"]
     blind = build(table(vehicle={**table()["vehicle"], "drag": 1.0}), "car.toml", Path(scene.folder))
     known = uncertainty(fit(problem_of(blind, measured(scene), keys)))
@@ -165,7 +164,7 @@ def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
     [
         ("front.frictoin", "is no key of the scene"),
         ("front", "holds no number"),
-        ("sensors.steer_offset", "starts at 0"),
+        ("vehicle.centre_height", "starts"),
         ("front.friction=2:3", "must start between its bounds"),
         ("front.friction=2", "LOW:HIGH"),
     ],

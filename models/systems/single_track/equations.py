@@ -3,11 +3,11 @@
 Each axle has a load N = its static share + transfer by the forward acceleration - lift v^2, a largest side force
 D = mu N sqrt(1 - (X / (mu N))^2) beside its forward force X, and the side force
 
-    Y = -D x / (1 + |x|^n)^(1/n),    x = c N alpha / D,
+    Y = -D x ((1 - e) / (1 + |x|^n)^(1/n) + e),    x = c N alpha / D,
 
-of its slip angle alpha: c N alpha at small slip, D at large slip, with a bend as sharp as n. The forward force of
-all tyres is what the measured speed asks for, m a_x + drag v^2, shared by the axles as the scene says. With v the
-speed, w the lateral velocity and r the yaw rate at the centre of mass, alpha = (w + a r) / v - delta in front and
+of its slip angle alpha: c N alpha at small slip, D at large slip where e is 0, with a bend as sharp as n. The forward
+force of all tyres is what the measured speed asks for, m a_x + drag v^2, shared by the axles as the scene says. With v
+the speed, w the lateral velocity and r the yaw rate at the centre of mass, alpha = (w + a r) / v - delta in front and
 (w - b r) / v behind, m (w' + v r) = Y_f + X_f delta + Y_r, J r' = a (Y_f + X_f delta) - b Y_r.
 Source: ISO 8855 for axes; Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge, for the model.
 """
@@ -26,13 +26,14 @@ TURNED = 0.02
 
 class Axle(NamedTuple):
     """stiffness : cornering stiffness by load (1/rad); friction; sharpness : n; side : friction in left turns is
-    larger by this share, in right turns smaller; lift : N s^2/m^2."""
+    larger by this share, in right turns smaller; lift : N s^2/m^2; rise : e, share of the stiffness beyond the bend."""
 
     stiffness: float
     friction: float
     sharpness: float
     side: float
     lift: float
+    rise: float
 
 
 class Car(NamedTuple):
@@ -55,7 +56,8 @@ def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> fl
     grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
     across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
     x = axle.stiffness * load * slip_angle / across
-    return -across * x / (1.0 + abs(x) ** axle.sharpness) ** (1.0 / axle.sharpness)
+    bent = (1.0 + abs(x) ** axle.sharpness) ** (-1.0 / axle.sharpness)
+    return -across * x * ((1.0 - axle.rise) * bent + axle.rise)
 
 
 @njit(cache=True)

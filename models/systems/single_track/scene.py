@@ -36,10 +36,11 @@ class AxleTable(Strict):
     sharpness: float = Field(default=2.0, ge=1.0, le=SHARPEST, description="of the bend from stiffness to friction")
     side: float = Field(default=0.0, ge=-0.5, le=0.5, description="share of friction more in left turns, less in right")
     lift: float = quantity("N s^2/m^2", "by which the air lifts the axle, or presses it", default=0.0, signed=True)
+    rise: float = Field(default=0.0, ge=0.0, le=0.5, description="share of the stiffness that is left beyond the bend")
 
     def axle(self) -> Axle:
         """As the equations take it."""
-        return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift)
+        return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift, self.rise)
 
 
 class DriveTable(Strict):
