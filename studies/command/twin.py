@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.own_model.certificate import Agreement, certificate
+from models.own_model.certificate import ALIKE, Agreement, certificate
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
@@ -149,7 +149,9 @@ def verdict(each: Examined) -> str:
     if each.misread:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
     if each.certified:
-        return f"every build moves as the file does: accelerations differ by {worst:.1e} at the most"
+        bound = max(row.bound for row in each.agreements)
+        said = f"; up to {bound:.0e} is rounding, by the condition of its mass matrix" if bound > ALIKE else ""
+        return f"every build moves as the file does: accelerations differ by {worst:.1e} at the most{said}"
     builds = ", ".join(row.build for row in each.agreements if not row.alike)
     return f"differs in {builds}: accelerations by {worst:.1e}"
 
