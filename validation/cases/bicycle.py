@@ -202,7 +202,10 @@ def _unfitted_rows(bicycle: Whipple, seen: Observation) -> list[Row]:
 
 def _predicted_rows(bicycle: Whipple, choice: Choice, seen: Observation) -> list[Row]:
     gaps = deviations(bicycle, FEEDBACK, choice, seen)
-    why = "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds"
+    why = (
+        "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
+        "that were settled with all of these speeds in sight"
+    )
     return [
         Observed(
             f"bicycle.chosen.{name}.{seen.speed:g}",
