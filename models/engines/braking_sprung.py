@@ -91,7 +91,7 @@ class OnSprings:
 
     @cached_property
     def _on_engine(self) -> OnEngine:
-        """Data that steps need with tyres that answer at once."""
+        """Data for time steps of a vehicle whose tyres answer without lag."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,

@@ -93,7 +93,7 @@ def _makes_arrays(kind: Any) -> bool:
 
 
 def _tuple(kind: Any) -> Any:
-    """A compiled function that spoils each part of such tuples."""
+    """A compiled function that spoils each part of a tuple of this kind."""
     parts = ", ".join(f"spoiled(value[{i}], place)" for i in range(len(kind)))
     made = f"cls({parts})" if isinstance(kind, types.BaseNamedTuple) else f"({parts},)"
     names = {"spoiled": spoiled, "cls": getattr(kind, "instance_class", tuple)}

@@ -15,7 +15,7 @@ NAN = float("nan")
 
 
 def frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
-    """An answer."""
+    """Bytes of a controller's answer, right or spoilt."""
     return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 
 

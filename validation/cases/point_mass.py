@@ -173,7 +173,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """Relative errors of both covariances."""
+    """Table of the relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
     note = (
         f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "

@@ -218,7 +218,8 @@ def _engine_row(engine: str) -> Row:
 
 
 def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
-    """Five cases over speeds with weighting, fast and direct, timed in this process's own seconds."""
+    """Rows and data of the fast route: five cases of correlation over speeds with weighting, fast and direct, timed in
+    this process's own seconds."""
     vehicle = _vehicle("r19_ride")
     linear = linear_vehicle(vehicle, source)
     roads = five_cases(linear(20.0).wheels)

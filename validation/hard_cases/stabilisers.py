@@ -115,7 +115,7 @@ def moving_moment_naive(folder: Path) -> str:
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
-    """A moment sampled every 1.5 ms under a step of 1 ms."""
+    """0, if a run in steps of 1 ms under a moment that is sampled every 1.5 ms is not refused, as it must be."""
     moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
     run(engine, replace(beside_held(), moment=moment), STEP, DURATION)
     return 0.0

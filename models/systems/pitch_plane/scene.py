@@ -141,7 +141,7 @@ def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
 
 
 def _check_engine(name: str, scene: Scene) -> None:
-    """Known names, and no setting that the integrator would not read."""
+    """Check that engine and integrator are known, and that no setting is one that the integrator would not read."""
     if name not in CATALOGUE:
         raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
     given, place = scene.engines[name], f"engines.{name}"

@@ -24,7 +24,8 @@ PLACE = "effects.gyro.sampling_rate"
 
 
 class Parameters(Strict):
-    """[effects.gyro]. Random walk of the angle: deviation / sqrt(sampling_rate), in rad per sqrt(s)."""
+    """Keys of the scene's table [effects.gyro].. Random walk of the angle: deviation / sqrt(sampling_rate), in rad per
+    sqrt(s)."""
 
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     deviation: float = quantity("rad/s", "standard deviation of each sample", zero=True)
