@@ -164,7 +164,7 @@ def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
     [
         ("front.frictoin", "is no key of the scene"),
         ("front", "holds no number"),
-        ("vehicle.centre_height", "starts"),
+        ("vehicle.centre_height", "must start between its bounds"),
         ("front.friction=2:3", "must start between its bounds"),
         ("front.friction=2", "LOW:HIGH"),
     ],
