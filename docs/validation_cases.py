@@ -60,6 +60,20 @@ def rows(report: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
+def counts(report: Path) -> str:
+    """Rows of a report per system and kind of second side in Markdown; those that were not run do not count."""
+    from validation.report.page import KINDS, evidence
+
+    lines = [
+        "\n## Rows of the newest report\n",
+        "| system | " + " | ".join(KINDS) + " |",
+        "|---" * (len(KINDS) + 1) + "|",
+    ]
+    for system, numbers in evidence(json.loads(report.read_text(encoding="utf-8"))["rows"]):
+        lines.append(f"| {system} | " + " | ".join(map(str, numbers)) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def _cell(value: Any) -> str:
     """Text of a cell; brackets are escaped, as a pair of them would be a link to a reference."""
     text = "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

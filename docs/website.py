@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from docs.gallery import add_pictures
 from docs.outputs import run_pages
 from docs.pages import OUTSIDE, ROOT, pages
-from docs.validation_cases import newest_report, rows
+from docs.validation_cases import counts, newest_report, rows
 
 QUIET = {"NO_MKDOCS_2_WARNING": "1"}
 """No news of MkDocs in the output."""
@@ -37,11 +37,13 @@ def copy_pages(to: Path) -> None:
 
 
 def add_rows(pages_folder: Path) -> None:
-    """Put the rows of the newest report, where there is one, into the page that explains them."""
+    """Put the rows of the newest report, where there is one, and their counts into the pages that explain them."""
     report = newest_report()
-    if report is not None:
-        page = pages_folder / "docs" / "reference" / "report_rows.md"
-        page.write_text(page.read_text(encoding="utf-8") + rows(report), encoding="utf-8")
+    if report is None:
+        return
+    for name, text in (("reference/report_rows.md", rows(report)), ("validated_by.md", counts(report))):
+        page = pages_folder / "docs" / name
+        page.write_text(page.read_text(encoding="utf-8") + text, encoding="utf-8")
 
 
 def build(site: Path, work: Path, as_shown: bool) -> bool:

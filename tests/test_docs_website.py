@@ -9,7 +9,7 @@ import yaml
 
 from docs.mathml import on_page_content
 from docs.pages import ROOT, pages
-from docs.validation_cases import newest_report, rows
+from docs.validation_cases import counts, newest_report, rows
 from docs.website import copy_pages
 
 ROW = {
@@ -18,6 +18,7 @@ ROW = {
     "expected": 0.0,
     "tolerance": 1e-12,
     "independence": "native",
+    "system": "wheelset",
     "status": "passed",
 }
 
@@ -39,6 +40,7 @@ def test_the_rows_are_those_of_the_newest_report(tmp_path):
     report = newest_report(tmp_path)
     assert report == tmp_path / "new" / "results.json"
     assert rows(report).splitlines()[-1] == "| `audit.one` | a \\| b \\[1\\] \\[2\\] | 0 | 1e-12 | native | passed |"
+    assert counts(report).splitlines()[-1] == "| wheelset | 1 | 0 | 0 | 0 | 0 | 0 | 0 |"
 
 
 def entries(nav):
