@@ -133,3 +133,34 @@ def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
 
     files = compiled._files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
     assert {file.name for file in files} >= {"sprung_step.py", "plane_step.py", "mujoco_native.py"}
+
+
+RECORD = """
+from typing import NamedTuple
+from models.machine.compiled import compiled
+
+class NAME(NamedTuple):
+    x: float
+
+@compiled
+def twice(record):
+    return 2.0 * record.x
+
+print(twice(NAME(1.5)))
+"""
+
+
+def test_machine_code_of_a_class_that_is_gone_is_made_anew(tmp_path):
+    """An update renames the class in a kernel's signature: the index that names it cannot be read any more."""
+    (tmp_path / "script.py").write_text("import kernel")
+    for name in ("Before", "After"):
+        (tmp_path / "kernel.py").write_text(RECORD.replace("NAME", name))
+        told = subprocess.run(
+            [sys.executable, "script.py"],
+            cwd=tmp_path,
+            env=os.environ
+            | {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONPATH": str(Path(models.__file__).parents[1])},
+            capture_output=True,
+            text=True,
+        )
+        assert told.stdout == "3.0\n", told.stderr

@@ -59,7 +59,20 @@ def _kept_apart(compiled: Any) -> Any:
         stem = file._index_name.removesuffix(".nbi")
         file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
         file._source_stamp = stamp(*_files(compiled.py_func))
+        file._load_index = _or_none(file._load_index)
     return compiled
+
+
+def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
+    """An index of machine code as it is read; empty where older sources wrote it, with classes that are gone since."""
+
+    def read() -> dict:
+        try:
+            return load()
+        except (AttributeError, ImportError):
+            return {}
+
+    return read
 
 
 def named(function: Any, *parts: Any) -> Any:

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.stack import array, at, beyond, doubles
 from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, TURNS, add_wrench, column, locate, move
 from models.multibody.tree import dot, plus, three, times
@@ -36,7 +36,7 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     return np.concatenate([[len(rows), len(laws)], rows.ravel(), np.array(laws).ravel()])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def spring_forces(numbers, t, q, v, f):
     """Add the springs' forces (N, N m) to ``f`` (n,), at coordinates and rates (n,)."""
     head = array(numbers, (HEAD,))
@@ -66,7 +66,7 @@ def spring_forces(numbers, t, q, v, f):
         add_wrench(chain, m, n - 1, tip, times(along, push), _NONE, out)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def set_spring_forces(block, t, n):
     """``spring_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
     f = at(block)

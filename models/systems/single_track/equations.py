@@ -15,7 +15,8 @@ Source: ISO 8855 for axes; Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from models.machine.compiled import compiled
 
 GRAVITY = 9.81
 LEAST_LOAD, LEAST_SHARE = 0.05, 0.1
@@ -50,7 +51,7 @@ class Car(NamedTuple):
     drive: float
 
 
-@njit(cache=True)
+@compiled
 def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
     """Side force (N, left positive) of an axle at a load and a forward force (N) and a slip angle (rad)."""
     grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
@@ -60,7 +61,7 @@ def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> fl
     return -across * x * ((1.0 - axle.rise) * bent + axle.rise)
 
 
-@njit(cache=True)
+@compiled
 def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
     """Side force of all tyres (N), yaw moment (N m), and load, side force and slip angle of the front and rear axle.
 
@@ -82,14 +83,14 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
     return turned + side_r, car.front * turned - car.rear * side_r, load_f, load_r, side_f, side_r, angle_f, angle_r
 
 
-@njit(cache=True)
+@compiled
 def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
     """Rates of lateral velocity (m/s^2) and of yaw rate (rad/s^2)."""
     answer = forces(car, front, rear, motion, drive)
     return answer[0] / car.mass - drive[1] * motion[1], answer[1] / car.inertia
 
 
-@njit(cache=True)
+@compiled
 def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
     """(n, 2): lateral velocity (m/s) and yaw rate (rad/s) at every sample, by Heun's method from sample to sample.
 
@@ -109,7 +110,7 @@ def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, fir
     return motion
 
 
-@njit(cache=True)
+@compiled
 def reports(car: Car, front: Axle, rear: Axle, given: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """(n, 7): lateral acceleration (m/s^2), then load, side force (N) and slip angle (rad) in front, and behind."""
     table = np.empty((len(given), 7))
