@@ -4,22 +4,23 @@ import io
 import json
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
 
 from models.core.errors import InputError, RunFailed
-from models.core.finding import Finding, lines, queries
-from models.core.whole_files import reason_of, write_whole
+from models.core.whole_files import reason_of
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.audits import blind_spot_audit, conformity_report
+from studies.command.finishing import end, finish, folder_of, untold, watched
 from studies.command.waiting import waiting
 
 app = typer.Typer(
@@ -47,8 +48,6 @@ def common(
     """Options that belong to no command."""
 
 
-Work = Callable[[Any], dict[str, Any]]
-"""A study, which is given what it tells its progress to, and returns its summary."""
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
 Changes = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4; repeatable.")
@@ -76,20 +75,15 @@ def main() -> None:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
     except TyperException as error:  # what was typed does not fit the command's options
         command = getattr(getattr(error, "ctx", None), "command_path", "twinrig")
-        _end(f"{error.format_message().rstrip('.')}; see `{command} --help`", 2)
+        end(f"{error.format_message().rstrip('.')}; see `{command} --help`", 2)
     except InputError as error:
-        _end(str(error), 2)
+        end(str(error), 2)
     except RunFailed as error:
-        _end(f"the run failed: {error}", 1)
+        end(f"the run failed: {error}", 1)
     except MemoryError:
-        _end("the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1)
+        end("the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1)
     except OSError as error:
-        _end(f"the results could not be written: {reason_of(error)}", 1)
-
-
-def _end(message: str, code: int) -> NoReturn:
-    print(f"twinrig: {message}", file=sys.stderr)
-    sys.exit(code)
+        end(f"the results could not be written: {reason_of(error)}", 1)
 
 
 @app.command("list")
@@ -141,7 +135,7 @@ def show(
     loaded = load_scene(scene, changes)
     if not price:
         plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *_untold(findings_of(loaded), plan), *_search(loaded)]))
+        return print("\n".join([plan, *untold(findings_of(loaded), plan), *_search(loaded)]))
     _say_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
@@ -180,35 +174,25 @@ def run_scene(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    watched = _watched(profile)
+    telling = watched(profile)
     if sweep is not None:
         from studies.command.sweep import RECORDS, points
         from studies.command.sweep import run as run_points
 
         job = points(sweep, scene, changes or (), engine, not no_error)
-        folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
+        folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
         work = partial(run_points, replace(job, folder=folder))
-        return _finish(watched(work), folder, as_json, strict=strict)
+        return finish(telling(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
         with waiting("checking the scene", loaded.system):
             module = ready(loaded, engines)
-        folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
+        folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
-        _finish(watched(work), folder, as_json, doubts, strict, loaded.system)
-
-
-def _watched(profile: bool) -> Callable[[Work], Work]:
-    """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
-    if not profile:
-        return lambda work: work
-    from studies.command.profile import Watch
-
-    watch = Watch()
-    return lambda work: partial(watch.told, work)
+        finish(telling(work), folder, as_json, doubts, strict, loaded.system)
 
 
 @contextmanager
@@ -220,19 +204,6 @@ def _queried(scene: Any) -> Iterator[None]:
         for line in causes(scene):
             print(line, file=sys.stderr)
         raise
-
-
-def _conformity(engine: str, more: bool, out: Path | None) -> None:
-    """Put an engine from outside the tree through the suite."""
-    from models.core.result_folders import new_folder
-    from models.engines.outside import register
-    from validation.conformity import conformity
-
-    if more:
-        raise InputError("--engine", "", engine, "has one suite, without --quick, --against and --resume")
-    register(engine)
-    folder = new_folder(out, "conformity")
-    sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
 
 
 @app.command()
@@ -282,13 +253,13 @@ def compare(
     if measured.against(first, second):
         for run in measured.runs_of(first).values():
             measured.overlay(run, second, shift)  # before a folder is made
-        folder = _folder("compare", None, "", out, None)
-        return _finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
+        folder = folder_of("compare", None, "", out, None)
+        return finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
     if shift is not None:
         raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
     differences(first, second)  # before a folder is made
-    folder = _folder("compare", None, "", out, None)
-    _finish(lambda progress: report(first, second, folder), folder, as_json)
+    folder = folder_of("compare", None, "", out, None)
+    finish(lambda progress: report(first, second, folder), folder, as_json)
 
 
 @app.command()
@@ -316,9 +287,9 @@ def identify(
     ready(loaded, engines)
     if not measurement.is_file():
         raise InputError(measurement, "--from", None, "no such file")
-    folder = _folder(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
+    folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
     more = {"engine": engines[0] if engines else "", "low_pass": low_pass, "profiles": profiles}
-    _finish(
+    finish(
         lambda tell: report(loaded, measurement, keys, folder, tell, **more), folder, as_json, (), False, loaded.system
     )
 
@@ -394,103 +365,20 @@ def validate(
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     if engine is not None:
-        return _conformity(engine, quick or blind_spots or against is not None or resume is not None, out)
+        return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:
-        return _blind_spots(quick or against is not None, out, resume)
+        return blind_spot_audit(quick or against is not None, out, resume)
     from validation.common.changes import read
     from validation.run import KEPT
     from validation.run import validate as run_all
 
     earlier = None if against is None else read(against)
-    folder = _folder("validate-quick" if quick else "validate", KEPT, "", out, resume)
+    folder = folder_of("validate-quick" if quick else "validate", KEPT, "", out, resume)
     try:
         failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier, resume is not None)
     except KeyboardInterrupt:
-        _end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
+        end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)
-
-
-def _blind_spots(more: bool, out: Path | None, resume: Path | None) -> None:
-    """Audit all shared functions; raises InputError for options that go with a report."""
-    if more:
-        raise InputError("--blind-spots", "", True, "goes without --quick and --against")
-    from validation.blind_spots.audit import TRACE, audit, summary
-
-    folder = _folder("blind-spots", TRACE, "", out, resume)
-    try:
-        with waiting("blind spots") as progress:
-            lines = audit(folder, progress)
-    except KeyboardInterrupt:
-        _end(f"interrupted; finished functions are kept: twinrig validate --blind-spots --resume {folder}", 130)
-    print("\n".join(summary(lines, folder)))
-
-
-def _finish(
-    work: Work, folder: Path, as_json: bool, doubts: tuple[Finding, ...] = (), strict: bool = False, system: str = ""
-) -> None:
-    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
-
-    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
-    a broken assumption ends with code 1; system : of the scene.
-    """
-    from models.core.result_folders import COMMAND, drop_if_empty
-    from models.core.told import summarised
-
-    try:
-        with waiting(folder.name, system) as progress:
-            summary = summarised(work(progress))
-        if doubts:
-            summary["queries"] = queries(doubts)
-            write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
-    except KeyboardInterrupt:
-        kept = {path.name for path in folder.iterdir()} - {COMMAND}
-        _end(f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130)
-    finally:
-        drop_if_empty(folder)
-    if as_json:
-        print(json.dumps(summary, indent=1))
-    else:
-        _print(summary, doubts)
-    if summary.get("failed") or (strict and any(judged["broken"] for judged in summary["assumptions"].values())):
-        sys.exit(1)
-
-
-def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
-    """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
-    from models.core.result_folders import new_folder, resumed_folder
-
-    if resume is None:
-        return new_folder(out, name)
-    if out is not None:
-        raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
-    if blocks is None:
-        raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")
-    return resumed_folder(resume, blocks)
-
-
-def _untold(findings: tuple[Finding, ...], told: str) -> list[str]:
-    """Lines of those findings that a plan or a study has not told."""
-    return lines(finding for finding in findings if finding.text not in told)
-
-
-def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
-    """Summary as a person reads it."""
-    print(summary["scene"])
-    for engine, line in summary.get("runs", {}).items():
-        steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)
-        print(
-            f"  {engine:<10} {line['integrator']:<17} step {line['step']:g} s  {steps} steps, "
-            f"{calls} force calls, {line['seconds']:.3f} s once"
-        )
-    for engine, reason in summary.get("failed", {}).items():
-        print(f"  {engine:<10} FAILED: {reason}")
-    for pair, gap in summary.get("largest difference of states", {}).items():
-        print(f"  {pair}: states differ by at most {gap:.1e}")
-    table = summary.get("table", [])
-    for line in (*_untold(doubts, "\n".join(table)), *table):
-        print(line)
-    kept = Path(summary["folder"]).exists()
-    print(f"  results in {summary['folder']}" if kept else "  nothing was saved")
 
 
 def study(scene: str) -> None:

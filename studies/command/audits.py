@@ -1,0 +1,36 @@
+"""What ``twinrig validate`` does beside the report: the suite for an engine from outside, and the blind-spot audit."""
+
+import sys
+from pathlib import Path
+
+from models.core.errors import InputError
+from studies.command.finishing import end, folder_of
+from studies.command.waiting import waiting
+
+
+def conformity_report(engine: str, more: bool, out: Path | None) -> None:
+    """Put an engine from outside the tree through the suite."""
+    from models.core.result_folders import new_folder
+    from models.engines.outside import register
+    from validation.conformity import conformity
+
+    if more:
+        raise InputError("--engine", "", engine, "has one suite, without --quick, --against and --resume")
+    register(engine)
+    folder = new_folder(out, "conformity")
+    sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
+
+
+def blind_spot_audit(more: bool, out: Path | None, resume: Path | None) -> None:
+    """Audit all shared functions; raises InputError for options that go with a report."""
+    if more:
+        raise InputError("--blind-spots", "", True, "goes without --quick and --against")
+    from validation.blind_spots.audit import TRACE, audit, summary
+
+    folder = folder_of("blind-spots", TRACE, "", out, resume)
+    try:
+        with waiting("blind spots") as progress:
+            lines = audit(folder, progress)
+    except KeyboardInterrupt:
+        end(f"interrupted; finished functions are kept: twinrig validate --blind-spots --resume {folder}", 130)
+    print("\n".join(summary(lines, folder)))

@@ -1,0 +1,100 @@
+"""How a command ends: in a folder of its results, with a summary on the terminal, or with one message and a code."""
+
+import json
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NoReturn
+
+from models.core.errors import InputError
+from models.core.finding import Finding, lines, queries
+from models.core.whole_files import write_whole
+from studies.command.waiting import waiting
+
+Work = Callable[[Any], dict[str, Any]]
+"""A study, which is given what it tells its progress to, and returns its summary."""
+
+
+def end(message: str, code: int) -> NoReturn:
+    """End with a message on stderr and an exit code: 1 for a failed run, 2 for a user's mistake, 130 for Ctrl-C."""
+    print(f"twinrig: {message}", file=sys.stderr)
+    sys.exit(code)
+
+
+def watched(profile: bool) -> Callable[[Work], Work]:
+    """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
+    if not profile:
+        return lambda work: work
+    from studies.command.profile import Watch
+
+    watch = Watch()
+    return lambda work: partial(watch.told, work)
+
+
+def finish(
+    work: Work, folder: Path, as_json: bool, doubts: tuple[Finding, ...] = (), strict: bool = False, system: str = ""
+) -> None:
+    """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
+
+    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
+    a broken assumption ends with code 1; system : of the scene.
+    """
+    from models.core.result_folders import COMMAND, drop_if_empty
+    from models.core.told import summarised
+
+    try:
+        with waiting(folder.name, system) as progress:
+            summary = summarised(work(progress))
+        if doubts:
+            summary["queries"] = queries(doubts)
+            write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
+    except KeyboardInterrupt:
+        kept = {path.name for path in folder.iterdir()} - {COMMAND}
+        end(f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130)
+    finally:
+        drop_if_empty(folder)
+    if as_json:
+        print(json.dumps(summary, indent=1))
+    else:
+        _print(summary, doubts)
+    if summary.get("failed") or (strict and any(judged["broken"] for judged in summary["assumptions"].values())):
+        sys.exit(1)
+
+
+def folder_of(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
+    """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
+    from models.core.result_folders import new_folder, resumed_folder
+
+    if resume is None:
+        return new_folder(out, name)
+    if out is not None:
+        raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
+    if blocks is None:
+        raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")
+    return resumed_folder(resume, blocks)
+
+
+def untold(findings: tuple[Finding, ...], told: str) -> list[str]:
+    """Lines of those findings that a plan or a study has not told."""
+    return lines(finding for finding in findings if finding.text not in told)
+
+
+def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
+    """Summary as a person reads it."""
+    print(summary["scene"])
+    for engine, line in summary.get("runs", {}).items():
+        steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)
+        print(
+            f"  {engine:<10} {line['integrator']:<17} step {line['step']:g} s  {steps} steps, "
+            f"{calls} force calls, {line['seconds']:.3f} s once"
+        )
+    for engine, reason in summary.get("failed", {}).items():
+        print(f"  {engine:<10} FAILED: {reason}")
+    for pair, gap in summary.get("largest difference of states", {}).items():
+        print(f"  {pair}: states differ by at most {gap:.1e}")
+    table = summary.get("table", [])
+    for line in (*untold(doubts, "\n".join(table)), *table):
+        print(line)
+    kept = Path(summary["folder"]).exists()
+    print(f"  results in {summary['folder']}" if kept else "  nothing was saved")
