@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[1]
 SHORT = {
     "pitch-plane": ("study_road", {"run.duration": 0.1}, {}),
     "handling": ("handling", {"manoeuvres.brake_in_curve.duration": 0.02}, {"manoeuvre": "brake_in_curve"}),
+    "single-track": ("single_track", {"drive.stretch": [0.0, 2.0]}, {}),
     "bicycle": ("bicycle", {"run.duration": 0.02}, {}),
     "wheelset": ("wheelset", {"run.duration": 0.02, "contact.law": "linear"}, {"speed": 20.0}),
     "contact": ("contact_ellipse", {"method.cells": 11}, {}),

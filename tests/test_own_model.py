@@ -18,7 +18,7 @@ from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
 from models.own_model.path import paths
 from models.own_model.urdf import misread
-from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:

@@ -7,7 +7,7 @@ import pytest
 
 from studies import command_line
 from validation.cases import twin_files
-from validation.own_model_files import ARM_URDF, CART
+from validation.own_model.files import ARM_URDF, CART
 
 
 @pytest.fixture

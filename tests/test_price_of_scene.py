@@ -27,7 +27,7 @@ STEPS = tuple(0.1 / 2**k for k in range(12))
 class Planted:
     """y = t^2 sin 5t with an error of scale h^order, and one method that lies."""
 
-    title, quantity, unit, cell, note, counted = "planted", "y", "N", 0.0, "", "force calls"
+    title, quantity, unit, kink_period, note, counted = "planted", "y", "N", 0.0, "", "force calls"
     whole: float = 2.0
     first: float = 1.0
     growing: float = 0.0

@@ -10,7 +10,7 @@ from models.own_model.explain import compare
 from models.own_model.file import ModelFile, read
 from models.own_model.path import ALIKE, paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.own_model_files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"

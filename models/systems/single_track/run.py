@@ -42,7 +42,7 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
         scene,
         channels,
         {"time": Channel("time", drive.times, "s")},
-        engine="plain equations",
+        engine="reference",
         counts=counts,
         seconds=time.process_time() - begun,
         detail=drive,
@@ -74,7 +74,7 @@ def motion_of(scene: SingleTrackScene, given: np.ndarray, period: float) -> tupl
     if bad.any():
         row = int(bad.argmax())
         why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
-        raise RunFailed("plain equations", why, period * row, motion[max(row - 1, 0)])
+        raise RunFailed("reference", why, period * row, motion[max(row - 1, 0)])
     return motion, reports(*parts, given, motion)
 
 

@@ -1,0 +1,1 @@
+"""Models in MJCF and URDF of ours, and what is planted in them."""
