@@ -126,7 +126,18 @@ def test_every_name_of_code_is_there(name):
     for path in set(re.findall(r"`((?:models|studies|validation|twinrig|docs|tests|\.ci)/[\w/.-]+)`", text)):
         assert (ROOT / path).exists() or "NAME" in path or path in NEW_FILES, path
     for command in set(re.findall(r"(?:`|\$ )twinrig ([a-z]+)", text)):
-        assert command in ("list", "show", "run", "price", "compare", "identify", "identify", "validate", "export", "twin"), command
+        assert command in (
+            "list",
+            "show",
+            "run",
+            "price",
+            "compare",
+            "identify",
+            "identify",
+            "validate",
+            "export",
+            "twin",
+        ), command
 
 
 NEW_FILES = ("models/systems/handling/effects/side_wind.py",)

@@ -20,7 +20,9 @@ def test_the_free_builder_moves_both_as_their_own_builders(system, engine):
 
 
 def test_an_axis_that_turns_with_its_body_is_noticed():
-    with patch.object(one_builder, "AXIS_JOINT", one_builder.FIRST_BODY):  # the axis keeps to the body of the second end
+    with patch.object(
+        one_builder, "AXIS_JOINT", one_builder.FIRST_BODY
+    ):  # the axis keeps to the body of the second end
         assert ride("mujoco").gap(2) > 1e-4
 
 

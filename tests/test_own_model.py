@@ -237,3 +237,12 @@ def test_elements_have_names_units_and_values(tmp_path):
     assert listed["armature", "joint 'hinge'"].unit == "kg m^2"
     assert listed["damping", "joint 'slide'"].unit == "N s/m"
     assert np.allclose(listed["inertia", "body 'arm'"].value, (0.3, 0.4, 0.5, 0.02, 0.03, 0.04))
+
+
+def test_a_mass_that_no_force_moves_is_no_silent_difference(tmp_path):
+    """A wheel in balance: armature changes no acceleration, as there is none, and the mass matrix all the same."""
+    body = "<body><joint axis='0 1 0' armature='0.1'/><geom size='0.1' mass='1'/></body>"
+    wheel = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    first, second = (_read(tmp_path, wheel.replace("0.1'/><g", f"{size}'/><g"), f"{size}.xml") for size in (0.1, 0.12))
+    comparison = compare(first.twin, second.twin, 3)
+    assert not comparison.alike and [each.kind for each in comparison.influential] == ["armature"]

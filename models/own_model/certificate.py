@@ -35,7 +35,7 @@ class Agreement:
     """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
-    rad/s^2; bound : what acceleration may differ by.
+    rad/s^2; bound : what acceleration and mass may differ by.
     """
 
     build: str
@@ -49,8 +49,8 @@ class Agreement:
 
     @property
     def alike(self) -> bool:
-        """Whether accelerations are the same."""
-        return self.acceleration <= self.bound
+        """Whether accelerations are the same, and the mass matrix: what no force moves now may be pushed one day."""
+        return max(self.acceleration, self.mass) <= self.bound
 
 
 def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:

@@ -24,7 +24,7 @@ STATES = 20
 OFF = ("friction loss", "range")
 """Kinds of elements that are off in both files (see ``content``): a difference in them is listed, and not compared."""
 STILL = 1e-13
-"""Relative change of accelerations below which an element has no influence."""
+"""Relative change of accelerations and of the mass matrix below which an element has no influence."""
 Key = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
 
@@ -32,8 +32,8 @@ States = list[tuple[np.ndarray, np.ndarray]]
 @dataclass(frozen=True, eq=False)
 class Difference:
     """An element that differs: what it is, its values in both files (None: it has none), its unit, and its influence,
-    the largest relative change of accelerations when it alone is as in the other file (None where it has no try);
-    said : its kind in words, where that says more."""
+    the largest relative change of accelerations when it alone is as in the other file, or of the mass matrix where
+    no acceleration changes (None where it has no try); said : its kind in words, where that says more."""
 
     kind: str
     owner: str
@@ -66,7 +66,7 @@ class Comparison:
 
     @property
     def influential(self) -> tuple[Difference, ...]:
-        """Differences that change accelerations, or could not be tried."""
+        """Differences that change accelerations or the mass matrix, or could not be tried."""
         tried = (each for each in self.differences if each.kind not in OFF)
         return tuple(each for each in tried if each.influence is None or each.influence > STILL)
 
@@ -77,7 +77,7 @@ class Comparison:
 
     @property
     def silent(self) -> tuple[Difference, ...]:
-        """Differences that change no acceleration."""
+        """Differences that change neither."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
 
@@ -116,9 +116,11 @@ class _Trial:
     base: list[Moved]
 
     def influence(self, model: mujoco.MjModel) -> float | None:
-        """Largest relative change of accelerations by a changed model; None where it cannot be built."""
+        """Largest relative change by a changed model: of accelerations, or of the mass matrix where these stay; None
+        where it cannot be built."""
         try:
-            return agreement("", self.base, self.moved(model), self.twin).acceleration
+            change = agreement("", self.base, self.moved(model), self.twin)
+            return change.acceleration if change.acceleration > STILL else change.mass
         except RunFailed:
             return None
 

@@ -186,9 +186,14 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         return rows + [f"  {each.sentence(names)}" for each in comparison.differences]
     apart, influential = comparison.apart, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
-    rows = [f"{head}: accelerations differ by {apart.acceleration:.1e}, most at {apart.worst}"]
+    rows = [
+        f"{head}: accelerations differ by {apart.acceleration:.1e}, most at {apart.worst}; "
+        f"mass matrices by {apart.mass:.1e}"
+    ]
     for each in influential:
-        size = "cannot be tried" if each.influence is None else f"changes accelerations by {each.influence:.1e}"
+        size = (
+            "cannot be tried" if each.influence is None else f"changes accelerations or masses by {each.influence:.1e}"
+        )
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
