@@ -16,6 +16,7 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.strict import Strict, read
 from models.identification.held_out import Identified, Search, identified
+from models.identification.of_scene import SceneModel
 from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
 from models.systems.single_track.scene import SingleTrackScene, build
 from studies.command.identify import as_dict, lines
@@ -59,7 +60,7 @@ def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Identify, predict, compare with simpler vehicles: saves race_car.png and the drives."""
+    """Identify, predict, compare with simpler vehicles: saves race_car.png, predicted.nc and the drives."""
     from studies.race_car_figure import draw
 
     options = read(Options, scene.options, scene.file, "options")
@@ -69,6 +70,9 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     )
     others = {name: simpler(first, second, options, name, progress) for name in SIMPLER}
     draw(chosen, others, scene.title, folder / "race_car.png")
+    solved = chosen.known.fit
+    predicted = SceneModel(second, [each.name for each in solved.problem.parameters], "").result(solved.values)
+    predicted.save(folder / "predicted.nc")
     answer = figures(chosen)
     answer["identified"] = as_dict(chosen.known)
     answer["simpler vehicles"] = {
@@ -80,7 +84,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
         "folder": str(folder),
         "failed": {},
         "answer": answer,
-        "results": {},
+        "results": {"prediction": predicted},
         "table": [*lines(chosen.known), *_told(chosen, others), *_wrong(answer["residuals"])],
     }
 
