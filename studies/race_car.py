@@ -38,10 +38,24 @@ class Options(Strict):
     low_pass: float = Field(5.0, gt=0, le=50, description="Hz, of run and measurement alike, without phase")
     blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
     parameters: list[str] = Field(
-        list(PARAMETERS), min_length=1, description="keys that are identified, each KEY or KEY=LOW:HIGH"
+        [],
+        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: twelve of a measured race car, five of "
+        "the scene's own short drive, which determines no more",
     )
 
+    def asked(self) -> list[str]:
+        """Keys that are identified."""
+        return self.parameters or list(PARAMETERS if self.measurement else FEW)
 
+
+FEW = (
+    "vehicle.yaw_inertia=300:5000",
+    "front.stiffness=5:50",
+    "front.friction=0.3:3",
+    "rear.stiffness=5:50",
+    "rear.friction=0.3:3",
+)
+"""What half a minute of driving determines; with all twelve the search does not settle, and predicts badly."""
 SIMPLER: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
@@ -65,9 +79,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 
     options = read(Options, scene.options, scene.file, "options")
     first, second = stretches(scene, options, folder)
-    chosen = identified(
-        first, second, Search(options.parameters, list(AIMS), options.low_pass, options.blocks), progress
-    )
+    chosen = identified(first, second, Search(options.asked(), list(AIMS), options.low_pass, options.blocks), progress)
     others = {name: simpler(first, second, options, name, progress) for name in SIMPLER}
     draw(chosen, others, scene.title, folder / "race_car.png")
     solved = chosen.known.fit
@@ -128,7 +140,7 @@ def simpler(
 ) -> Identified:
     """The same with a vehicle of fewer numbers."""
     holds, kept = SIMPLER[name]
-    parameters = [text for text in options.parameters if any(word in text for word in kept)]
+    parameters = [text for text in options.asked() if any(word in text for word in kept)]
     few = Search(parameters, list(AIMS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
