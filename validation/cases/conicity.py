@@ -63,12 +63,27 @@ def _closed_forms() -> list[Row]:
     off_centre = 3.0 * (math.sqrt(right) - math.sqrt(left)) / (math.sqrt(right) + math.sqrt(left))
     return [
         _exact("cone", "cones of 1/20 at three amplitudes, relative error", cone, "the cone's tangent"),
-        _exact("offset", "the same with unequal radii", _off(wave.conicity, 0.05), "the offset moves the centre alone"),
-        _exact("offset.centre", "centre of that wave", abs(wave.centre + 1.0), "where both radii are equal, -1 mm"),
+        _exact(
+            "offset",
+            "cones on wheels of unequal radii, relative error",
+            _off(wave.conicity, 0.05),
+            "the offset moves the centre alone",
+        ),
+        _exact(
+            "offset.centre",
+            "cones on wheels of unequal radii, centre of the wave",
+            abs(wave.centre + 1.0),
+            "where both radii are equal, -1 mm",
+        ),
         _exact("two_slopes", "period on tread and flange root, two slopes", bent, "two sines, matched at the bend"),
         _exact("jump", "period with a jump in the middle", _off(jump.period, 4.0 * math.sqrt(4.0 / 0.3)), "parabolas"),
         _exact("uneven", "period of a wheel steeper than the other", _off(uneven.period, halves), "two half sines"),
-        _exact("uneven.centre", "centre of that wave", abs(uneven.centre + off_centre), "equal potential at both ends"),
+        _exact(
+            "uneven.centre",
+            "a wheel steeper than the other, centre of the wave",
+            abs(uneven.centre + off_centre),
+            "equal potential at both ends",
+        ),
     ]
 
 

@@ -44,7 +44,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
         Observed(
             "hub_forces.own_steps_centre",
             SYSTEM,
-            f"the same of {names}, which pick their own steps, held and linear forces",
+            f"centre of mass by {names}, which pick their own steps: largest distance from its parabolas",
             max(centre_gap(vehicle, m, how, name) for name, m in methods.items() for how in ("held", "linear")),
             "m",
         ).at_most(1e-10, f"a tolerance of {TIGHT:g} per step", "closed form"),
