@@ -227,7 +227,9 @@ FAULTS = (
     Fault(
         "cross terms of the axles missing",
         "covariance",
-        attribute("models.ride.covariance:_responses", lambda real: lambda A, met: [np.zeros_like(b) for b in met.B]),
+        attribute(
+            "models.ride.covariance:_responses", lambda real: lambda A, met, moved: [np.zeros_like(b) for b in met.B]
+        ),
     ),
     Fault(
         "noise without the root of the speed",
