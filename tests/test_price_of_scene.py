@@ -16,6 +16,7 @@ from models.advice.price.truth import at
 from models.core.assumptions import Assumption, judged
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
+from models.engines import outside
 from models.engines.outside import register
 from models.systems.pitch_plane.scene import build
 from validation.price.unseen import true_errors
@@ -192,6 +193,14 @@ class Fixed:
         return solve_ivp(f, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance).y.T
 
 
+@pytest.fixture
+def catalogue(monkeypatch):
+    """Engines from outside leave the catalogue with the test that entered them: others list what is in it."""
+    for table in (outside.CATALOGUE, outside.RECOMMENDED, outside.OUTSIDE):
+        monkeypatch.setitem(table, f"{__name__}:Fixed", None)  # which is taken back; until then register enters it
+
+
+@pytest.mark.usefixtures("catalogue")
 def test_an_integrator_of_ones_own_is_priced_by_its_tolerance():
     name = f"{__name__}:Fixed"
     register(name)
