@@ -60,7 +60,7 @@ class Match:
 
     @property
     def row(self) -> int:
-        """Where the error is largest."""
+        """Index of the sample at which the error is largest."""
         return int(np.abs(self.error).argmax())
 
     @property

@@ -213,7 +213,7 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
-        along = _along(channel)
+        along = _dimension_along(channel)
         over, grid = _grid(channel, along)
         others = [dim for dim in channel.dims if dim != along]
         for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
@@ -224,7 +224,7 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
             yield ", ".join((str(name), *labels)), quantity
 
 
-def _along(channel: Any) -> Any:
+def _dimension_along(channel: Any) -> Any:
     """The dimension that a channel is read along: time, or the longest whose entries are numbers or have no names."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)

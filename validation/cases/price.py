@@ -76,7 +76,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    priced, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _shared()
+    priced, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _in_processes()
     rows = [row for problem_rows, _ in priced for row in problem_rows]
     return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
@@ -104,7 +104,7 @@ def _priced(quick: bool, make: Make) -> CaseAnswer:
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _shared() -> tuple[list[CaseAnswer], CaseAnswer]:
+def _in_processes() -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems, and what is beside them, by as many processes as there are processors, two at most; the first of
     the problems last, but for the road, which is long."""
     with processes(min(2, os.cpu_count() or 1)) as pool:

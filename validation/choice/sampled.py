@@ -79,7 +79,7 @@ class Sampled:
         return expm(self._rate * later) @ self._variance
 
     def _by_road(self, axle: int) -> np.ndarray:
-        """Quantities by an axle's filters (q, m)."""
+        """Matrix (q, m) that gives the quantities from the states of the road filters of one axle."""
         m = len(self._rate)
         at = self.march.vehicle + axle * m
         return self.march.read[:, at : at + m]

@@ -158,7 +158,7 @@ class OtherTrack(Altered):
         return self.signal.sample(start, step, count) + self._beside().sample(start, step, count)
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (4,)."""
+        """Road at one time (s), shape (4,): heights under the front and the rear wheel (m), then their rates (m/s)."""
         return self.signal.at(time) + self._beside().at(time)
 
     def _beside(self) -> Any:

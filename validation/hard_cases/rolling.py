@@ -91,7 +91,7 @@ def through_zero(implementation: str, folder: Path) -> float:
 
 
 def energies(motion: Motion, w: Wheelset) -> np.ndarray:
-    """Energy (J) of a wheelset without suspension whose contacts are elastic: of motion, of weight, of the contacts."""
+    """Total energy (J) of a wheelset without suspension on elastic contacts: kinetic, of weight and of the contacts."""
     _, z, roll, _, _, vy, vz, roll_rate, yaw_rate, spin = motion.states.T
     turning = w.yaw_inertia * (roll_rate**2 + (yaw_rate * np.cos(roll)) ** 2) + w.spin_inertia * spin**2
     pressed = 0.4 * (motion.contacts["load"] * motion.contacts["depth"]).sum(axis=1)

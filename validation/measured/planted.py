@@ -61,7 +61,7 @@ def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[st
 
 @spoiling
 def lost(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """A channel that is silent from a time on, for another (s)."""
+    """Make a channel NaN from ``begin`` (s) on, for ``length`` (s)."""
     first = round(begin / virtual.period)
     samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
 

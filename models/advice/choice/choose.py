@@ -256,7 +256,7 @@ class Chooser:
         """Calls of all runs so far."""
         return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
-    def _exhausted(self) -> bool:
+    def _budget_spent(self) -> bool:
         """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
         whole_run = self.whole.variants.of()
         share = self._spent() / (RUNS * whole_run.counts["calls"]) if whole_run else 1.0
@@ -304,7 +304,7 @@ class Chooser:
             pairs = [pair for pair in combinations(self.effects, 2) if max(alone[effect] for effect in pair) > BUDGET]
             pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
             self._pairs = [
-                frozenset(pair) for pair in pairs if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET
+                frozenset(pair) for pair in pairs if not self._budget_spent() and self.share(frozenset(pair)) <= BUDGET
             ]
         return self._pairs
 
@@ -314,7 +314,7 @@ class Chooser:
         now, work = self.share(chosen), self.work(chosen)
         for step in steps:
             further = chosen | step
-            if further == chosen or step - chosen in banned or step in banned or self._exhausted():
+            if further == chosen or step - chosen in banned or step in banned or self._budget_spent():
                 continue
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0

@@ -86,7 +86,7 @@ class Recommendation:
 
     @property
     def whole(self) -> bool:
-        """Whether all of the run was searched."""
+        """Whether settings were searched over the full duration of the run, not its first part alone."""
         return self.scene.whole <= self.scene.first * (1 + 1e-9)
 
 

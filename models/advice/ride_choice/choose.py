@@ -148,7 +148,7 @@ class Chooser(Candidates):
         )
 
     def _greedy(self) -> tuple[Set, int]:
-        """The set, and how many were confirmed."""
+        """The set of effects to leave out, and how many sets were put to the test for it, failed ones too."""
         kept, banned, rounds = [frozenset[Effect]()], set[Set](), 0
         while rounds < ROUNDS:
             path = self.path(kept, banned)

@@ -58,7 +58,7 @@ def of_branch(wheelset: Wheelset) -> list[Assumption]:
     return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
 
 
-def by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
+def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
     """Sums over the patches of each wheel of values (n, patches)."""
     each = contacts.shape[1] // 2
     return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
@@ -89,7 +89,7 @@ def _presses(wheelset: Wheelset) -> Assumption:
         "wheels press",
         "both wheels stay on their rails",
         "start with a smaller displacement, or travel below the critical speed",
-        _of_path(lambda path: by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))),
+        _of_path(lambda path: sums_by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))),
         "N",
         least=LEAST_LOAD * wheelset.load / 2.0,
     )

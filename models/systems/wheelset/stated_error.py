@@ -27,7 +27,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.rail.equations import YAW, WheelsetPath, Y
 from models.rail.limit_cycle import Orbit
-from models.systems.wheelset.assumptions import by_wheel
+from models.systems.wheelset.assumptions import sums_by_wheel
 from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
 
 UNITS = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
@@ -64,7 +64,9 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
 
 def series(path: WheelsetPath) -> Series:
     """The principal channels of a path."""
-    forces = {name: np.stack([*by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")}
+    forces = {
+        name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
+    }
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
