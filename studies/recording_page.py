@@ -13,6 +13,7 @@ from models.core.assumptions import assumed_of, broken_of
 from models.core.discretisation import error_lines
 from models.core.result import Result
 from models.core.whole_files import write_whole
+from models.drawing.pages import environment_of
 from models.fatigue.damage import SLOPE
 from models.systems.measured.consequences import DAMAGE, FORCE
 from models.systems.measured.run import FREE, Examination
@@ -38,15 +39,7 @@ def write(exam: Examination, path: Path, result: Result) -> Path:
 
 def page(exam: Examination, folder: Path, result: Result) -> str:
     """The page as text, with what the result says of its error and assumptions; figures pass through ``folder``."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of(Path(__file__).parent)
     environment.filters |= {"as": format, "png": lambda path: base64.b64encode(path.read_bytes()).decode()}
     library = exam.engine if exam.engine != "reference" else "numpy"
     return environment.get_template(TEMPLATE).render(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.core.whole_files import write_whole
+from models.drawing.pages import environment_of
 from models.own_model.elements import Element, elements
 from studies.command.twin import Twins, verdict
 
@@ -24,15 +25,7 @@ def write(twins: Twins, path: Path) -> Path:
 
 def page(twins: Twins) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of(Path(__file__).parent)
     environment.filters |= {"short": lambda number: f"{number:.1e}", "g": lambda number: f"{number:.6g}"}
     return environment.get_template(TEMPLATE).render(
         twins=twins,

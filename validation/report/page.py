@@ -17,6 +17,7 @@ from typing import Any, get_args
 
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
+from models.drawing.pages import environment_of
 from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
 from validation.report.blind_spots import blind_spots
 from validation.report.numbers import duration, error, margin, marked, number, numeric_columns, powers, share
@@ -192,15 +193,7 @@ def read(path: Path) -> Saved:
 
 def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of(Path(__file__).parent)
     filters = (number, error, share, duration, powers, marked, numeric_columns)
     environment.filters |= {filter.__name__: filter for filter in filters}
     environment.globals |= {"margin": margin, "case_of": case_of}
