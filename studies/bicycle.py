@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from models.core.errors import RunFailed
@@ -87,7 +86,6 @@ def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: di
         axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} from upright")
     axes[2].legend()
     heading(drawn, scene.title, runs)
-    plt.close(drawn)
     return save(drawn, path)
 
 

@@ -146,12 +146,12 @@ PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "fi
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
-    from models.drawing.figures import WIDE, heading, legend_below, plt, save
+    from models.drawing.figures import WIDE, heading, legend_below, save, subplots
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
     names, each = list(scene.procedures), len(options.controllers)
-    figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(WIDE, 6.0), squeeze=False, sharey="row")
+    figure, axes = subplots(len(PANELS), max(len(surfaces), 1), figsize=(WIDE, 6.0), squeeze=False, sharey="row")
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
         for row, (key, quantity) in enumerate(PANELS.items()):

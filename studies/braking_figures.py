@@ -3,13 +3,26 @@
 from pathlib import Path as File
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 from models.brake.plane_chain import ChainPoint, place_of
 from models.brake.plane_vehicle import Plane
 from models.core.told import Results
-from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, PINK, SKY, SMALL, VERMILION, WIDE, heading, save
+from models.drawing.figures import (
+    BLUE,
+    DARK,
+    GREEN,
+    ORANGE,
+    PINK,
+    SKY,
+    SMALL,
+    VERMILION,
+    WIDE,
+    heading,
+    save,
+    subplot_mosaic,
+)
 from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, sides, vehicle_of
 from models.systems.braking.plan import behind
@@ -33,7 +46,7 @@ def stop_figure(
     aside, lean = _moves_aside(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
-    figure, axes = plt.subplot_mosaic([*rows, ["road", "road"]], figsize=(WIDE, 2.3 * (len(rows) + 1) + 0.4))
+    figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(WIDE, 2.3 * (len(rows) + 1) + 0.4))
     _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
     _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
@@ -71,7 +84,7 @@ def _moves_aside(stop: Stop) -> bool:
     return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
 
 
-def _speeds(axis: plt.Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
+def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
     for i, values in enumerate(rims.T):
         axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=WHEELS[i])
     if measured is not None and measured.speeds is not None:
@@ -81,13 +94,13 @@ def _speeds(axis: plt.Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPres
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
 
 
-def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
+def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
     for i, row in enumerate(values.T):
         axis.plot(times, row, color=COLOURS[i], lw=0.8, label=WHEELS[i])
     axis.set(xlabel="time [s]", ylabel=label, title=title)
 
 
-def _lean(axis: plt.Axes, times: np.ndarray, lean: np.ndarray) -> None:
+def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
     """Roll and pitch (n, 2) in rad of the body."""
     for values, colour, label in zip(
         np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
@@ -97,7 +110,7 @@ def _lean(axis: plt.Axes, times: np.ndarray, lean: np.ndarray) -> None:
     axis.legend(fontsize=SMALL)
 
 
-def _angles(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
+def _angles(axis: Axes, stop: Stop, trailer: bool) -> None:
     """Yaw, side slip and, of a train, the hitch."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
@@ -127,7 +140,7 @@ def _box(front: float, rear: float) -> np.ndarray:
     return np.array([[ahead, BESIDE], [ahead, -BESIDE], [behind, -BESIDE], [behind, BESIDE], [ahead, BESIDE]])
 
 
-def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
+def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     """The path from above with the vehicle's outline now and then, on its surfaces."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0

@@ -315,11 +315,11 @@ def misled(choice_of: SceneChoice) -> list[str]:
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     """A panel per scene; one more for the activity of those that have it."""
-    from models.drawing.figures import WIDE, heading, plt, save
+    from models.drawing.figures import WIDE, heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
     heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(choice.alone), 4)) for choice, active in shown]
-    figure, axes = plt.subplots(len(shown), 1, figsize=(WIDE, sum(heights) + 0.5), squeeze=False, height_ratios=heights)
+    figure, axes = subplots(len(shown), 1, figsize=(WIDE, sum(heights) + 0.5), squeeze=False, height_ratios=heights)
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _activity(axis, choice) if active else _changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"

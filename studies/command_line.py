@@ -17,8 +17,9 @@ from typer.exceptions import TyperException
 
 from models.core.errors import InputError, RunFailed
 from models.core.whole_files import reason_of
+from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plain_arrays, plan_of, ready
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.finishing import end, finish, folder_of, untold, watched
 from studies.command.waiting import waiting
@@ -189,6 +190,8 @@ def run_scene(
     with _queried(loaded):
         with waiting("checking the scene", loaded.system):
             module = ready(loaded, engines)
+        if plain_arrays(loaded, engines, module):
+            leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)

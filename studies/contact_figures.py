@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 
 from models.contact.fields import Fields
@@ -24,8 +25,8 @@ from models.drawing.figures import (
     WIDE,
     heading,
     legend_below,
-    plt,
     save,
+    subplots,
 )
 from models.systems.contact.scene import Sweep
 from models.systems.contact.work_precision import TARGETS, TheoryPoint
@@ -45,7 +46,7 @@ def contact_figure(
     """
     length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
     size = WIDE, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
-    figure, axes = plt.subplots(1, 2, figsize=size, sharex=True, sharey=True)
+    figure, axes = subplots(1, 2, figsize=size, sharex=True, sharey=True)
     _pressure(axes[0], patches, pressure)
     _tractions(axes[1], patches, friction, max(length, width) / ARROWS)
     for axis in axes:
@@ -88,7 +89,7 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
         x, y, px, py = _arrows(f, spacing / MILLI)
         arrows = axis.quiver(MILLI * x, MILLI * y, px, py, **scaled, width=0.004, color=DARK)
     axis.quiverkey(arrows, 0.9, 1.03, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
-    marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
+    marks = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
     area = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
     slip = float(area[np.concatenate([f.slips[f.inside] for f in patches])].sum() / area.sum())
     labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
@@ -120,7 +121,7 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
 
     forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
     limit = 1e-3 * body.friction * body.pressing.load
     stated, none = "error_of_cells" in forces.data, 0.0 * values
@@ -175,7 +176,7 @@ def price_figure(price: Result, title: str) -> Figure:
     FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
     """
     widths = (1.3, 1.0, 1.0)
-    figure, axes = plt.subplots(1, 3, figsize=(WIDE, 4.6), sharey=True, width_ratios=widths)
+    figure, axes = subplots(1, 3, figsize=(WIDE, 4.6), sharey=True, width_ratios=widths)
     points: list[TheoryPoint] = price.detail
     for name in STYLES:
         line = [point for point in points if point.name == name]

@@ -204,10 +204,12 @@ def _figure(
     times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, results: Results, folder: Path
 ) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
-    from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, DARK, WIDE, heading, plt, save
+    from matplotlib.artist import setp
 
-    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
+    from models.drawing.drift import draw_fan
+    from models.drawing.figures import BLUE, DARK, WIDE, heading, save, subplots
+
+    figure, (fan, histogram) = subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
@@ -222,7 +224,7 @@ def _figure(
     histogram.set_title(f"Drift-offs: paths [-] ({len(drift_off) - len(drifted)} never)")
     if len(drifted):
         histogram.legend()
-    plt.setp((fan, histogram), xlabel="time [s]")
+    setp((fan, histogram), xlabel="time [s]")
     title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
     heading(figure, title, results)
     save(figure, folder / "ensemble.png")

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 from models.core.told import Results
 from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, heading, legend_below, panels, save
@@ -44,7 +44,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     return save(figure, path)
 
 
-def _path(axis: plt.Axes, drive: Drive) -> None:
+def _path(axis: Axes, drive: Drive) -> None:
     x, y, _ = drive.path.T
     axis.plot(x, y, color=DARK)
     x, y_few, yaw = drive.path[:: max(1, len(x) // 8)].T
@@ -55,7 +55,7 @@ def _path(axis: plt.Axes, drive: Drive) -> None:
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
 
 
-def _circle(axis: plt.Axes, drive: Drive) -> None:
+def _circle(axis: Axes, drive: Drive) -> None:
     """Forces of each tyre by mu N: inside of the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)

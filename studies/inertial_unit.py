@@ -212,9 +212,9 @@ def _percent(share: float) -> str:
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
     """Angle error and damage error over the length of the drive, a line per grade."""
-    from models.drawing.figures import DARK, WIDE, heading, legend_below, plt
+    from models.drawing.figures import DARK, WIDE, heading, legend_below, subplots
 
-    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, axes = subplots(1, 2, figsize=(WIDE, 3.8))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
         of_grade = [row for row in rows if row["grade"] == grade]
@@ -234,9 +234,9 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
 def _figure_curve(curve: CubicSpline) -> Any:
     """Damage over a constant angle error."""
     from models.drawing.drift import NAMES
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import heading, subplots
 
-    figure, axis = plt.subplots(figsize=(7, 3.8))
+    figure, axis = subplots(figsize=(7, 3.8))
     angles = np.linspace(curve.x[0], curve.x[-1], 401)
     for i, name in enumerate(CHANNELS):
         axis.semilogy(np.degrees(angles), np.exp(curve(angles)[:, i]), label=NAMES[name])

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.drawing.figures import BLUE, DARK, SKY, VERMILION, heading, plt, save
+from models.drawing.figures import BLUE, DARK, SKY, VERMILION, heading, save, subplots
 
 if TYPE_CHECKING:
     from studies.race_car import Identified
@@ -19,7 +19,7 @@ def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path
     problem = chosen.bands.problem
     times = problem.clock.times
     shown = times <= times[0] + SECONDS
-    figure, axes = plt.subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6), layout="constrained")
+    figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6), layout="constrained")
     for axis, channel, row, half in zip(
         axes, problem.channels, chosen.bands.predicted, chosen.bands.half_width, strict=False
     ):

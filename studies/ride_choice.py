@@ -180,11 +180,11 @@ def choice_figure(
     path: Path,
 ) -> None:
     """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
-    from models.drawing.figures import DARK, WIDE, heading, plt, save
+    from models.drawing.figures import DARK, WIDE, heading, save, subplots
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
     heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS
-    figure, (above, below) = plt.subplots(2, 1, figsize=(WIDE, sum(heights) + 0.4), height_ratios=heights)
+    figure, (above, below) = subplots(2, 1, figsize=(WIDE, sum(heights) + 0.4), height_ratios=heights)
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)

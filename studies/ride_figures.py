@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from models.core.told import Results
 from models.drawing.figures import (
@@ -20,8 +22,8 @@ from models.drawing.figures import (
     heading,
     legend_below,
     panels,
-    plt,
     save,
+    subplots,
     wrapped,
 )
 from models.drawing.figures import COLOURS as ENGINES
@@ -53,7 +55,7 @@ def along_figure(
     places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, above: Heading, path: Path
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.0))
     name = _middle(vehicle)
     for i, case in enumerate(at.cases):
         left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
@@ -103,7 +105,7 @@ def outputs_figure(
     _save(figure, above, ": standard deviations over speed", path)
 
 
-def _say_where_none(axis: plt.Axes) -> None:
+def _say_where_none(axis: Axes) -> None:
     """Words in a panel whose curves have no finite value, as of forces under white noise."""
     if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
         axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
@@ -141,7 +143,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
     if not shown:
         return
-    figure, axes = plt.subplots(1, len(shown), figsize=(WIDE, 4.2), squeeze=False)
+    figure, axes = subplots(1, len(shown), figsize=(WIDE, 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
@@ -157,7 +159,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: Heading, path: Path) -> None:
     """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.0))
     if fitted is not None:
         spectra = fitted.spectra
         left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
@@ -185,7 +187,7 @@ def detail_figure(
     share = 0.66 * WIDE / len(errors)
     heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
-    figure, axis = plt.subplots(figsize=(WIDE, 0.3 * len(names) + 2.2))
+    figure, axis = subplots(figsize=(WIDE, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
     for i, j in np.ndindex(values.shape):
         if np.isfinite(values[i, j]):
@@ -212,7 +214,7 @@ def drive_figure(
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
     groups = list(dict.fromkeys(kinds[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
-    figure, axes = plt.subplots(
+    figure, axes = subplots(
         len(heights), 1, figsize=(WIDE, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
@@ -290,18 +292,18 @@ def engine_spectra_figure(
     _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
 
 
-def _few(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
+def _few(count: int) -> tuple[Figure, list[Axes]]:
     """Two or three small panels beside each other."""
     figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 
 
-def _name_below(axis: plt.Axes, drop: float = 0.18) -> None:
+def _name_below(axis: Axes, drop: float = 0.18) -> None:
     """The legend below a panel, by a share of its height that leaves room for what is written there."""
     axis.legend(fontsize=SMALL, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 
-def _save(figure: plt.Figure, above: Heading, text: str, path: Path) -> None:
+def _save(figure: Figure, above: Heading, text: str, path: Path) -> None:
     heading(figure, above.title + text, above.results)
     save(figure, path)

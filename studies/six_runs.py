@@ -123,9 +123,9 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
 
 
 def _figure_measurement(measured: Result) -> Any:
-    from models.drawing.figures import WIDE, heading, legend_below, plt
+    from models.drawing.figures import WIDE, heading, legend_below, subplots
 
-    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 4.6), sharex="col", width_ratios=(2, 1))
+    figure, axes = subplots(2, 2, figsize=(WIDE, 4.6), sharex="col", width_ratios=(2, 1))
     middle = round(float(measured.times[-1]) / 2, 1)
     detail = (measured.times >= middle) & (measured.times <= middle + 1)
     panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))
@@ -136,16 +136,17 @@ def _figure_measurement(measured: Result) -> Any:
         whole.set_title(label)
         part.set_title("Detail, " + label[label.index("[") :])
     legend_below(figure, axes[0, 0])
-    plt.setp(axes[1], xlabel="time [s]")
+    for axis in axes[1]:
+        axis.set_xlabel("time [s]")
     heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured})
     return figure
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
     """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
-    from models.drawing.figures import TRUTH, WIDE, heading, legend_below, plt
+    from models.drawing.figures import TRUTH, WIDE, heading, legend_below, subplots
 
-    figure, (heave, pitch) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (heave, pitch) = subplots(1, 2, figsize=(WIDE, 3.8))
     (name, measured), *runs = results.items()
     pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
@@ -159,9 +160,9 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
 
 
 def _figure_moment(result: Result) -> Any:
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
-    figure, (inertia, moment) = plt.subplots(1, 2, figsize=(WIDE, 3.2))
+    figure, (inertia, moment) = subplots(1, 2, figsize=(WIDE, 3.2))
     inertia.plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
     inertia.set(title="Inertia term I β'' [kN m]", xlabel="time [s]")
     moment.plot(result.times, result["enforced_moment"], linewidth=0.5)

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from models.core.result import Result
-from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, plt, save
+from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, save, subplots
 from models.rail.equations import YAW, Y
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.limit_cycle import Orbit
@@ -22,7 +23,7 @@ SHOWN = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
-def _note(axis: plt.Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
+def _note(axis: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
     """Text that ends so many points beside a place."""
     axis.annotate(text, place, shift, textcoords="offset points", ha="right", **style)
 
@@ -37,7 +38,7 @@ def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), MARKS[engine], **style)
@@ -76,7 +77,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     name, first = next(iter(paths.items()))
     rows = (2, 1) if len(paths) > 1 else (2,)
     size = WIDE, 1.1 + 1.3 * sum(rows)
-    figure, axes = plt.subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
+    figure, axes = subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
     for column, (speed, path_then) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
             states, colour = motions[speed].states, COLOURS[engine]
@@ -98,7 +99,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
     """Creep forces on each wheel and their power in the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
-    figure, axes = plt.subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
+    figure, axes = subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
         last = course.times >= course.times[-1] - SHOWN
         for side, colour, sums in _wheels(course.contacts[last], "fx", "fy", "power"):
@@ -118,7 +119,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
     orbits: Sequence[Orbit] = branch.detail
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
     )
@@ -149,7 +150,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
@@ -173,7 +174,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
 def conicity_figure(run: Result, title: str, path: Path) -> None:
     """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
     conicities: Conicities = run.detail
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.6))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.6))
     table, rows = conicities.table, conicities.rows
     left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="difference of the rolling radii")
     for row in rows:

@@ -7,7 +7,7 @@ import pytest
 from figure_rules import faults
 from matplotlib.figure import Figure
 
-from models.drawing.figures import SMALL, TURNS, WIDE, about_one, heading, legend_below, panels, plt, wrapped
+from models.drawing.figures import SMALL, TURNS, WIDE, about_one, heading, legend_below, panels, subplots, wrapped
 
 
 @pytest.fixture
@@ -21,7 +21,6 @@ def usual():
     legend_below(figure, *axes)
     heading(figure, "A figure as all of them are")
     yield figure, axes
-    plt.close(figure)
 
 
 def test_usual_figure_has_no_fault(usual):
@@ -119,17 +118,15 @@ def test_pages_of_drawings_use_the_palette():
 
 
 def test_ratios_near_one_and_far_away_are_both_told():
-    figure, axis = plt.subplots()
+    _, axis = subplots()
     about_one(axis, "y", [1e-3, 0.9, 1.0, 1.1, 1e3])
     low, near, one, high, far = axis.transData.transform([(0, value) for value in (1e-3, 0.9, 1.0, 1.1, 1e3)])[:, 1]
-    plt.close(figure)
     assert high - one > 0.1 * (far - low) and one - near > 0.1 * (far - low)
 
 
 def test_places_without_a_panel_are_taken_away():
     figure, axes = panels(3, 2, 2.0, sharex=True)
     assert len(axes) == 3 == len(figure.axes) and figure.get_figwidth() == WIDE
-    plt.close(figure)
 
 
 def test_lines_are_broken_where_a_figure_ends():

@@ -1,13 +1,12 @@
 """Labels of logarithmic axes: plain text, powers where there are many decades, numbers that fit where there are few."""
 
-from models.drawing.figures import plt
+from models.drawing.figures import subplots
 
 
 def labels(low: float, high: float) -> list[str]:
-    figure, axis = plt.subplots()
+    _, axis = subplots()
     axis.set(xscale="log", xlim=(low, high))
     found = [label.get_text() for which in ("major", "minor") for label in axis.get_xticklabels(which=which)]
-    plt.close(figure)
     return [text for text in found if text]
 
 

@@ -14,7 +14,6 @@ from models.core import told
 from models.core.assumptions import breaches, broken_of
 from models.core.discretisation import Estimate, errors_of, stated
 from models.core.systems import load
-from models.drawing import figures
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 from studies.choice import chosen, lines
@@ -98,7 +97,6 @@ def test_curves_have_marks_at_the_points_of_their_own_engine(tmp_path, monkeypat
     marks = {line.get_label(): line.get_xydata().tolist() for line in seen[0].axes[0].lines}
     assert marks[WARNING["label"]] == [[2.0, 2.5]] and [2.0, 2.5] in marks[BROKEN["label"]]
     assert swept.broken("reference") == [1] and swept.warned("reference") == []
-    figures.plt.close("all")
 
 
 def test_what_results_say_survives_json(pulling):
@@ -272,9 +270,8 @@ def test_all_systems_that_have_samples_are_found_and_shown(monkeypatch, tmp_path
     rows, data = stated_errors.measure(True, tmp_path)
     assert {row.id for row in rows} >= {"stated_errors.silent", "stated_errors.ride.near", "stated_errors.cost"}
     saved = json.loads(json.dumps(data))
-    (table,), ((_, figure),) = stated_errors.tables(saved), stated_errors.draw(saved)
+    (table,), ((_, _),) = stated_errors.tables(saved), stated_errors.draw(saved)
     assert len(table.rows) == 2
-    figures.plt.close(figure)
 
 
 def test_results_of_engines_are_not_of_others(pulling):

@@ -11,7 +11,6 @@ from functools import lru_cache
 from typing import Literal, Protocol, get_args
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from models.core.errors import InputError
 
@@ -142,6 +141,8 @@ class Smooth:
     _pieces: np.ndarray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        from scipy.interpolate import make_interp_spline
+
         times = self.period * np.arange(len(self.values))
         spline = make_interp_spline(times, self.values, k=self.degree)
         powers = [spline.derivative(i)(times[:-1]) if i else self.values[:-1] for i in range(self.degree + 1)]

@@ -4,6 +4,8 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import NullLocator
 
 from models.core.told import Results
@@ -19,7 +21,7 @@ from models.drawing.figures import (
     about_one,
     heading,
     legend_below,
-    plt,
+    subplots,
 )
 from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 
@@ -48,7 +50,7 @@ def decision(rows: list[Row], limits: Limits, grade: float | None, results: Resu
     """One line per method: damage, pitch error, artificial moment, the two verdicts and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (2.5, 1.25, 1.25, 1.5)
-    figure, axes = plt.subplots(1, 4, figsize=(WIDE, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
+    figure, axes = subplots(1, 4, figsize=(WIDE, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
     for row in rows:
         _marks(axes, row, methods.index(row["method"]))
     right = (1 - limits.damage_error, 1 + limits.damage_error)
@@ -117,18 +119,18 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
 def _legend(figure: Any, grade: float | None) -> None:
     """Marks and roads, below."""
     marks = [
-        plt.Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=NAMES[channel])
+        Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=NAMES[channel])
         for channel, mark in MARKS.items()
     ]
     words = {"road": "on the road as it is", "grade": f"on the same road with a grade of {grade or 0:g} rad"}
     roads = [
-        plt.Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
+        Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
         for road, word in words.items()
         if road == "road" or grade is not None
     ]
-    good = plt.Rectangle((0, 0), 1, 1, color=GOOD, alpha=0.16, label="within the limits")
+    good = Rectangle((0, 0), 1, 1, color=GOOD, alpha=0.16, label="within the limits")
     signs = [
-        plt.Line2D([], [], marker="s", linestyle="", color=colour, markersize=5, label=f"{sign} {word}")
+        Line2D([], [], marker="s", linestyle="", color=colour, markersize=5, label=f"{sign} {word}")
         for word, (sign, colour) in WORDS.items()
     ]
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
@@ -139,7 +141,7 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
 
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
     """
-    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 4.6))
+    figure, axes = subplots(1, 2, figsize=(WIDE, 4.6))
     for road, curve in sweep.items():
         name, colour = ROADS[road]
         axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring {name}")

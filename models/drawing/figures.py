@@ -12,14 +12,12 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
 from matplotlib.scale import LogScale, register_scale
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullLocator
 
@@ -60,13 +58,13 @@ COLOURS = _Colours({"reference": DARK, "exudyn": BLUE, "mujoco": VERMILION})
 LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"})
 """As figures call them; one from outside the tree by its own name and in a colour of its own."""
 
-plt.rcParams.update(
+rcParams.update(
     {
         "figure.dpi": 110,
         "savefig.dpi": 150,
         "font.size": 8.5,
         "axes.titlesize": TITLE,
-        "axes.prop_cycle": plt.cycler(color=TURNS),
+        "axes.prop_cycle": cycler(color=TURNS),
         "figure.titlesize": 10.5,
         "figure.labelsize": 8.5,
         "legend.fontsize": 8,
@@ -99,7 +97,7 @@ def wrapped(text: str, inches: float, size: float) -> str:
 
 def heading(figure: Figure, title: str, results: Results | None = None) -> None:
     """Title of a whole figure, above its left edge; below the figure what its results must be doubted for."""
-    size, wide = plt.rcParams["figure.titlesize"], figure.get_figwidth()
+    size, wide = rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
         broken = wrapped("\n".join(told), 1.12 * wide, REMARK)
@@ -110,13 +108,37 @@ def heading(figure: Figure, title: str, results: Results | None = None) -> None:
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color=BAD)
 
 
+def drawing(size: tuple[float, float] | None = None) -> Figure:
+    """An empty figure of so many inches, or of matplotlib's size: without pyplot, which takes longer to import than
+    most figures take to draw and keeps each until it is closed."""
+    figure = Figure(figsize=size)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def subplots(
+    rows: int = 1, columns: int = 1, figsize: tuple[float, float] | None = None, **more: Any
+) -> tuple[Figure, Any]:
+    """A figure with panels in rows and columns; figsize : inches; more : as for matplotlib's ``Figure.subplots``."""
+    figure = drawing(figsize)
+    return figure, figure.subplots(rows, columns, **more)
+
+
+def subplot_mosaic(
+    places: Sequence[Sequence[str]], figsize: tuple[float, float] | None = None, **more: Any
+) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with panels by their names in rows of ``places``; more : as for ``Figure.subplot_mosaic``."""
+    figure = drawing(figsize)
+    return figure, figure.subplot_mosaic([list(row) for row in places], **more)
+
+
 def panels(count: int, across: int, height: float, wide: float = WIDE, **more: Any) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, ``across`` of them beside each other, each so many inches high; no place is empty.
 
-    more : as for ``plt.subplots``; panels that share an axis show its numbers once.
+    more : as for ``subplots``; panels that share an axis show its numbers once.
     """
     down = -(-count // across)
-    figure, axes = plt.subplots(down, across, figsize=(wide, height * down), squeeze=False, **more)
+    figure, axes = subplots(down, across, figsize=(wide, height * down), squeeze=False, **more)
     for place, axis in enumerate(axes.flat[count:], count):
         axes.flat[place - across].xaxis.set_tick_params(labelbottom=True)
         axis.remove()
@@ -134,19 +156,21 @@ def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
 
 def _lines_of_legends(figure: Figure) -> int:
     """Number of lines that the legends below a figure's axes take, in units of a remark's line."""
-    if figure.legends:
-        figure.draw_without_rendering()
     tops = [legend.get_window_extent().y1 for legend in figure.legends]
     lowest = max((top for top in tops if top < figure.bbox.height / 2), default=0.0)
     return int(np.ceil(lowest / (1.2 * REMARK * figure.dpi / 72)))
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write ``path`` (.svg or .png) without a date, close the figure and return the path."""
-    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    """Write ``path`` (.svg or .png) without a date, and return the path; drawn once, where ``savefig`` draws twice."""
     with whole_file(path) as part:
-        figure.savefig(part, metadata=metadata)
-    plt.close(figure)
+        if path.suffix == ".svg":
+            from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+            FigureCanvasSVG(figure).print_svg(part, metadata={"Date": None})
+        else:
+            figure.set_dpi(rcParams["savefig.dpi"])
+            FigureCanvasAgg(figure).print_png(part, metadata={"Software": None})
     return path
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
-from scipy.integrate import solve_ivp
 
 from models.core.errors import RunFailed
 from models.core.signals import Stacked
@@ -174,6 +173,8 @@ class Reference:
             yield start, end, slice(*np.searchsorted(times, (start + small, end + small)))
 
     def _piece(self, start: float, end: float, y: np.ndarray, dense: bool):
+        from scipy.integrate import solve_ivp
+
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
 
         def rhs(t, y):

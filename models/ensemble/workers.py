@@ -12,6 +12,7 @@ from threading import Thread
 from typing import Any
 
 from models.core.errors import InputError
+from models.machine.left_out import let_in
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of glibc's mallopt, from its malloc.h."""
@@ -111,6 +112,7 @@ def cluster(address: str) -> Iterator[Executor]:
 
     Raises InputError where the extra ``cluster`` is not installed or nobody answers.
     """
+    let_in("dask")
     try:
         from distributed import Client
     except ImportError:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field
-from scipy.interpolate import CubicSpline
 
 from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
@@ -89,6 +88,8 @@ def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
 @cache
 def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
     """The arrays that ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
+    from scipy.interpolate import CubicSpline
+
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
     y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)

@@ -31,6 +31,7 @@ from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean, njit
 from models.machine.records import record
+from models.machine.stack import array, doubles
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.laid_profiles import laid_profile, no_profile
 from models.rail.profile_contact import TOUCH, LaidProfile, Pose, pressed, profile_on_rail
@@ -219,10 +220,13 @@ def _linear(a, b, motion, shear, poisson):
     if a <= 0.0:
         a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
     area, ratio = a * b, a / b
-    turn = area**1.5 * coefficient_at(2, ratio, poisson)
-    fx = -shear * area * coefficient_at(0, ratio, poisson) * x
-    fy = -shear * (area * coefficient_at(1, ratio, poisson) * y + turn * spin)
-    return fx, fy, shear * (turn * y - area**2 * coefficient_at(3, ratio, poisson) * spin)
+    c = array(doubles(4), (4,))
+    for kind in range(4):  # a loop, as numba compiles one function for each number that is written out
+        c[kind] = coefficient_at(kind, ratio, poisson)
+    turn = area**1.5 * c[2]
+    fx = -shear * area * c[0] * x
+    fy = -shear * (area * c[1] * y + turn * spin)
+    return fx, fy, shear * (turn * y - area**2 * c[3] * spin)
 
 
 @inlined

@@ -5,8 +5,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.special import digamma
 
 from models.core.errors import InputError
 from models.road.measured_tracks import MeasuredTracks, TrackSpectra, spectra
@@ -76,6 +74,8 @@ def fit(
 
 def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str) -> FilterFit:
     """ln S = ln(q / 2 pi) - ln(corner^2 + k^2), both unknowns as logarithms."""
+    from scipy.optimize import least_squares
+
     middle, mean = _bands(k, density, freedom, low, high)
     if len(middle) < 4:
         allowed = f"four bands or more are needed between {low:.3g} and {high:.3g} rad/m: the road is too short"
@@ -100,6 +100,8 @@ def _bands(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Middles (rad/m) and ln of the densities times k^2 averaged in bands, freed of the bias of a logarithm."""
+    from scipy.special import digamma
+
     count = max(1, round(PER_DECADE * math.log10(high / low))) if high > low else 0
     edges = np.geomspace(low, high, count + 1)
     middles, values = [], []

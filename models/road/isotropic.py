@@ -19,8 +19,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import quad
-from scipy.special import gamma, kv
 
 from models.core.errors import InputError
 from models.road.iso8608 import level_of_class
@@ -48,6 +46,8 @@ class Part:
 
     def density(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
         """Cross density (m^3) of tracks ``distance`` (m) apart, at 0 that of one track; infinite at Omega = 0 = a."""
+        from scipy.special import gamma, kv
+
         sigma, order = np.hypot(self.corner, wavenumber), self.waviness / 2.0
         with np.errstate(divide="ignore"):
             track = self.level * sigma**-self.waviness
@@ -97,6 +97,8 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
 
     Its error is about 1e-12 m times R(distance), whatever the density itself.
     """
+    from scipy.integrate import quad
+
     scale = covariance(abs(distance))
 
     def part(k: float) -> float:

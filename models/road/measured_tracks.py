@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import csd
-from scipy.stats import chi2
 
 from models.core.errors import InputError
 from models.road.csv_road import read_csv_tracks
@@ -62,6 +60,8 @@ class TrackSpectra:
 
     def band(self, level: float = 0.95) -> tuple[float, float]:
         """Factors on a density between which the true one lies with the probability ``level``."""
+        from scipy.stats import chi2
+
         low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.freedom)
         return self.freedom / high, self.freedom / low
 
@@ -121,6 +121,8 @@ def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> Track
     b = tracks.half_track
 
     def density(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        from scipy.signal import csd
+
         n, both = csd(x, y, 1.0 / tracks.increment, "hann", size, size // 2, detrend="linear")
         inner = (n > 0.0) & (n < n[-1])  # the ends stand once where all others stand for +- n
         return np.asarray(both[inner] / (4.0 * math.pi))  # one-sided over n, to two-sided over 2 pi n

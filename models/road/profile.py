@@ -11,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from models.core.errors import InputError
 from models.road import kernels
@@ -164,6 +163,8 @@ class SplineProfile:
         an error of order h^2 where the rest has h^4, for the sake of a curvature of 0 that no measured
         road has. Raises InputError for fewer points, points out of order or values that are not finite.
         """
+        from scipy.interpolate import CubicSpline
+
         s, zeta = _frozen(station, "station", 1), _frozen(height, "height", 1)
         if s.size < 4 or zeta.shape != s.shape:
             raise InputError(name, "points", (s.size, zeta.size), "as many heights as stations, 4 or more, are needed")

@@ -222,10 +222,10 @@ def _told(name: str, overlay: Overlay, count: int) -> Sequence[str]:
 
 def draw(overlay: Overlay, title: str, path: Path) -> None:
     """Draw measurement and run, and below their difference, of the channels of the largest relative error."""
-    from models.drawing.figures import BLUE, DARK, VERMILION, heading, plt, save
+    from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     shown = overlay.matches[:SHOWN]
-    figure, axes = plt.subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
+    figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, below), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
         top.plot(match.times, match.measured, color=DARK, linewidth=1.8, label="measured")

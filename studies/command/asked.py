@@ -61,6 +61,13 @@ def ready(scene: Any, engines: tuple[str, ...]) -> Any:
     return module
 
 
+def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
+    """Whether a study needs no array library besides numpy: it has no workers, no units to convert, no user's code."""
+    code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
+    shared = hasattr(module, "BLOCKS") or scene.system == "measured"
+    return not (code or shared or any(":" in engine for engine in engines))
+
+
 def plan_of(scene: Any) -> Any:
     """The module that describes and checks scenes of this one's system."""
     return import_module(KNOWN[scene.system].plan)

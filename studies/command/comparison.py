@@ -378,12 +378,23 @@ def _told(difference: Difference) -> str:
 def _figure(first: Path, second: Path, differences: list[Difference], results: Results, path: Path) -> None:
     """Draw both results and, below, their difference, of the three quantities that differ most, or one that is
     equal."""
-    from models.drawing.figures import BLUE, DARK, TITLE, VERMILION, WIDE, heading, legend_below, plt, save, wrapped
+    from models.drawing.figures import (
+        BLUE,
+        DARK,
+        TITLE,
+        VERMILION,
+        WIDE,
+        heading,
+        legend_below,
+        save,
+        subplots,
+        wrapped,
+    )
 
     differ = [each for each in differences if each.largest != 0][:3]
     shown = differ or differences[:1]
     share = 0.95 * WIDE / len(shown) - 0.3
-    figure, axes = plt.subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
+    figure, axes = subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
     for top, each in zip(axes[0], shown, strict=True):
         top.plot(each.grid, each.first, color=DARK, linewidth=2.0, label=str(first))
         top.plot(each.grid, each.second, color=VERMILION, linewidth=1.0, label=str(second))

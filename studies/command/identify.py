@@ -179,12 +179,12 @@ def _combined(known: Uncertainty) -> list[str]:
 
 def draw(known: Uncertainty, title: str, path: Path) -> None:
     """Every channel with the model at the estimates, the error below it."""
-    from models.drawing.figures import BLUE, DARK, VERMILION, heading, plt, save
+    from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     problem = known.fit.problem
     predicted, times = problem.predicted(known.fit.values), problem.clock.times
     count = len(problem.channels)
-    figure, axes = plt.subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
+    figure, axes = subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
     for (top, below), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):
         measured = np.where(channel.used, channel.values, np.nan)
         top.plot(times, measured, color=DARK, linewidth=1.2, label="measured")

@@ -20,8 +20,16 @@ SLOW = 0.4
 """s of one compilation from which on it is told: loading what was compiled before takes less."""
 KNOWN = 0.01
 """Share of a work from which on its time left is told."""
-COMPILING = {"pitch-plane": 5.0, "handling": 30.0}
-"""s that all kernels of a system take to compile on an idle core; an upper bound, as some may be there."""
+COMPILING = {
+    "pitch-plane": 5.0,
+    "ride": 5.0,
+    "wheelset": 15.0,
+    "contact": 15.0,
+    "hub-forces": 20.0,
+    "handling": 30.0,
+    "braking": 40.0,
+}
+"""s of processor that the kernels of a system's scenes take to compile; an upper bound, as some may be there."""
 LOCK = "numba:compiler_lock"
 """Numba's event from the beginning to the end of each compilation."""
 Tell = Callable[[str, float], None]

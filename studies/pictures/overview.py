@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 
 from models.core.result import Result
-from models.drawing.figures import COLOURS, DARK, GREY, LABELS, PALE, SMALL, WIDE, heading, plt, save
+from models.drawing.figures import COLOURS, DARK, GREY, LABELS, PALE, SMALL, WIDE, heading, save, subplot_mosaic
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 
@@ -40,7 +40,7 @@ SHOWN = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1.5)}
 def draw(path: Path) -> Path:
     """Run, draw, save ``path`` and return it."""
     alike = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
-    figure, axes = plt.subplot_mosaic(
+    figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(WIDE, 4.5), height_ratios=(1, 1.5)
     )
     _idea(axes["idea"])

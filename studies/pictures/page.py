@@ -5,13 +5,14 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrow
 from matplotlib.transforms import IdentityTransform
 
-from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY, plt
+from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY
 from studies.pictures.drawing import drawn
 from studies.pictures.film import FilmedMotion, Stage, gaps
 
@@ -39,7 +40,7 @@ class Page:
             [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
             for motion in motions
         ]
-        with plt.rc_context(LETTERS):
+        with rc_context(LETTERS):
             self._draw()
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 

@@ -234,9 +234,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
-    from models.drawing.figures import GREY, WIDE, heading, legend_below, plt
+    from models.drawing.figures import GREY, WIDE, heading, legend_below, subplots
 
-    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 5.8), sharex=True, sharey=True)
+    figure, axes = subplots(2, 2, figsize=(WIDE, 5.8), sharex=True, sharey=True)
     milliseconds = 1e3 * np.array(data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
     for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):

@@ -337,9 +337,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import BLUE, VERMILION, WIDE, heading, plt
+    from models.drawing.figures import BLUE, VERMILION, WIDE, heading, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
     predicted, confirmed_ = (100 * abs(np.array([v for each in data["scenes"] for v in each[key]])) for key in PARTS)
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")

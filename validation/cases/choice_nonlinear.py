@@ -204,9 +204,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import DARK, WIDE, heading, plt
+    from models.drawing.figures import DARK, WIDE, heading, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     for i, system in enumerate(data["systems"]):

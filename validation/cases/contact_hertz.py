@@ -212,9 +212,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Axes over the ratio of curvatures, and the error over the ratio of axes."""
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
     touching = by_load(curvature, 1.0, LOAD, Pair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):

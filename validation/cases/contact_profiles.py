@@ -239,9 +239,9 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Place of contact and its load over the shift."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import heading, subplots
 
-    figure, axis = plt.subplots(figsize=(7.0, 3.6))
+    figure, axis = subplots(figsize=(7.0, 3.6))
     for name, cases in data.items():
         points = [(case["shift"], place["rail"], place["load"]) for case in cases for place in case["places"]]
         shift, rail, load = np.array(points).T

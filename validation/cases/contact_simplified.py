@@ -368,10 +368,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Errors of the two pressure profiles by shape."""
     if "shapes" not in data:
         return []
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
     shapes = data["shapes"]
-    figure, axes = plt.subplots(1, 4, figsize=(WIDE, 4.2), sharey=True)
+    figure, axes = subplots(1, 4, figsize=(WIDE, 4.2), sharey=True)
     place = np.arange(len(shapes))
     for axis, (key, label) in zip(
         axes,

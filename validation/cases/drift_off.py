@@ -201,9 +201,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Measured over predicted."""
-    from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, plt
+    from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, subplots
 
-    figure, axis = plt.subplots(figsize=(5.2, 4.2))
+    figure, axis = subplots(figsize=(5.2, 4.2))
     ends = [each["predicted"] for each in data["combinations"]]
     line = np.array([0.9 * min(ends), 1.1 * max(ends)])
     axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color=DARK, linewidth=0, label="within 10 %")

@@ -214,9 +214,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Start-up ringing of the multiplier."""
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
-    figure, axis = plt.subplots(figsize=(WIDE, 3.2))
+    figure, axis = subplots(figsize=(WIDE, 3.2))
     paths = data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)

@@ -358,9 +358,9 @@ def draw(data: Saved) -> Drawn:
     if not data:
         return []
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, WIDE, heading, plt
+    from models.drawing.figures import BLUE, WIDE, heading, subplots
 
-    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(WIDE, 3.6), width_ratios=(3, 2))
+    figure, (fan, histogram) = subplots(1, 2, figsize=(WIDE, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
     fan.legend(loc="lower right")
     histogram.stairs(data["counts"], data["edges"], fill=True, color=BLUE, alpha=0.6)

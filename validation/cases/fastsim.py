@@ -349,9 +349,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Largest error over the cells."""
-    from models.drawing.figures import WIDE, heading, legend_below, plt
+    from models.drawing.figures import WIDE, heading, legend_below, subplots
 
-    figure, axis = plt.subplots(figsize=(WIDE, 4.4))
+    figure, axis = subplots(figsize=(WIDE, 4.4))
     for i, (name, values) in enumerate(data["cells"].items()):
         axis.loglog(
             CELLS,

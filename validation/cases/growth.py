@@ -340,10 +340,10 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import heading, subplots
 
     spread = data["spread"]
-    figure, axis = plt.subplots(figsize=(7.0, 3.6))
+    figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
         "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),
         "covariance": ("x", "covariance along the true path"),

@@ -259,9 +259,9 @@ def _id(name: str) -> str:
 
 def draw(data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.6))
+    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.6))
     for name, gap in data["gaps"].items():
         if max(map(abs, gap[1:])) > 1e-12:
             left.semilogy(data["times"], [abs(value) for value in gap], label=name)

@@ -395,11 +395,11 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import BLUE, WIDE, heading, plt
+    from models.drawing.figures import BLUE, WIDE, heading, subplots
 
     figures = []
     if data["ten minutes"]:
-        figure, axes = plt.subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
+        figure, axes = subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
         paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
         times = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):
@@ -411,7 +411,7 @@ def draw(data: Saved) -> Drawn:
         heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
         figures.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
     if data["recording"]:
-        figure, axis = plt.subplots(figsize=(6, 3.2))
+        figure, axis = subplots(figsize=(6, 3.2))
         axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
         axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
         heading(figure, "A minute in a real car: attitude from the gyro alone")

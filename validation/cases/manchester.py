@@ -297,10 +297,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Mean place and force of the right wheel beside CONTACT's."""
-    from models.drawing.figures import BLUE, GREY, WIDE, heading, legend_below, plt
+    from models.drawing.figures import BLUE, GREY, WIDE, heading, legend_below, subplots
 
     published = np.array(data["published"])
-    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.5))
+    figure, axes = subplots(1, 2, figsize=(WIDE, 3.5))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
         axis.plot(
             published[:, 0],

@@ -161,9 +161,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
-    from models.drawing.figures import BAD, COLOURS, DARK, LABELS, heading, plt
+    from models.drawing.figures import BAD, COLOURS, DARK, LABELS, heading, subplots
 
-    figure, ax = plt.subplots(figsize=(6.0, 4.6))
+    figure, ax = subplots(figsize=(6.0, 4.6))
     every = [verdict for of_engine in data["verdicts"] for verdict in of_engine]
     for engine in dict.fromkeys(verdict["curve"].split()[0] for verdict in every):
         of_engine = [verdict for verdict in every if verdict["curve"].startswith(engine)]

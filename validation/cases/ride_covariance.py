@@ -289,10 +289,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
-    from models.drawing.figures import WIDE, heading, legend_below, plt
+    from models.drawing.figures import WIDE, heading, legend_below, subplots
 
     shown = data["figure"]
-    figure, axes = plt.subplots(1, 3, figsize=(WIDE, 4.2), sharey=True)
+    figure, axes = subplots(1, 3, figsize=(WIDE, 4.2), sharey=True)
     for axis, place in zip(axes, ALONG, strict=True):
         for i, case in enumerate(shown["cases"]):
             words = "left/right {}, front/rear {}".format(*CASES[int(case)])

@@ -312,9 +312,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviations over time, quasi-stationary beside."""
     if not data:
         return []
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import WIDE, heading, subplots
 
-    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.9), sharey=True)
+    figure, axes = subplots(1, 2, figsize=(WIDE, 3.9), sharey=True)
     for axis, (name, drive) in zip(axes, data.items(), strict=True):
         for column, point in enumerate(POINTS):
             pick = [row[column] for row in drive["deviation"]]

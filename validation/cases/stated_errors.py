@@ -198,9 +198,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """True over stated error, both by the channel's deviation."""
-    from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, plt
+    from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, subplots
 
-    figure, axis = plt.subplots(figsize=(6.5, 5.0))
+    figure, axis = subplots(figsize=(6.5, 5.0))
     known = [sample for sample in data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
     for name, colour in zip(dict.fromkeys(sample["system"] for sample in known), (*TURNS, BAD), strict=False):
         stated = np.array([sample["share"] for sample in known if sample["system"] == name])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.drawing.figures import COLOURS, PALE, SKY, SMALL, VERMILION, WIDE, heading, plt
+from models.drawing.figures import COLOURS, PALE, SKY, SMALL, VERMILION, WIDE, heading, subplot_mosaic
 
 LAWS = (
     "no contact",
@@ -27,7 +27,7 @@ LINES = {1: ":", WHEELS: "-", 8: "--"}
 
 def figure(points: list[dict[str, Any]]) -> Figure:
     """Cost per step over the law; shares of engine, kernel and bridge over the law and over the number of wheels."""
-    drawing, places = plt.subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(WIDE, 8.6))
+    drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(WIDE, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]

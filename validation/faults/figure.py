@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from models.drawing.figures import SMALL, WIDE, heading, plt
+from models.drawing.figures import SMALL, WIDE, heading, subplots
 
 DECADES = 12
 """End of the colour scale; a refused run counts as this."""
@@ -25,7 +25,7 @@ def fault_map(
 
     ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
     """
-    figure, axes = plt.subplots(1, len(ratios), figsize=(WIDE, 1.6 + 0.17 * len(faults)), sharey=True)
+    figure, axes = subplots(1, len(ratios), figsize=(WIDE, 1.6 + 0.17 * len(faults)), sharey=True)
     heading(figure, "Which check sees which fault: decades above its tolerance")
     for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
         image = _cells(axis, np.array(values), checks)

@@ -25,7 +25,7 @@ from models.drawing.figures import (
     VERMILION,
     WIDE,
     heading,
-    plt,
+    subplots,
     wrapped,
 )
 from validation.price.tables import named
@@ -61,7 +61,7 @@ CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.lin
 
 def draw(measured: Measured) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
-    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 7.6), sharey=True)
+    figure, axes = subplots(1, 2, figsize=(WIDE, 7.6), sharey=True)
     styles = _styles(measured)
     top = 8 * max(measured.error(p) for p in measured.points if p.status == "ok")
     rounds = max(len(p.seconds) for p in measured.points)

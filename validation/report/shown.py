@@ -82,11 +82,9 @@ def _figures(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
 
 def inline(figure: Any, caption: str, key: str) -> Markup:
     """A figure as markup that needs nothing else; ``key`` keeps its identifiers apart from other figures'."""
-    from models.drawing.figures import plt
 
     vector = _svg(figure, caption, key)
     picture = vector if len(vector) <= LARGEST_SVG else _png(figure, caption)
-    plt.close(figure)
     return Markup(picture)
 
 

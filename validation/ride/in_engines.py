@@ -141,11 +141,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra of both engines' runs over the covariance's own."""
     if not data["spectra"]:
         return []
-    from models.drawing.figures import COLOURS, DARK, LABELS, WIDE, heading, legend_below, plt
+    from models.drawing.figures import COLOURS, DARK, LABELS, WIDE, heading, legend_below, subplots
 
     shown = data["spectra"]
     units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
-    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 6.0), sharex=True)
+    figure, axes = subplots(2, 2, figsize=(WIDE, 6.0), sharex=True)
     for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
         for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
             curves = shown[engine]

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path as Folder
 
 import numpy as np
-from scipy.optimize import root
 
 from models.brake.controller import Pressures, Sample
 from models.brake.plane_records import motion_of
@@ -175,6 +174,8 @@ class Circle:
 
     def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
         """The unknowns of a steady circle from a guess, and whether they are steady."""
+        from scipy.optimize import root
+
         unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from models.core.discretisation import Estimate, by_chance
 from models.core.errors import RunFailed
@@ -113,6 +112,8 @@ class Welch:
 
 def welch(first: Scatter, second: Scatter) -> Welch:
     """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
+    from scipy.stats import t as student
+
     a, b = first.error**2, second.error**2
     gap, error = second.mean - first.mean, sqrt(a + b)
     if error == 0.0:

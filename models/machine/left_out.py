@@ -1,0 +1,26 @@
+"""Libraries that another one looks for, and that this process does without.
+
+xarray imports dask (with its cluster) and pint where they are installed, to ask whether an array is one of theirs. That
+takes longer than all the rest of a short run, whose arrays are numpy's.
+"""
+
+import sys
+from typing import Any
+
+OF_LABELS = ("dask", "pint")
+"""Array libraries that xarray looks for."""
+
+
+def leave_out(*names: str) -> None:
+    """Make libraries that are not imported yet count as not installed in this process, until they are let in."""
+    modules: dict[str, Any] = sys.modules
+    for name in names:
+        modules.setdefault(name, None)
+
+
+def let_in(*names: str) -> None:
+    """Undo ``leave_out``: who imports one of these libraries calls this before, as it may have been left out."""
+    modules: dict[str, Any] = sys.modules
+    for name in names:
+        if name in modules and modules[name] is None:
+            del modules[name]
