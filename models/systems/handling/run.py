@@ -151,21 +151,21 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
-    again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
+    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
         name: values
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
     }
-    by_step, how = by_steps(Series(fine.times, moving), again, ORDER, again.step)
-    by_net = again.by_cells(list(moving))
+    by_step, how = by_steps(Series(fine.times, moving), rerun, ORDER, rerun.step)
+    by_net = rerun.by_cells(list(moving))
     told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
     return stated(run, told, f"{how}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
+class ManoeuvreRerun:
     """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
 
     engine: str
@@ -190,7 +190,7 @@ class Again:
 
     def __call__(self, factor: float, share: float) -> Series:
         """Run the manoeuvre again in twice the step, or its second half in half the step (see
-        ``models.core.discretisation.Again``)."""
+        ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:
