@@ -2,7 +2,7 @@
 
 from models.core.assumptions import assumption_lines
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.drive import read_drive
+from models.measured.drive import read_drive
 from models.systems.single_track.run import inputs
 from models.systems.single_track.scene import SingleTrackScene
 

@@ -10,7 +10,7 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.core.smoothing import smoothed
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.drive import Measured, read_drive
+from models.measured.drive import Measured, read_drive
 from models.systems.single_track.equations import march, reports
 from models.systems.single_track.scene import SensorTable, SingleTrackScene
 
