@@ -34,7 +34,7 @@ def test_car_that_made_the_drive_repeats_its_motion():
     for name, column in (("yaw rate", 3), ("side slip", 5)):
         error = drive[name][::20] - columns[:, column]
         assert np.sqrt(np.mean(error**2)) < 1.15 * NOISE[name]
-    assert np.sqrt(np.mean((drive["speed"][::20] - columns[:, 2]) ** 2)) < 2.0 * CLOSE * columns[:, 2].mean()
+    assert np.sqrt(np.mean((drive["forward speed"][::20] - columns[:, 2]) ** 2)) < 2.0 * CLOSE * columns[:, 2].mean()
 
 
 def test_other_tyres_do_not_repeat_it():

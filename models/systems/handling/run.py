@@ -63,7 +63,7 @@ REPORTS = {
 
 BELOW = "of the place below the chassis' centre, left positive"
 MOTION = {
-    "speed": ("m/s", "ahead, of the place below the chassis' centre"),
+    "forward speed": ("m/s", "of the place below the chassis' centre"),
     "yaw rate": ("rad/s", "left positive"),
     "lateral acceleration": ("m/s^2", BELOW),
     "side slip": ("rad", BELOW),
