@@ -97,7 +97,7 @@ def test_no_scene_without_a_measured_drive_reads_measurements():
     code = (
         "import sys; from studies.command.asked import load_scene; from models.systems.handling.run import run;"
         "scene = load_scene('handling', None); run(scene.model_copy(), 'mujoco', 'brake_in_curve');"
-        "print([m for m in sys.modules if m.startswith('models.measured')])"
+        "print([m for m in ('models.measured.drive', 'models.systems.handling.following') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

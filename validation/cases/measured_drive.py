@@ -11,14 +11,14 @@ from models.identification.of_scene import problem_of
 from models.identification.uncertainty import uncertainty
 from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene, build
-from studies.four_wheel_drive import NOISE
 from validation.common.rows import Observed, Row, System
 
 TITLE = "A car on four rolling tyres along a measured drive"
 SYSTEM: System = "rolling-vehicle"
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 MADE = SCENES / "single_track.csv"
-COLUMNS = {"yaw rate": 3, "side slip": 5}
+SENSORS = {"yaw rate": (3, 0.004), "side slip": (5, 0.0008)}
+"""Column of the file, and standard deviation (rad/s, rad) of the noise that its maker put on it."""
 START = (0.8, 1.2)
 """Ratios of both axles' cornering stiffness from which the search begins; the truth is 1."""
 OUTER = 18.4
@@ -57,11 +57,11 @@ def _motion_rows(drive: Any) -> list[Row]:
         Observed(
             f"measured_drive.{name.replace(' ', '_')}",
             SYSTEM,
-            f"a car repeats its own drive from steer angle and speed: ratio of the {name}'s error to the sensor's noise",
-            float(np.sqrt(np.mean((drive[name][::every] - made[:, column]) ** 2))) / NOISE[name],
+            f"a car repeats its own drive from steer and speed: ratio of the {name}'s error to the sensor's noise",
+            float(np.sqrt(np.mean((drive[name][::every] - made[:, column]) ** 2))) / noise,
             "",
         ).at_most(1.2, "the noise that was put on the file is what is left", "shared kernel")
-        for name, column in COLUMNS.items()
+        for name, (column, noise) in SENSORS.items()
     ]
 
 

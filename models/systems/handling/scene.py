@@ -81,9 +81,7 @@ class Manoeuvre(Strict):
 
     measured: str = Field(default="", description="CSV with time, steer (front wheels, left positive) and speed")
     stretch: list[float] = Field(
-        default=[],
-        max_length=2,
-        description="[s, s] of the measured file's time that are driven; all of it where empty",
+        default=[], max_length=2, description="[s, s] of the measured file's time that is driven; all of it where empty"
     )
     speed: float = quantity("m/s", "at the start; a measured drive has its own", default=0.0, zero=True)
     duration: float = quantity("s", "of the manoeuvre; of a measured drive all, or at most that", default=4.0)
