@@ -61,6 +61,15 @@ REPORTS = {
 }
 """Channels of every tyre: column of its report, unit, meaning."""
 
+BELOW = "of the place below the chassis' centre, left positive"
+MOTION = {
+    "forward speed": ("m/s", "of the place below the chassis' centre"),
+    "yaw rate": ("rad/s", "left positive"),
+    "lateral acceleration": ("m/s^2", BELOW),
+    "side slip": ("rad", BELOW),
+}
+"""Channels of the car, by the names of what is measured of one: unit, meaning."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drive:
@@ -94,6 +103,11 @@ class Drive:
         """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
         ahead, aside, turning = self.velocity().T
         return np.gradient(aside, self.run.times) + ahead * turning
+
+    def motion(self) -> dict[str, np.ndarray]:
+        """(m,) of each channel of MOTION."""
+        ahead, aside, turning = self.velocity().T
+        return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
 
     def slip_angles(self) -> np.ndarray:
         """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
@@ -137,8 +151,9 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
     channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
+    channels |= {name: Channel("time", values, *MOTION[name]) for name, values in drive.motion().items()}
     axes = {
-        "time": Channel("time", drive.run.times, "s"),
+        "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
