@@ -132,11 +132,12 @@ def test_shipped_vehicles():
         "quarter_car_nonlinear",
         "r19_free",
         "r19_ride",
+        "race_car",
         "seven_freedoms",
         "three_axle_truck",
     )
     sizes = [len(load_vehicle(name).coordinates()) for name in shipped()]
-    assert sizes == [4, 2, 2, 19, 19, 7, 13]
+    assert sizes == [4, 2, 2, 19, 19, 14, 7, 13]
 
 
 def test_a_file_of_ones_own(tmp_path):
