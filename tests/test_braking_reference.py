@@ -26,6 +26,7 @@ from validation.cases import braking_reference as case
 
 
 @pytest.mark.parametrize("name", case.LAWS)
+@pytest.mark.grounds("plain counterpart")
 def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
     both, bound, _ = case.LAWS[name]
     assert laws.largest(*both(60, seed=5)) < bound
