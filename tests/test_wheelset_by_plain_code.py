@@ -6,6 +6,7 @@ import pytest
 from models.rail import equations as eq
 from models.rail.equations import Equations
 from models.rail.joint_forces import JOINTS, set_joint_forces, table, to_joints
+from models.rail.laid_profiles import Profiles
 from models.rail.wheelset import CHOSEN
 from validation.wheelset.plain_wheelset import PlainWheelset
 
@@ -67,3 +68,12 @@ def test_a_march_is_the_classical_runge_kutta_method_of_the_plain_rates():
     start = compiled.displaced(4e-3)
     path = compiled.run(start, 0.012, 4e-4, 3).states
     assert path == pytest.approx(plain.run(start, 4e-4, 30)[::3], abs=1e-11)
+
+
+def test_profiles_carry_the_load_at_the_height_where_the_springs_bear_no_more():
+    """In the middle of the track, without rates: the vertical parts of the normal forces are the load."""
+    compiled = Equations(CHOSEN.changed(profiles=Profiles()), 40.0, "linear")
+    state = np.zeros(eq.STATES)
+    state[eq.Z], state[eq.SPIN] = compiled.body.sunk, -40.0 / CHOSEN.radius
+    contacts = compiled.at(state[None])[1][0]
+    assert contacts["load"] @ np.cos(contacts["angle"]) == pytest.approx(CHOSEN.load, rel=1e-9)

@@ -76,8 +76,8 @@ def touch(wheelset: Wheelset, side: float, axle: Axle) -> Touch:
     inward = -cosine * outward + sine * radial
     aside = np.cross(np.array([1.0, 0.0, 0.0]), normal)
     way = ((middle - apex) @ aside) / (inward @ aside)
-    depth = w.head_radius - normal @ (middle - apex)
-    return Touch(depth, normal, apex + way * inward - axle.centre, cosine / (2.0 * way * sine))
+    depth = w.head_radius - float(normal @ (middle - apex))
+    return Touch(depth, normal, apex + way * inward - axle.centre, float(cosine / (2.0 * way * sine)))
 
 
 def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
@@ -106,8 +106,10 @@ def creeping(
     if a == 0.0:
         return np.zeros(3)
     if law == "linear":
-        return np.array([float(part) for part in linear_forces(a, b, *slip, wheelset.pair)])
-    creep = fastsim(RollingEllipse(a, b, load, wheelset.friction, *slip), wheelset.pair, cells=cells)
+        return np.array([float(part) for part in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
+    creep = fastsim(
+        RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
+    )
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
