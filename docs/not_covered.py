@@ -5,6 +5,7 @@
 
 from collections import Counter
 from itertools import groupby
+from textwrap import fill
 
 from docs.pages import ROOT
 from validation.blind_spots.table import WHY_HARMLESS, Line, read, uncovered
@@ -30,10 +31,11 @@ def counts(lines: list[Line]) -> str:
     noticed, empty = sum(line.is_covered for line in lines), sum(line.ended == "no numbers" for line in lines)
     commits = [f"{count} to `{commit}`" for commit, count in Counter(line.commit for line in lines).most_common()]
     belong = ", ".join(commits[:-1]) + " and " + commits[-1] if len(commits) > 1 else commits[0]
-    return (
+    text = (
         f"The table has {len(lines)} lines; by commit, {belong}. {noticed} functions were noticed by something "
-        f"independent, and {empty} give no number.\n"
+        f"independent, and {empty} give no number."
     )
+    return fill(text, 120) + "\n"
 
 
 def listed(names: list[str]) -> str:
@@ -47,7 +49,7 @@ def page(text: str) -> str:
     """The page with counts and lists as the kept table has them now."""
     lines = read()
     kinds = uncovered(lines, [line.function for line in lines])
-    parts = [f"{HEADINGS[kind]}\n\n{listed(names)}" for kind, names in kinds.items()]
+    parts = [f"{fill(HEADINGS[kind], 120)}\n\n{listed(names)}" for kind, names in kinds.items()]
     return text.partition(START)[0] + START + "\n" + "\n".join([counts(lines), *parts])
 
 
