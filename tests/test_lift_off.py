@@ -346,7 +346,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
     from models.engines.cut_vehicle import build as hub_model
 
     car = hubs(lift_off={})
-    car = replace(car, whole=replace(car.whole, tyres=tuple(replace(t, damping=500.0) for t in car.whole.tyres)))
+    car = replace(car, uncut=replace(car.uncut, tyres=tuple(replace(t, damping=500.0) for t in car.uncut.tyres)))
     drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), 20.0, 1e-3, 100)
     own = hub_model("mujoco", car, replace(drive, frame="inertial"), 1e-3, 0.1)
     model, data = own.model.model, own.model.data
@@ -358,7 +358,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        for i, tyre in enumerate(car.whole.tyres):
+        for i, tyre in enumerate(car.uncut.tyres):
             body, jacobian = int(model.body(str(names.index(tyre.body))).id), np.zeros((3, model.nv))
             mujoco.mj_jac(model, data, jacobian, None, data.xpos[body], body)
             height, rate = drive.hubs[0, i], drive.hubs[0, 4 + i]

@@ -54,7 +54,7 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
     """Queries about the vehicle, and doubts about measured forces."""
     vehicle = scene.cut_vehicle()
     doubts = judged(scene, vehicle) if scene.forces.file is not None else ()
-    return (*plausible(vehicle.whole, scene.vehicle.accept), *doubts)
+    return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
 
 
 def describe(scene: HubScene) -> str:
