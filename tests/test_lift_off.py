@@ -75,6 +75,7 @@ def test_three_implementations_agree_and_never_pull(effects, geometry):
     assert pressed.min() == 0.0 and 0.05 < (pressed == 0.0).mean() < 0.5
 
 
+@pytest.mark.grounds("closed form")
 def test_the_law_at_hand_made_states():
     """In the air, pressed, released faster than the spring follows, hit faster than it gives way."""
     p = assemble(scene()).parameters
