@@ -8,8 +8,6 @@ that was killed, to the same bits. Each other engine repeats the first paths on 
 import json
 import math
 from collections.abc import Callable
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -30,7 +28,7 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
-from models.ensemble.workers import cluster, processes
+from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright
 from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run_away
@@ -51,8 +49,6 @@ class Options(Strict):
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
     engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
-    workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
-    cluster: str | None = Field(None, description="address of a Dask scheduler whose workers compute instead")
     rows: float = quantity("s", "spacing of the saved states", default=0.5)
     times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
     threshold: float = quantity("rad", "pitch error at which a path has drifted off", default=0.05)
@@ -88,7 +84,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     def tell(finished: Done) -> None:
         progress(f"reference: {finished}", finished.done / finished.paths)
 
-    with TemporaryDirectory() as name, _workers(options) as pool:
+    crew, size = Crew.of(scene), Blocks()
+    with TemporaryDirectory() as name, crew.at_work(len(size.cut(options.paths))) as pool:
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower(scene, Path(name))({}, {"force_noise": noise})
@@ -99,7 +96,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
             if engine == "mujoco":
-                repeated = run_paths(mujoco_threads(*asked, options.workers), options.engine_paths)
+                repeated = run_paths(mujoco_threads(*asked, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
             gaps[engine] = gap(paths, repeated, times)
@@ -148,13 +145,6 @@ def _told(saved: Result, first: Result, rows: list[dict[str, float]], options: O
 def _steepest(run: Result) -> Watched:
     """Largest pitch (rad) of all paths at each time; of those that left all bounds it is none."""
     return {"any path": np.fmax.reduce(np.abs(run["states"][:, :, 3]), axis=0)}
-
-
-def _workers(options: Options) -> AbstractContextManager[Executor | None]:
-    """Who computes: a cluster, processes, or this process alone."""
-    if options.cluster is not None:
-        return cluster(options.cluster)
-    return processes(options.workers) if options.workers > 1 else nullcontext()
 
 
 def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[str, float]]:
