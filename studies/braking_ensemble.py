@@ -60,7 +60,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(each, procedure=options.procedure, error=scene.error) for each in scenes]
-    with Crew.of(scene).at_work(len(blocks.cut(options.runs)), *places_of(scene)) as pool:
+    with Crew.of(scene).at_work(blocks.count(options.runs), *places_of(scene)) as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 

@@ -9,10 +9,12 @@ first axis is the paths, together.
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -39,9 +41,13 @@ class Blocks(NamedTuple):
     size: int = BLOCK
     ahead: int = AHEAD
 
-    def cut(self, paths: int) -> list[range]:
-        """Path numbers of each block."""
-        return [range(first, min(first + self.size, paths)) for first in range(0, paths, self.size)]
+    def count(self, paths: int) -> int:
+        """Number of blocks."""
+        return -(-paths // self.size)
+
+    def block(self, number: int, paths: int) -> range:
+        """Path numbers of a block."""
+        return range(number * self.size, min((number + 1) * self.size, paths))
 
 
 BLOCKS = Blocks()
@@ -166,37 +172,36 @@ def each_block(
     -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
     """
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
-    cut = blocks.cut(paths)
+    count, block = blocks.count(paths), partial(blocks.block, paths=paths)
     store = _Memory() if folder is None else Store(folder)
     with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
         failed = dict[int, str]()
-        missing = [i for i in range(len(cut)) if not store.has(i)]
-        counted = _Counted(paths, paths - sum(len(cut[i]) for i in missing), progress)
-        answers = _answers(job, [(i, cut[i]) for i in missing], executor, blocks.ahead)
+        counted = _Counted(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
+        missing = ((i, block(i)) for i in range(count) if not store.has(i))
+        answers = _answers(job, missing, executor, blocks.ahead)
         with closing(answers):  # an interrupt drops at once what waits
             given = 0
-            while given < len(cut):
+            while given < count:
                 if store.has(given) and not failed:
                     yield store.load(given)
                     given += 1
                 elif lost is not None and (store.has(given) or given in failed):
-                    yield lost(cut[given], failed[given]) if given in failed else store.load(given)
+                    yield lost(block(given), failed[given]) if given in failed else store.load(given)
                     given += 1
-                elif not _next_kept(answers, store, failed, cut, counted):
+                elif not _next_kept(answers, store, failed, counted):
                     break
         if failed and lost is None:
-            raise _failure(failed, cut, folder)
+            raise _failure({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
 def _next_kept(
-    answers: Iterator[tuple[int, Arrays | _Failure]],
+    answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _Memory,
     failed: dict[int, str],
-    cut: Sequence[range],
     counted: _Counted,
 ) -> bool:
     """Keep the next answer, or note why it failed; whether there was one."""
-    i, answer = next(answers, (-1, _Failure("")))
+    i, block, answer = next(answers, (-1, range(0), _Failure("")))
     if i < 0:
         return False
     if isinstance(answer, _Failure):
@@ -207,27 +212,28 @@ def _next_kept(
         failed[i] = answer.reason
         return True
     _keep(store, i, answer)
-    counted.add(len(cut[i]))
+    counted.add(len(block))
     return True
 
 
-def _failure(failed: dict[int, str], cut: Sequence[range], folder: Path | None) -> RunFailed:
+def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
     """The failure that names blocks and paths."""
-    told = [f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {reason}" for i, reason in failed.items()]
+    told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
     kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
     more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
     return RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
 
 
 def _answers(
-    job: Job, missing: list[tuple[int, range]], executor: Executor | None, ahead: int
-) -> Generator[tuple[int, Arrays | _Failure]]:
+    job: Job, missing: Iterator[tuple[int, range]], executor: Executor | None, ahead: int
+) -> Generator[tuple[int, range, Arrays | _Failure]]:
     """Blocks and their answers, as they come: at most ``ahead`` are under way, none further before the first of them
     than that."""
     if executor is None:
-        yield from ((i, _attempt(job, block)) for i, block in missing)
+        yield from ((i, block, _attempt(job, block)) for i, block in missing)
         return
-    queue, alone, lost, waiting = deque(missing), deque[tuple[int, range]](), Counter[int](), dict[Future, Any]()
+    queue, alone = deque(islice(missing, ahead)), deque[tuple[int, range]]()
+    lost, waiting = Counter[int](), dict[Future, tuple[int, range]]()
     try:
         while queue or alone or waiting:
             while (queue and _near(queue[0][0], waiting, ahead)) or (alone and not waiting):
@@ -237,11 +243,13 @@ def _answers(
                 i, block = waiting.pop(future)
                 error = _error(future)
                 died = _worker_died(error)
-                lost[i] += died
+                if died:
+                    lost[i] += 1
                 if died and lost[i] < LIVES:
                     alone.append((i, block)) if lost[i] == LIVES - 1 else queue.appendleft((i, block))
                 else:
-                    yield i, future.result() if error is None else _said(error)
+                    yield i, block, future.result() if error is None else _said(error)
+            queue.extend(islice(missing, max(ahead - len(queue), 0)))
     finally:
         for future in waiting:
             future.cancel()
