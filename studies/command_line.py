@@ -373,14 +373,18 @@ def validate(
     blind_spots: Annotated[
         bool, typer.Option("--blind-spots", help="Which rows and tests notice each shared function 1 % off (hours).")
     ] = False,
+    workers: Workers = None,
+    cluster: Cluster = None,
     out: Out = None,
     resume: Resume = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
+    crew = given_crew(workers, cluster)
     if engine is not None:
         return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:
         return blind_spot_audit(quick or against is not None, out, resume)
+    from models.ensemble.workers import Crew
     from validation.common.changes import read
     from validation.run import KEPT
     from validation.run import validate as run_all
@@ -388,7 +392,8 @@ def validate(
     earlier = None if against is None else read(against)
     folder = folder_of("validate-quick" if quick else "validate", KEPT, "", out, resume)
     try:
-        failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier, resume is not None)
+        command = " ".join(["twinrig", *sys.argv[1:]])
+        failed = run_all(folder, quick, command, earlier, resume is not None, Crew.given(**crew))
     except KeyboardInterrupt:
         end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)

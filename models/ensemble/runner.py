@@ -14,9 +14,9 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,10 @@ TOLD = 5
 """Failed blocks that a message names."""
 LIVES = 3
 """Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
+
+
+T = TypeVar("T")
+"""A block of work."""
 
 
 class Blocks(NamedTuple):
@@ -194,6 +198,44 @@ def each_block(
             raise _failure({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
+def in_order(
+    function: Callable[[T], Arrays],
+    blocks: Iterator[T],
+    executor: Executor | None = None,
+    store: Store | None = None,
+    ahead: int = AHEAD,
+) -> Generator[tuple[T, Arrays]]:
+    """Each of some blocks with what a function gives for it, in their order, each as soon as those before it are there.
+
+    The blocks are read as they are needed, ``ahead`` of them at most. store : keeps what is finished, of a folder that
+    the caller has claimed; what it has is not computed. Raises RunFailed for the first block that fails.
+    """
+    kept: Store | _Memory = _Memory() if store is None else store
+    numbered, here, given = enumerate(blocks), dict[int, T](), 0
+    for given, block in numbered:
+        here[given] = block
+        if not kept.has(given):
+            break
+        yield here.pop(given), kept.load(given)
+
+    def missing() -> Iterator[tuple[int, T]]:
+        for i, block in chain([*here.items()], numbered):
+            here[i] = block
+            if not kept.has(i):
+                yield i, block
+
+    with closing(_answers(function, missing(), executor, ahead)) as answers:
+        for i, _, answer in answers:
+            if isinstance(answer, _Failure):
+                raise (_full if answer.full else _gone)(f"block {i}: {answer.reason}", kept)
+            _keep(kept, i, answer)
+            while given in here and kept.has(given):
+                yield here.pop(given), kept.load(given)
+                given += 1
+    for i in sorted(here):
+        yield here[i], kept.load(i)
+
+
 def _next_kept(
     answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _Memory,
@@ -225,15 +267,15 @@ def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFa
 
 
 def _answers(
-    job: Job, missing: Iterator[tuple[int, range]], executor: Executor | None, ahead: int
-) -> Generator[tuple[int, range, Arrays | _Failure]]:
+    job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
+) -> Generator[tuple[int, T, Arrays | _Failure]]:
     """Blocks and their answers, as they come: at most ``ahead`` are under way, none further before the first of them
     than that."""
     if executor is None:
         yield from ((i, block, _attempt(job, block)) for i, block in missing)
         return
-    queue, alone = deque(islice(missing, ahead)), deque[tuple[int, range]]()
-    lost, waiting = Counter[int](), dict[Future, tuple[int, range]]()
+    queue, alone = deque(islice(missing, ahead)), deque[tuple[int, T]]()
+    lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or alone or waiting:
             while (queue and _near(queue[0][0], waiting, ahead)) or (alone and not waiting):
@@ -293,23 +335,25 @@ def _gone(reason: str, store: Store | _Memory) -> RunFailed:
     return RunFailed("ensemble", f"{reason}{kept}")
 
 
-def _submitted(executor: Executor, job: Job, paths: range) -> Future:
-    """Future of a block of paths; of a pool that has lost its workers, a failed future."""
+def _submitted(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
+    """Future of a block; of a pool that has lost its workers, a failed future."""
     try:
-        return executor.submit(_attempt, job, paths)
+        return executor.submit(_attempt, job, block)
     except BrokenExecutor as error:
         lost: Future = Future()
         lost.set_exception(error)
         return lost
 
 
-def _attempt(job: Job, paths: range) -> Arrays | _Failure:
+def _attempt(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
     """One block, in the worker."""
     try:
-        arrays = job(paths)
+        arrays = job(block)
     except Exception as error:
         return _said(error)
-    short = [name for name, values in arrays.items() if len(values) != len(paths)]
+    if not isinstance(block, range):
+        return arrays
+    short = [name for name, values in arrays.items() if len(values) != len(block)]
     return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
 
 

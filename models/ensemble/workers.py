@@ -130,9 +130,14 @@ class Crew:
     cluster: str | None = None
 
     @classmethod
+    def given(cls, workers: int | None = None, cluster: str | None = None, usual: int = USUAL) -> "Crew":
+        """The crew that is asked for; ``usual`` processes, one per core at most, where none is."""
+        return cls(workers or min(usual, os.cpu_count() or 1), cluster)
+
+    @classmethod
     def of(cls, scene: Any, usual: int = USUAL) -> "Crew":
-        """The crew that a scene asks for; ``usual`` processes, one per core at most, where it asks for none."""
-        return cls(scene.workers or min(usual, os.cpu_count() or 1), scene.cluster)
+        """The crew that a scene asks for, as ``given``."""
+        return cls.given(scene.workers, scene.cluster, usual)
 
     @contextmanager
     def at_work(self, blocks: int, *places: Path) -> Iterator[Executor | None]:

@@ -14,7 +14,7 @@ import shutil
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -252,12 +252,19 @@ def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) ->
     def lost(points: range, reason: str) -> Arrays:
         return _array(_failed(reason) for _ in points)
 
-    with crew.at_work(len(job.values), job.folder, scene_path(job.scene)) as pool:
+    if crew.cluster is not None:  # whose workers compute in folders of their own
+        job = replace(job, folder=job.folder.resolve(), scene=_absolute(job.scene))
+    with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
         kept = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
     records = [json.loads(str(text_of_record)) for text_of_record in kept]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
     return records
+
+
+def _absolute(scene: str) -> str:
+    """The path of a scene file, from any folder; the name of a scene that comes with twinrig."""
+    return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
 def _save(folder: Path, swept: Swept) -> None:
