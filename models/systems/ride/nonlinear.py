@@ -7,6 +7,7 @@ copies and the engines: what stands for the vehicle over speed keeps them on the
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +19,10 @@ from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
+from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import Progress as Done
+from models.ensemble.store import Arrays
+from models.ensemble.workers import Crew
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.nonlinear_copies import Copies, copies_in_time, followed
@@ -90,17 +95,14 @@ def linearised(
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
     linear, on_road, begun = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
-    small, replaced, copies = [], [], {}
+    small, replaced = [], []
     for i, speed in enumerate(speeds):
         progress("statistical linearisation", 0.3 * i / len(speeds))
         small.append(stationary(excited(linear(speed), road, speed)).deviation)
         replaced.append(statistically_linear(on_road, road, speed))
     shown = sampling.shown(speeds)
     beside = sampling.beside or [shown]
-    for i, speed in enumerate(beside):
-        progress(f"Monte Carlo at {speed:g} m/s", 0.3 + 0.4 * i / len(beside))
-        lasting, count, seed = sampling.lasting, sampling.copies, sampling.seed
-        copies[speed] = copies_in_time(vehicle, road, speed, lasting, copies=count, seed=seed)
+    copies = _copies(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small}
@@ -132,6 +134,45 @@ def linearised(
         return labelled
     known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
     return with_error_of_copies(labelled, vehicle, road, known, copies, sampling.seed)
+
+
+@dataclass(frozen=True)
+class CopiesBySpeed:
+    """Job (see ``models.ensemble.runner``): path i is all copies at the i-th speed (m/s)."""
+
+    vehicle: SpatialVehicle
+    road: Excitation
+    speeds: tuple[float, ...]
+    sampling: Sampling
+
+    def __call__(self, paths: range) -> Arrays:
+        """Arrays of ``Copies``, their first axis the speeds."""
+        made = [self._at(self.speeds[i]) for i in paths]
+        return {name: np.array([getattr(each, name) for each in made]) for name in Copies.__dataclass_fields__}
+
+    def _at(self, speed: float) -> Copies:
+        s = self.sampling
+        return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
+
+    def facts(self) -> dict[str, Any]:
+        """Nothing, as the blocks are not kept."""
+        return {}
+
+
+def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
+    """Copies by their speeds (m/s)."""
+
+    def tell(state: Done) -> None:
+        progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
+
+    with Crew.of(scene, usual=1).at_work(len(job.speeds)) as pool:
+        made = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
+    return {
+        speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
+        for speed, names, moments, step, duration, settling in zip(
+            job.speeds, *(made[name] for name in Copies.__dataclass_fields__), strict=True
+        )
+    }
 
 
 def _replaced_at(
