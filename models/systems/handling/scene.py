@@ -15,9 +15,9 @@ from models.core.strict import Query, Strict, accepted, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
+from models.own_model.scene_vehicle import scene_vehicle
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
-from models.vehicles.vehicle_file import load_vehicle
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
@@ -29,7 +29,9 @@ LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0
 class HandlingVehicle(Strict):
     """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
 
-    file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str = Field(
+        default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
+    )
     accept: list[Query] = accepted()
 
 
@@ -110,7 +112,7 @@ class HandlingScene(SceneFile):
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
         built = Handling(vehicle, Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
         return extended(built, self)
 
