@@ -13,6 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
+from models.vehicles.sliding_springs import sliding_springs
 from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import preloads
 
@@ -92,7 +93,8 @@ class CutVehicle:
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
     _check(vehicle, chassis)
-    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
+    sprung = sliding_springs(guided(vehicle, chassis))
+    whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
 
     def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:

@@ -77,6 +77,7 @@ CASES = (
     "braking_relaxation",
     "braking_reference",
     "twin_files",
+    "own_car",
     "measured_formats",
     "measured_virtual",
     "measured_long",

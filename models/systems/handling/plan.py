@@ -40,6 +40,7 @@ def describe(scene: HandlingScene) -> str:
             f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
             "rough, else flat",
         ),
+        *(_line("read", note) for note in first.given.notes),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
         *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),

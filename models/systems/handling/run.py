@@ -18,13 +18,15 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
+from models.engines.native_parts import joint_parts
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.tyre.bristles import SLOW
-from models.vehicles.free_vehicle import SWAY, chassis_of
+from models.vehicles.free_vehicle import SWAY, chassis_of, spinning
+from models.vehicles.spatial import JointElement
 from models.vehicles.spatial_linear import mass
 
 if TYPE_CHECKING:
@@ -289,8 +291,10 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: the bodies, and the compiled forces with their table."""
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
+    """The car as engines build it: the bodies, what acts along their coordinates, and the compiled forces with their
+    table."""
+    parts = joint_parts(handling.vehicle)
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -349,7 +353,18 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
     at.reports(handling.numbers, run.times, *states, report, ledger)
+    for element in handling.vehicle.joint_elements:
+        travel, rate = (_along(handling, element, values) for values in states)
+        ledger[:, at.POTENTIAL] += (element.held + 0.5 * element.stiffness * travel) * travel
+        ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
+
+
+def _along(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
+    """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
+    places = handling.vehicle.coordinates()
+    columns = [places.index(place) for place in element.coordinates]
+    return np.asarray(values[..., columns] @ np.array(element.factors))
 
 
 def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
@@ -373,7 +388,7 @@ def _check_step(drive: Drive, engine: str) -> None:
         stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
         lightness = 1.0 / h.vehicle.body(tyre.body).mass
         if n[at.ROTOR] >= 0.0:
-            lightness += tyre.point[2] ** 2 / h.tyres.spin_inertia
+            lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
         holds = force[:, i] < 0.95 * n[at.GRIP] * load
         damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
         if step * damped.max() > LIMIT:
@@ -412,6 +427,8 @@ def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
         speed, spin = motion.shift @ v, motion.rotation.T @ (motion.turn @ v)
         total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
         total -= body.mass * handling.gravity @ motion.centre
+    for element in handling.vehicle.joint_elements:
+        total += 0.5 * element.inertia * float(_along(handling, element, v)) ** 2
     return float(total)
 
 

@@ -16,10 +16,10 @@ from models.core.strict import Query, Strict, accepted, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
+from models.own_model.scene_vehicle import scene_vehicle
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.vehicle_file import load_vehicle
 
 if TYPE_CHECKING:
     from models.measured.drive import Measured
@@ -34,7 +34,9 @@ LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0
 class HandlingVehicle(Strict):
     """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
 
-    file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str = Field(
+        default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
+    )
     accept: list[Query] = accepted()
 
 
@@ -159,7 +161,7 @@ class HandlingScene(SceneFile):
 
     def _vehicle(self) -> SpatialVehicle:
         """The vehicle of the file, its cornering stiffness as [tyres] says."""
-        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
         if not (ratios := self.tyres.cornering):
             return vehicle
         axles = len({tyre.axle for tyre in vehicle.tyres})

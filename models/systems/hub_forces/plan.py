@@ -69,6 +69,7 @@ def describe(scene: HubScene) -> str:
             "vehicle",
             f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
+        *(_line("read", note) for note in vehicle.uncut.notes),
         _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames(vehicle)}"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
         _line("noise", _noise(scene)),
