@@ -413,7 +413,7 @@ def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
         total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
         total -= body.mass * handling.gravity @ motion.centre
     for element in handling.vehicle.joint_elements:
-        total += 0.5 * element.inertia * _along(handling, element, v) ** 2
+        total += 0.5 * element.inertia * float(_along(handling, element, v)) ** 2
     return float(total)
 
 
