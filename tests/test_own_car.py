@@ -163,6 +163,11 @@ WRONG = {
     "muscle": ("<actuator>", '<actuator><muscle joint="fl travel" lengthrange="0 1"/>', "actuator"),
     "mixed tendon": ('joint="fl travel" coef', 'joint="fl steer" coef', "which twinrig moves, and along others"),
     "compensated": ('<body name="engine"', '<body name="engine" gravcomp="1"', "a vehicle has its weight"),
+    "line": (
+        "<tendon>",
+        '<tendon><spatial name="rope" stiffness="1"><site site="driver"/><site site="hub_rr"/></spatial>',
+        "rope.*springs of a car act along joints",
+    ),
     "massless": ("<worldbody>", '<worldbody><body name="loose"><joint/></body>', "parser refuses it"),
 }
 
