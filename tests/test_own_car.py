@@ -298,7 +298,7 @@ def test_a_car_in_mjcf_is_that_of_a_vehicle_file(tmp_path):
     """The linear vehicles under weight, and what hub forces cut; to rounding."""
     mjcf, toml = twice_written()
     of_mjcf, of_toml = read(tmp_path, mjcf), build_vehicle(tomllib.loads(toml), "car.toml")
-    for first, second in ((of_mjcf, of_toml), (cut(of_mjcf, "body").whole, cut(of_toml, "body").whole)):
+    for first, second in ((of_mjcf, of_toml), (cut(of_mjcf, "body").uncut, cut(of_toml, "body").uncut)):
         one, other = (linearise(replace(each, gravity=9.81).in_frame("body"), 20.0) for each in (first, second))
         for name in ("mass", "damping", "stiffness", "road_stiffness"):
             left, right = getattr(one, name), getattr(other, name)

@@ -373,7 +373,12 @@ def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> t
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
     outputs = tuple(
-        replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
+        replace(
+            o,
+            acceleration_factors=o.acceleration_factors @ N,
+            rate_factors=o.rate_factors @ N,
+            displacement_factors=o.displacement_factors @ N,
+        )
         for o in linear.outputs
     )
     return replace(

@@ -65,6 +65,7 @@ CASES = (
     "handling",
     "bicycle",
     "race_car",
+    "measured_drive",
     "written_equations",
     "adams_joints",
     "braking_stop",

@@ -63,6 +63,15 @@ REPORTS = {
 }
 """Channels of every tyre: column of its report, unit, meaning."""
 
+BELOW = "of the place below the chassis' centre, left positive"
+MOTION = {
+    "forward speed": ("m/s", "of the place below the chassis' centre"),
+    "yaw rate": ("rad/s", "left positive"),
+    "lateral acceleration": ("m/s^2", BELOW),
+    "side slip": ("rad", BELOW),
+}
+"""Channels of the car, by the names of what is measured of one: unit, meaning."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drive:
@@ -96,6 +105,11 @@ class Drive:
         """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
         ahead, aside, turning = self.velocity().T
         return np.gradient(aside, self.run.times) + ahead * turning
+
+    def motion(self) -> dict[str, np.ndarray]:
+        """(m,) of each channel of MOTION."""
+        ahead, aside, turning = self.velocity().T
+        return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
 
     def slip_angles(self) -> np.ndarray:
         """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
@@ -139,8 +153,9 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
     channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
+    channels |= {name: Channel("time", values, *MOTION[name]) for name, values in drive.motion().items()}
     axes = {
-        "time": Channel("time", drive.run.times, "s"),
+        "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
@@ -153,21 +168,21 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
-    again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
+    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
         name: values
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
     }
-    by_step, how = by_steps(Series(fine.times, moving), again, ORDER, again.step)
-    by_net = again.by_cells(list(moving))
+    by_step, how = by_steps(Series(fine.times, moving), rerun, ORDER, rerun.step)
+    by_net = rerun.by_cells(list(moving))
     told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
     return stated(run, told, f"{how}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
+class ManoeuvreRerun:
     """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
 
     engine: str
@@ -192,7 +207,7 @@ class Again:
 
     def __call__(self, factor: float, share: float) -> Series:
         """Run the manoeuvre again in twice the step, or its second half in half the step (see
-        ``models.core.discretisation.Again``)."""
+        ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:

@@ -160,7 +160,7 @@ class MeasuredScene(SceneFile):
             places = Places(hubs, (CHASSIS,), springs)
             return Rig(str(given_vehicle.parameters), CHASSIS, places, springs, ("pitch",), None)
         vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
-        bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.whole.bodies, vehicle.elements))
+        bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
         places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
         return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
 
