@@ -10,14 +10,18 @@ import pytest
 
 from models.brake.sprung import sprung
 from models.core.errors import InputError, Refused
+from models.core.systems import load
 from models.engines.export import Subject
 from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
 from models.multibody.plain.rolling import PlainRolling
 from models.multibody.plain.statics import held_at_rest
 from models.own_model.car import car
+from models.systems.handling import plan as handling_plan
+from models.systems.handling.assumptions import assumptions
 from models.systems.handling.export import of_handling
 from models.systems.handling.run import REFERENCE, build, driven, unaccounted
+from models.systems.ride.run import run as run_ride
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial import JointElement, SpatialVehicle
@@ -26,6 +30,7 @@ from models.vehicles.vehicle_file import build_vehicle, load_vehicle
 from validation.own_model.car_energy import energies_apart
 from validation.own_model.cars import SALOON
 
+ROOT = Path(__file__).parents[1]
 LANE_CHANGE = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0)))
 
 
@@ -158,6 +163,11 @@ WRONG = {
     "muscle": ("<actuator>", '<actuator><muscle joint="fl travel" lengthrange="0 1"/>', "actuator"),
     "mixed tendon": ('joint="fl travel" coef', 'joint="fl steer" coef', "which twinrig moves, and along others"),
     "compensated": ('<body name="engine"', '<body name="engine" gravcomp="1"', "a vehicle has its weight"),
+    "line": (
+        "<tendon>",
+        '<tendon><spatial name="rope" stiffness="1"><site site="driver"/><site site="hub_rr"/></spatial>',
+        "rope.*springs of a car act along joints",
+    ),
     "massless": ("<worldbody>", '<worldbody><body name="loose"><joint/></body>', "parser refuses it"),
 }
 
@@ -302,3 +312,51 @@ def test_springs_on_hinges_are_refused_where_springs_lie_between_points(saloon):
         build_spatial("mujoco", saloon)
     with pytest.raises(InputError, match="acts along coordinates"):
         sprung(saloon, 1.0)
+
+
+def blocks(page: Path) -> dict[str, str]:
+    """Files that a page of the documentation has its reader save."""
+    return dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", page.read_text(), re.DOTALL))
+
+
+RIDE = """title = "r"
+system = "ride"
+vehicle = { file = "my_car.xml" }
+road = { iso8608 = "B" }
+speeds = { start = 20.0, stop = 25.0, count = 2 }
+"""
+HUBS = """title = "h"
+system = "hub-forces"
+vehicle = { file = "my_car.xml", chassis = "body" }
+forces = { sampling_rate = 100.0 }
+road = { iso8608 = "B" }
+run = { duration = 1.0 }
+"""
+
+
+def test_scenes_take_the_car_of_the_documentation(tmp_path):
+    """Handling says what was left out, ride reads named sites, hub forces have its springs by name."""
+    for name, text in blocks(ROOT / "docs" / "how-to" / "own_vehicle.md").items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "ride.toml").write_text(RIDE)
+    (tmp_path / "hubs.toml").write_text(HUBS)
+    handling = load(tmp_path / "my_lane_change.toml")
+    plan = handling_plan.describe(handling)
+    assert "read               tyres, steering, brakes and drive are twinrig's; not built: joint 'fl spin'" in plan
+    assert "mujoco: bodies and 14 joints, 5 of 5 springs and 0 bars" in plan
+    assert not handling_plan.findings(handling)
+    ride = run_ride(load(tmp_path / "ride.toml"))
+    assert {"driver", "travel joint 'fl travel'", "tyre force rr"} <= set(ride.data["output"].values)
+    assert (ride.data["deviation"] > 0.0).all()
+    assert "tendon 'front bar'" in [each.name for each in load(tmp_path / "hubs.toml").cut_vehicle().elements]
+
+
+def test_a_run_that_passes_a_stop_of_the_file_says_so(saloon):
+    handling = Handling(saloon)
+    (stop,) = [each for each in assumptions(handling) if each.name == "stops fl strut z"]
+    column = handling.vehicle.coordinates().index(("fl strut", "z"))
+    positions = np.zeros((3, len(handling.vehicle.coordinates())))
+    positions[:, column] = 0.0, 0.08, 0.11
+    watched = stop.watched({"positions": positions})["fl strut z"]
+    assert (stop.least, stop.most, stop.unit) == (-0.09, 0.1, "m")
+    assert [not stop.least <= value <= stop.most for value in watched] == [False, False, True]

@@ -17,7 +17,7 @@ from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
 from models.own_model.path import paths
 from models.own_model.urdf import misread
-from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, TIED, chain, changed, tree
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
@@ -30,10 +30,21 @@ def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...]
     return read(_file(folder, text, name), without)
 
 
-@pytest.mark.parametrize("text", [JOINTED, CART, chain(8), tree(9, 4)], ids=["jointed", "cart", "chain", "tree"])
+@pytest.mark.parametrize(
+    "text", [JOINTED, CART, TIED, chain(8), tree(9, 4)], ids=["jointed", "cart", "tied", "chain", "tree"]
+)
 def test_every_build_moves_as_the_file_does(tmp_path, text):
     for row in certificate(_read(tmp_path, text).twin, 20):
         assert max(row.mass, row.force, row.acceleration) < 1e-11, row  # rounding by a condition of about 100
+
+
+def test_ends_of_a_tendon_between_sites_are_told(tmp_path):
+    """And the balance of energy and work holds with it."""
+    first = _read(tmp_path, TIED)
+    second = _read(tmp_path, TIED.replace('pos=".3 .1 -.2"', 'pos=".3 .1 -.21"'), "b.xml")
+    (difference,) = compare(first.twin, second.twin, 3).influential
+    assert (difference.kind, difference.owner) == ("ends", "tendon 'rope'")
+    assert paths(first.twin).energy < 1e-7  # Simpson's rule at 2 ms, on a rope that moves at 6 Hz
 
 
 def test_urdf_is_built_and_its_xml_says_the_same(tmp_path):

@@ -18,7 +18,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.native_parts import GroundSpring, NativePart, joint_parts
+from models.engines.native_parts import GroundSpring, LineSpring, NativePart, joint_parts
 from models.engines.protocol import guard, timed
 from models.vehicles.spatial import SpatialVehicle
 
@@ -35,7 +35,8 @@ class Driven:
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
     engine has all of them as its own, and calls nothing back; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
-    parts, ground_springs : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
+    parts, ground_springs, line_springs : springs, dampers, mounts and bars that the engine has as its own beside the
+    kernel's forces.
     """
 
     vehicle: SpatialVehicle
@@ -45,6 +46,7 @@ class Driven:
     block: Any
     parts: tuple[NativePart, ...] = ()
     ground_springs: tuple[GroundSpring, ...] = ()
+    line_springs: tuple[LineSpring, ...] = ()
 
     @property
     def size(self) -> int:

@@ -10,7 +10,7 @@ from models.engines.assembly import Settings
 from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.native_exudyn import add_ground_spring, add_parts, add_rotors, built_elements
+from models.engines.native_exudyn import add_ground_spring, add_line_spring, add_parts, add_rotors, built_elements
 from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
@@ -44,6 +44,8 @@ class FreeExudyn(FreeModel):
         add_rotors(built, node, rotors(driven.vehicle))
         for spring in driven.ground_springs:
             add_ground_spring(built, spring)
+        for line in driven.line_springs:
+            add_line_spring(built, line)
         self._sensors = recorders(mbs, [node])
         mbs.Assemble()
 

@@ -17,11 +17,13 @@ from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
 from models.engines.native_mujoco import (
     add_ground_spring,
+    add_line_spring,
     add_parts,
     add_rotors,
     built_elements,
     ends,
     set_laws,
+    set_line_springs,
     set_rotors,
 )
 from models.engines.native_parts import rotors
@@ -53,6 +55,8 @@ def specified(driven: Driven) -> mujoco.MjSpec:
     add_rotors(spec, driven.vehicle, rotors(driven.vehicle))
     for spring in driven.ground_springs:
         add_ground_spring(spec, driven.vehicle, spring)
+    for line in driven.line_springs:
+        add_line_spring(spec, driven.vehicle, line)
     spec.option.gravity = driven.gravity
     spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
     return spec
@@ -60,7 +64,8 @@ def specified(driven: Driven) -> mujoco.MjSpec:
 
 def _merged(driven: Driven) -> dict[str, str]:
     """Bodies that are one with the only one that rides on each, and bear no end of a spring."""
-    return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in ends(driven.parts)}
+    bearing = ends(driven.parts) | {body for line in driven.line_springs for body, _ in line.ends if body is not None}
+    return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 
 
 def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
@@ -73,6 +78,7 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     weigh(model, places, driven.vehicle.bodies)
     set_laws(model, driven.parts)
     set_rotors(model, rotors(driven.vehicle))
+    set_line_springs(model, driven.line_springs)
     return model
 
 

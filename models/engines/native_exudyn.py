@@ -16,7 +16,7 @@ import numpy as np
 
 from models.engines.exudyn_system import items, lists
 from models.engines.exudyn_tree import JOINTS, Build
-from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, NativePart
+from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, LineSpring, NativePart
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
 
@@ -63,6 +63,20 @@ def add_ground_spring(built: Build, spring: GroundSpring) -> None:
         built.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
     if np.any(spring.load):
         built.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
+
+
+def add_line_spring(built: Build, spring: LineSpring) -> None:
+    """A connector along the line between two points; Exudyn wants a length above 0, and has a constant force beside."""
+    length = spring.length or 1.0
+    built.mbs.AddObject(
+        items.SpringDamper(
+            markerNumbers=[built.marker(*end) for end in spring.ends],
+            referenceLength=length,
+            stiffness=spring.stiffness,
+            damping=spring.damping,
+            force=spring.stiffness * (length - spring.length),
+        )
+    )
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:

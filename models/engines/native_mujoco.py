@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, NativePart
+from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, LineSpring, NativePart
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import Curve, SpatialVehicle
 
@@ -23,6 +23,8 @@ ENDLESS = 1e300
 """N: a force range that cuts nothing off."""
 ROTOR = "rotor "
 """What the name of a tendon begins with that has inertia alone."""
+LINE = "line "
+"""What the name of a tendon begins with that lies along the line between two points."""
 BREAK = ": "
 """Between the number of a tendon or an actuator and its element's name."""
 
@@ -93,6 +95,26 @@ def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: Grou
             strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
             strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
             strut.biasprm[:3] = load, -spring.stiffness[i], -spring.damping[i]
+
+
+def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSpring) -> None:
+    """A spatial tendon between two sites; ``set_line_springs`` gives it its law."""
+    number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE}{spring.name}")
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    for i, (body, point) in enumerate(spring.ends):
+        carrier = spec.worldbody if body is None else spec.body(numbers[body])
+        origin = (0.0, 0.0, 0.0) if body is None else vehicle.body(body).position
+        site = f"end {number + i}"
+        carrier.add_site(name=site, pos=np.subtract(point, origin))
+        tendon.wrap_site(site)
+
+
+def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:
+    """Write stiffness, damping and length into the compiled model."""
+    for spring in springs:
+        tendon = model.tendon(f"{LINE}{spring.name}").id
+        model.tendon_stiffness[tendon], model.tendon_damping[tendon] = spring.stiffness, spring.damping
+        model.tendon_lengthspring[tendon] = spring.length
 
 
 def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:

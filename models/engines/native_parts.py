@@ -75,6 +75,29 @@ class GroundSpring:
 
 
 @dataclass(frozen=True)
+class LineSpring:
+    """A spring and damper along the straight line between points of two bodies, None for the ground.
+
+    Both are drawn together by F = stiffness (l - length) + damping l', l their distance (m); first_point, second_point
+    in the design position, m; length in m, stiffness in N/m, damping in N s/m.
+    """
+
+    name: str
+    first_body: str | None
+    second_body: str | None
+    first_point: Vector
+    second_point: Vector
+    stiffness: float
+    damping: float
+    length: float
+
+    @property
+    def ends(self) -> tuple[tuple[str | None, Vector], ...]:
+        """Both bodies with their points."""
+        return (self.first_body, self.first_point), (self.second_body, self.second_point)
+
+
+@dataclass(frozen=True)
 class Division:
     """native : the engine's own; shared : elements with what the compiled forces have of their laws; reasons : of
     these, by name."""

@@ -41,7 +41,8 @@ def equations(twin: TwinModel, build: str) -> Equations:
 def plain_tree(twin: TwinModel) -> PlainTree:
     """The plain equations of the description."""
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads)
+    lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines)
 
 
 def as_parsed(twin: TwinModel) -> Equations:

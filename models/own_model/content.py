@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import is_fixed, label
+from models.own_model.reading import is_fixed, is_line, label
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -148,7 +148,8 @@ def _spatial_tendons(model: mujoco.MjModel) -> Listed:
     for t in range(model.ntendon):
         forces = model.tendon_stiffness[t] or model.tendon_damping[t] or model.tendon_armature[t]
         slack = model.tendon_stiffness[t] and np.ptp(model.tendon_lengthspring[t])
-        if (forces and not is_fixed(model, t)) or slack:
+        straight = is_fixed(model, t) or (is_line(model, t) and not model.tendon_armature[t])
+        if (forces and not straight) or slack:
             yield "tendon", t
 
 
@@ -244,7 +245,11 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
         _forget_actuators,
     ),
     "force_range": (_bounded, "a force that is cut off at a bound", _forget_bounds),
-    "tendon": (_spatial_tendons, "a spring with a way through space or with slack", _forget_tendons),
+    "tendon": (
+        _spatial_tendons,
+        "a spring around bodies or with slack, or a rotor along a way in space",
+        _forget_tendons,
+    ),
     "turning_law": (_turning_laws, "a spring, damper or rotor about all axes of a ball or free joint", _forget_turning),
     "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
     "fluid": (_medium, "forces of a medium", _forget_medium),

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import label
+from models.own_model.reading import is_line, label, sites_of
 
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
@@ -201,6 +201,16 @@ def _coefficients() -> tuple[Callable, Callable]:
     return _field("wrap_prm", places)
 
 
+def _read_ends(model: mujoco.MjModel, t: int) -> np.ndarray:
+    """Places of both sites of a tendon that is a line, in the axes of their bodies."""
+    return model.site_pos[sites_of(model, t)].ravel() if is_line(model, t) else np.zeros(0)
+
+
+def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
+    model.site_pos[sites_of(model, t)] = value.reshape(-1, 3)
+    model.site_sameframe[sites_of(model, t)] = 0
+
+
 KINDS = (
     _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
     _Kind("body", "mass", "kg", *_body("body_mass")),
@@ -219,6 +229,7 @@ KINDS = (
     _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
     _Kind("joint", "range", "rad | m", *_of_joint("jnt_range")),
     _Kind("tendon", "coefficients", "", *_coefficients()),
+    _Kind("tendon", "ends", "m", _read_ends, _write_ends),
     _Kind("tendon", "stiffness", "N/m", *_field("tendon_stiffness", lambda model, t: t)),
     _Kind("tendon", "damping", "N s/m", *_field("tendon_damping", lambda model, t: t)),
     _Kind("tendon", "spring length", "m", *_field("tendon_lengthspring", lambda model, t: t)),

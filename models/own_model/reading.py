@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.engines.free_vehicle import Driven
-from models.engines.native_parts import GroundSpring, joint_parts
+from models.engines.native_parts import GroundSpring, LineSpring, joint_parts
 from models.own_model.coordinates import BALL, FREE, SLIDE, Coordinates
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -48,7 +48,8 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     vehicle = SpatialVehicle(name, tuple(_bodies(model, design)), (), (), (), joint_elements=elements)
     gravity = np.zeros(3) if _disabled(model, "GRAVITY") else np.array(model.opt.gravity)
     loads = tuple(_lifted(model, design, gravity))
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, joint_parts(vehicle), loads)
+    lines = tuple(line_springs(model, design))
+    driven = Driven(vehicle, gravity, np.zeros(1), None, None, joint_parts(vehicle), loads, lines)
     return TwinModel(name, model, driven, Coordinates(model, design))
 
 
@@ -172,6 +173,31 @@ def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[f
 def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
     """Whether a tendon is a sum of joints, and not a way through space."""
     return bool(model.wrap_type[model.tendon_adr[tendon]] == mujoco.mjtWrap.mjWRAP_JOINT)
+
+
+def is_line(model: mujoco.MjModel, tendon: int) -> bool:
+    """Whether a tendon goes straight from one site to another."""
+    first, site = int(model.tendon_adr[tendon]), mujoco.mjtWrap.mjWRAP_SITE
+    return bool(model.tendon_num[tendon] == 2 and (model.wrap_type[first : first + 2] == site).all())
+
+
+def sites_of(model: mujoco.MjModel, tendon: int) -> list[int]:
+    """Both sites of a tendon that is a line."""
+    first = int(model.tendon_adr[tendon])
+    return model.wrap_objid[first : first + 2].tolist()
+
+
+def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineSpring]:
+    """Springs and dampers of tendons between two sites."""
+    springs, dampers, numbers = not _disabled(model, "SPRING"), not _disabled(model, "DAMPER"), moving(model)
+    for t in (t for t in range(model.ntendon) if is_line(model, t)):
+        stiffness, damping = float(model.tendon_stiffness[t]) * springs, float(model.tendon_damping[t]) * dampers
+        bodies = [int(model.site_bodyid[s]) for s in sites_of(model, t)]
+        if (stiffness or damping) and bodies[0] != bodies[1]:
+            first, second = (_massive(b) if b in numbers else None for b in bodies)
+            start, end = (_vector(design.site_xpos[s]) for s in sites_of(model, t))
+            length = float(model.tendon_lengthspring[t, 0])
+            yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
 
 
 def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[float, ...], float]:

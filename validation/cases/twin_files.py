@@ -10,7 +10,7 @@ from models.own_model.explain import compare
 from models.own_model.file import ModelFile, read
 from models.own_model.path import ALIKE, paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, TIED, chain, changed, tree
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
@@ -23,8 +23,8 @@ OUTSIDE = tuple(kind for kind in KINDS if kind not in ("flex", "turning_law"))
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Quick: three models, five states, six planted differences; in full 20 models, eight of them exported, all 30."""
-    texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF}
+    """Quick: four models, five states, six planted differences; in full 21 models, eight of them exported, all 30."""
+    texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED}
     if not quick:
         texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}

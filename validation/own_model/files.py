@@ -54,6 +54,21 @@ ARM_URDF = """<?xml version="1.0"?>
 </robot>"""
 
 
+TIED = """<mujoco model="tied"><worldbody><site name="hook" pos="0 .3 1"/>
+<body name="arm" pos="0 0 .5"><joint name="swing" axis="1 .2 0"/>
+ <inertial pos="0 0 -.2" mass="1" diaginertia=".1 .1 .02"/>
+ <site name="elbow" pos=".1 0 -.4" euler="10 20 30"/><body name="hand" pos="0 0 -.4"><joint name="wrist" axis="0 1 0"/>
+  <joint name="reach" type="slide" axis="0 0 1"/><inertial pos=".1 0 -.1" mass=".5" diaginertia=".02 .03 .01"/>
+  <site name="tip" pos=".3 .1 -.2"/></body></body>
+<body name="buoy" pos="1 1 1"><freejoint/><inertial pos="0 .1 0" mass="2" diaginertia=".1 .2 .15"/>
+ <site name="ring" pos=".1 .2 .3"/></body></worldbody>
+<tendon>
+ <spatial name="rope" stiffness="40" damping="2" springlength=".7"><site site="hook"/><site site="tip"/></spatial>
+ <spatial name="rubber" stiffness="25" springlength="0"><site site="elbow"/><site site="ring"/></spatial>
+ <spatial name="seen"><site site="hook"/><site site="ring"/></spatial></tendon></mujoco>"""
+"""Springs along lines: from the ground, and between two bodies; one has no length, one no force."""
+
+
 def chain(count: int, seed: int = 1) -> str:
     """A chain of hinges and slides with springs, dampers and armatures, all numbers at random."""
     draw = np.random.default_rng(seed)

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, Bodies
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
 from models.vehicles.spatial import SpatialVehicle, Vector
 
+Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
+"""Two points of bodies (None: the ground) in the design position; N/m, N s/m and m of a spring along their line."""
 Load = tuple[str, Vector, np.ndarray]
 """A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
 
@@ -32,11 +34,14 @@ def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
 class PlainTree:
     """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
-    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, loads: Sequence[Load] = ()) -> None:
+    def __init__(
+        self, vehicle: SpatialVehicle, gravity: np.ndarray, loads: Sequence[Load] = (), lines: Sequence[Line] = ()
+    ) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])
+        self._lines, self._ends = lines, self.bodies.points([end for ends, *_ in lines for end in ends])
         self._rows = joint_rows(self.bodies, vehicle)
         self._stiffness, self._damping, self._held, self._inertia = joint_numbers(vehicle)
 
@@ -48,7 +53,20 @@ class PlainTree:
         force -= self._rows.T @ along
         if len(self._loads):
             force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
+        if self._lines:
+            force += self._drawn(motion)
         return mass + self._rows.T * self._inertia @ self._rows, force
+
+    def _drawn(self, motion: Motion) -> np.ndarray:
+        """Generalised forces (n,) of springs along lines: -F dl/dq, l the distance of their ends."""
+        total, ends = np.zeros(self.size), motion.at(self._ends)
+        for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):
+            apart = second - first
+            distance = float(np.linalg.norm(apart[PLACE]))
+            gradient = apart[FIRST:] @ (apart[PLACE] / distance)
+            rate = float(apart[RATE] @ apart[PLACE]) / distance
+            total -= (stiffness * (distance - length) + damping * rate) * gradient
+        return total
 
     def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Forces (n,) without those of inertia: their power with the rates is the rate of the kinetic energy."""
