@@ -373,17 +373,23 @@ def validate(
     blind_spots: Annotated[
         bool, typer.Option("--blind-spots", help="Which rows and tests notice each shared function 1 % off (hours).")
     ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(metavar="PATTERN", help="Of --blind-spots: functions of this name alone, as 'models.tyre.*'."),
+    ] = None,
     workers: Workers = None,
     cluster: Cluster = None,
     out: Out = None,
     resume: Resume = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
+    if only is not None and not blind_spots:
+        raise InputError("--only", "", only, "goes with --blind-spots")
     crew = given_crew(workers, cluster)
     if engine is not None:
         return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:
-        return blind_spot_audit(quick or against is not None, out, resume)
+        return blind_spot_audit(quick or against is not None, only, out, resume)
     from models.ensemble.workers import Crew
     from validation.common.changes import read
     from validation.run import KEPT

@@ -18,7 +18,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.native_parts import GroundSpring, NativePart
+from models.engines.native_parts import GroundSpring, NativePart, joint_parts
 from models.engines.protocol import guard, timed
 from models.vehicles.spatial import SpatialVehicle
 
@@ -150,19 +150,18 @@ def joints_alone(vehicle: SpatialVehicle) -> tuple[tuple[str, str], ...]:
     """Native joints of each engine for a vehicle whose springs keep to the heading of its carrier, and why no more:
     heads and texts of a plan. Joints are counted in built models.
 
-    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it.
+    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it. What
+    acts along coordinates is native.
     """
-    driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None)
-    count, bars = len(vehicle.springs), len(vehicle.bars)
+    driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None, joint_parts(vehicle))
+    count, bars = len(vehicle.springs) + len(driven.parts), len(vehicle.bars)
     why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
-    native = tuple(
-        (
-            "native",
-            f"{engine}: bodies and {built_share(engine, driven)[1]} joints, 0 of {count} springs and {bars} bars",
-        )
-        for engine in ENGINES
-    )
-    return (*native, ("shared", f"springs, mounts and bars: {why}"))
+    native = []
+    for engine in ENGINES:
+        names, joints = built_share(engine, driven)
+        told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
+        native.append(("native", told))
+    return (*native, *([("shared", f"springs, mounts and bars: {why}")] if vehicle.springs or bars else []))
 
 
 def _module(engine: str) -> Any:

@@ -255,7 +255,7 @@ def _with_error_of_steps(
         known = ~np.isnan(ride.outputs).any(axis=0)
         return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
-    def again(times: float, share: float) -> Series:
+    def rerun(times: float, share: float) -> Series:
         longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
         count = int(REPEATED * share * steps / times)
         read = table[:: round(times)] if times >= 1.0 else _halved(table)
@@ -265,7 +265,7 @@ def _with_error_of_steps(
 
     outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
-    return estimated(run, fine, again, ORDER, path.step)
+    return estimated(run, fine, rerun, ORDER, path.step)
 
 
 def _halved(table: np.ndarray) -> np.ndarray:
@@ -369,7 +369,11 @@ def _read(
         if spec.kind == "force" and spec.part in bent:
             values[:] = np.nan
         elif spec.kind == "tyre force" and spec.tyre in pushing:
-            elastic = rows @ row_of(replace(output, rate=0.0 * output.rate, road_rate=0.0 * output.road_rate))
+            elastic = rows @ row_of(
+                replace(
+                    output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
+                )
+            )
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
     return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs, at)
@@ -377,4 +381,12 @@ def _read(
 
 def row_of(output: Output) -> np.ndarray:
     """Factors (3 n + 2 w,) of accelerations, rates, positions, road heights and their rates."""
-    return np.concatenate([output.acceleration, output.rate, output.displacement, output.road, output.road_rate])
+    return np.concatenate(
+        [
+            output.acceleration_factors,
+            output.rate_factors,
+            output.displacement_factors,
+            output.road_factors,
+            output.road_rate_factors,
+        ]
+    )
