@@ -24,7 +24,7 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
-from models.ensemble.runner import Blocks, each_block, run_paths
+from models.ensemble.runner import BLOCK, Blocks, each_block, run_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright
@@ -50,6 +50,7 @@ class Options(Strict):
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
     saved: int = Field(1000, ge=1, le=1_000_000, description="first paths that are saved; statistics are of all")
     engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
+    block: int = Field(BLOCK, ge=1, le=100_000, description="paths that are computed, sent and kept together")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
     rows: float = quantity("s", "spacing of the saved states", default=0.5)
     times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
@@ -88,14 +89,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     def tell(finished: Done) -> None:
         progress(f"reference: {finished}", finished.done / finished.paths)
 
-    crew = Crew.of(scene)
-    with TemporaryDirectory() as name, crew.at_work(Blocks().count(options.paths)) as pool:
+    crew, cut = Crew.of(scene), Blocks(options.block)
+    with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower(scene, Path(name))({}, {"force_noise": noise})
         first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
-        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell):
+        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS, pool, cut, tell):
             found.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):

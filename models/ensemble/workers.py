@@ -188,7 +188,31 @@ def cluster(address: str, *places: Path) -> Iterator[Executor]:
         raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
     with client:
         _require_alike(client, address, places)
-        yield client.get_executor()
+        yield OnCluster(client)
+
+
+class OnCluster(Executor):
+    """The executor of a Dask client, which sends a job to the cluster once, and with each block its numbers alone.
+
+    A job is the result of a task, so that the scheduler can make it again where the workers that had it are gone.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client, self._executor = client, client.get_executor()
+        self._jobs: dict[int, tuple[Any, Any]] = {}
+
+    def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
+        """Submit a function of a job and a block, or any other."""
+        if len(args) == 2:
+            job, block = args
+            if id(job) not in self._jobs:
+                self._jobs[id(job)] = job, self._client.submit(_same, job, pure=False)
+            args = self._jobs[id(job)][1], block
+        return self._executor.submit(function, *args, **options)
+
+
+def _same(job: Any) -> Any:
+    return job
 
 
 class _Seen(NamedTuple):

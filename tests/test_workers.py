@@ -1,0 +1,108 @@
+"""Jobs that repeat have the same bits by 1 worker and by 2, and whoever computes them is asked for in one place."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.core.errors import InputError
+from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.workers import Crew, processes
+from models.systems.braking.stops import Stops
+from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
+from studies.command.asked import load_scene
+from studies.command.crew import given_crew
+from validation.ride.in_engines import ride
+
+
+def stops():
+    scene = load_scene("braking_ensemble", ["procedures.straight.speed=2.0"])
+    return Stops(scene.table(), scene.file, scene.folder, "straight", 0.01, 1)
+
+
+def copies():
+    vehicle, road = ride("quarter_car")
+    return CopiesBySpeed(vehicle, road, (15.0, 20.0, 25.0), Sampling(copies=8, lasting=0.5, seed=4))
+
+
+@pytest.fixture(scope="module")
+def pool():
+    with processes(2) as executor:
+        yield executor
+
+
+@pytest.mark.parametrize(("make", "paths"), [(stops, 4), (copies, 3)])
+def test_two_workers_give_the_bits_of_this_process(make, paths, pool):
+    alone = run_paths(make(), paths, blocks=Blocks(1))
+    shared = run_paths(make(), paths, executor=pool, blocks=Blocks(1))
+    assert set(alone) == set(shared) and all(np.array_equal(alone[name], shared[name]) for name in alone)
+    scattered = alone["distance" if "distance" in alone else "moments"]
+    assert len({values.tobytes() for values in scattered}) == paths  # paths that were mixed up would be seen
+
+
+def test_an_interrupt_between_blocks_and_a_resume_give_the_same_bits(tmp_path):
+    def stop(state):
+        if state.done >= 2:
+            raise KeyboardInterrupt
+
+    alone = run_paths(stops(), 4, blocks=Blocks(1))
+    with pytest.raises(KeyboardInterrupt):
+        run_paths(stops(), 4, tmp_path, blocks=Blocks(1), progress=stop)
+    assert len(list(tmp_path.glob("block*.npz"))) == 2
+    resumed = run_paths(stops(), 4, tmp_path, blocks=Blocks(1))
+    assert all(np.array_equal(alone[name], resumed[name]) for name in alone)
+
+
+@pytest.mark.parametrize(
+    ("asked", "crew"),
+    [
+        ((), Crew(min(2, os.cpu_count() or 1))),
+        (("workers=5",), Crew(5)),
+        (('cluster="tcp://a:1"',), Crew(min(2, os.cpu_count() or 1), "tcp://a:1")),
+    ],
+)
+def test_a_scene_asks_for_its_crew_and_no_result_depends_on_it(asked, crew):
+    scene = load_scene("study_road", asked)
+    assert Crew.of(scene) == crew and scene.table() == load_scene("study_road").table()
+
+
+def test_workers_and_a_cluster_are_not_asked_for_together():
+    with pytest.raises(InputError, match=r"^--workers = 3: .*leave one out"):
+        given_crew(3, "tcp://a:1")
+    with pytest.raises(InputError, match=r"workers = 0"):
+        load_scene("study_road", ["workers=0"])
+
+
+class Mortal:
+    """A job of the roots of path numbers; its processes note themselves in a folder, for whoever kills them."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    def __call__(self, paths):
+        (self.folder / str(os.getpid())).touch()
+        time.sleep(0.02)
+        return {"x": np.sqrt(np.arange(paths[0], paths[-1] + 1))}
+
+    def facts(self):
+        return {}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_twenty_workers_killed_at_random_moments_change_nothing(workers, tmp_path):
+    draw, killed = np.random.default_rng(workers), list[int]()
+    due = set(draw.choice(np.arange(1, 200), 20, replace=False).tolist())
+
+    def kill(state):
+        alive = [int(path.name) for path in tmp_path.iterdir() if int(path.name) not in killed]
+        if state.done in due and alive:
+            killed.append(alive[int(draw.integers(len(alive)))])
+            os.kill(killed[-1], signal.SIGKILL)
+
+    with processes(workers) as executor:
+        found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=Blocks(1), progress=kill)["x"]
+    assert len(killed) >= 10 and np.array_equal(found, np.sqrt(np.arange(200)))
