@@ -15,7 +15,7 @@ from models.contact.kernel_pointer import Pointer, pointer
 from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.patches import Patch
-from models.contact.simplified_kernels import covariances, drag, push, slope_products
+from models.contact.simplified_kernels import FineNet, covariances, drag, gather, push, slope_products
 from models.contact.simplified_theory import Options, press, roll
 from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
@@ -129,6 +129,16 @@ def test_sums_of_the_fits():
         products[axis], squares[axis] = np.sum(first * second * du * dh), np.sum(first * second * du**2)
     assert slope_products(u, h, cover, 0.3, 0.7, False) == pytest.approx((products[1], squares[1]), rel=1e-12)
     assert slope_products(u, h, cover, 0.3, 0.7, True) == pytest.approx((products.sum(), squares.sum()), rel=1e-12)
+
+
+def test_tractions_of_the_meshes():
+    """By the areas in common; a factor common to all of them would leave the fit."""
+    draw, box = np.random.default_rng(6), (-4e-3, 5e-3, -3e-3, 3e-3)
+    low, high = draw.uniform(-4e-3, 0.0, 7), draw.uniform(1e-3, 5e-3, 7)
+    net = plain.middles(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
+    tractions = draw.normal(size=(7, 6, 2))
+    expected = plain.gathered(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
+    assert gather(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
 def test_loads_press_and_drag_the_surface_beside_them():
