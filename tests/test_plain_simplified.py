@@ -15,7 +15,7 @@ from models.contact.kernel_pointer import Pointer, pointer
 from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.patches import Patch
-from models.contact.simplified_kernels import drag, push
+from models.contact.simplified_kernels import FineNet, covariances, drag, gather, push, slope_products
 from models.contact.simplified_theory import Options, press, roll
 from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
@@ -114,6 +114,31 @@ def test_load_and_forces_of_the_kernel(name, options):
             [(x1 - x0) / 2.0, (y1 - y0) / 2.0, APPROACH, truth.load], rel=CLOSE
         )
         assert out.stick == pytest.approx(forces[3], abs=1e-9)
+
+
+def test_sums_of_the_fits():
+    """A factor common to both sums of a fit would leave its slope; numpy tells each sum."""
+    u, h, cover = np.random.default_rng(4).uniform(0.2, 1.0, (3, 5, 5))
+    spread = np.cov(u.ravel(), h.ravel(), aweights=cover.ravel(), ddof=0) * cover.sum()
+    mean = np.average(u, weights=cover)
+    assert covariances(u, h, cover) == pytest.approx((mean, spread[0, 1], spread[0, 0]), rel=1e-12)
+    products, squares = np.zeros(2), np.zeros(2)
+    for axis, step in ((1, 0.3), (0, 0.7)):
+        first, second = (np.delete(cover, place, axis) for place in (-1, 0))
+        du, dh = (np.diff(each, axis=axis) / step for each in (u, h))
+        products[axis], squares[axis] = np.sum(first * second * du * dh), np.sum(first * second * du**2)
+    assert slope_products(u, h, cover, 0.3, 0.7, False) == pytest.approx((products[1], squares[1]), rel=1e-12)
+    assert slope_products(u, h, cover, 0.3, 0.7, True) == pytest.approx((products.sum(), squares.sum()), rel=1e-12)
+
+
+def test_tractions_of_the_meshes():
+    """By the areas in common; a factor common to all of them would leave the fit."""
+    draw, box = np.random.default_rng(6), (-4e-3, 5e-3, -3e-3, 3e-3)
+    low, high = draw.uniform(-4e-3, 0.0, 7), draw.uniform(1e-3, 5e-3, 7)
+    net = plain.middles(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
+    tractions = draw.normal(size=(7, 6, 2))
+    expected = plain.gathered(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
+    assert gather(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
 def test_loads_press_and_drag_the_surface_beside_them():

@@ -226,15 +226,20 @@ def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float
     return tractions, slips
 
 
+def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
+    """Mean tractions (2, n, n) of the meshes of the crude net, by the areas that cells and meshes have in common."""
+    across = _common(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
+    cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
+    along = np.array([_common(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
+    mean = np.einsum("sj,sik,si->jk", across, along, tractions) * n**2 / ((box[1] - box[0]) * (box[3] - box[2]))
+    return np.array([mean.real, mean.imag])
+
+
 def refitted(pressed: Pressed, net: Strips, tractions: Array, pair: Pair, options: Options) -> float:
     """W_1 = W_2 (m/Pa) of the tractions of a march."""
     n, box = options.net, pressed.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
-    across = _common(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1)) / step[1]
-    cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
-    along = np.array([_common(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells]) / step[0]
-    crude = np.einsum("sj,sik,si->jk", across, along, tractions)
-    p = np.array([crude.real, crude.imag])
+    p = gathered(net, tractions, box, n)
     u = np.array([sum(spread(p[m], step, pair, np.array([k, m])) for m in range(2)) for k in range(2)])
     return fitted(u, p, pressed.cover, step, options)
 
