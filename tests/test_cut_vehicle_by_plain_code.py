@@ -7,7 +7,7 @@ import pytest
 
 from models.engines.cut_vehicle import PLAIN, build
 from models.multibody.cut_kernel import set_joint_forces
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.multibody.plain.hubs import PlainHubs
 from models.multibody.plain.motion import FIRST, PLACE, REST
 from models.systems.measured.sections import AccelerometerPoint, Sections
@@ -32,18 +32,21 @@ def turning() -> CutVehicle:
     return cut(replace(whole, springs=tuple(springs)), "body")
 
 
-def drive_of(vehicle: CutVehicle, rows: int) -> Drive:
+def hub_inputs_of(vehicle: CutVehicle, rows: int) -> HubInputs:
     """Static loads and 400 N at random, and a guide that enforces roll and pitch."""
     hubs = static(vehicle, rows).hubs
-    return Drive(hubs + RNG.normal(0.0, 400.0, hubs.shape), "hub", guide=RNG.normal(0.0, 0.02, (rows, 6)))
+    return HubInputs(hubs + RNG.normal(0.0, 400.0, hubs.shape), "hub", guide=RNG.normal(0.0, 0.02, (rows, 6)))
 
 
 @pytest.mark.parametrize("car", [r19, rough_car, turning])
 def test_joint_forces_in_a_block_are_those_of_the_plain_equations(car):
     """f = M q'' - what weight and inertia give; read at the nearest half step of a time."""
     vehicle = car()
-    drive = replace(drive_of(vehicle, 5), guide=None)
-    plain, numbers = PlainHubs(vehicle, drive, STEP), build("reference", vehicle, drive, STEP, 2.0 * STEP).numbers
+    hub_inputs = replace(hub_inputs_of(vehicle, 5), guide=None)
+    plain, numbers = (
+        PlainHubs(vehicle, hub_inputs, STEP),
+        build("reference", vehicle, hub_inputs, STEP, 2.0 * STEP).numbers,
+    )
     q, v = cut_state(vehicle, 3)
     block = np.concatenate((np.full(vehicle.size, 5.0), q, v, numbers))
     set_joint_forces(block.ctypes.data, TIME, vehicle.size)
@@ -54,8 +57,8 @@ def test_joint_forces_in_a_block_are_those_of_the_plain_equations(car):
 
 def test_a_march_is_that_of_the_plain_equations():
     vehicle = rough_car()
-    drive = drive_of(vehicle, 21)
-    compiled, plain = (build(name, vehicle, drive, STEP, 10 * STEP).run() for name in ("reference", PLAIN))
+    hub_inputs = hub_inputs_of(vehicle, 21)
+    compiled, plain = (build(name, vehicle, hub_inputs, STEP, 10 * STEP).run() for name in ("reference", PLAIN))
     assert np.abs(plain.states[-1]).max() > 1e-3
     assert compiled.states == pytest.approx(plain.states, abs=1e-10)
     for name in ("elements", "wrenches", "moments"):
@@ -66,21 +69,21 @@ def test_a_march_is_that_of_the_plain_equations():
 def test_points_feel_the_second_derivative_of_their_places():
     """In the axes of the body that carries them, with and without the weight: r'' = (r'' without q'') + dr/dq q''."""
     vehicle = r19()
-    drive = replace(drive_of(vehicle, 3), guide=None)
+    hub_inputs = replace(hub_inputs_of(vehicle, 3), guide=None)
     places = {"body": (0.4, 0.2, 0.9), "engine": (1.1, -0.1, 0.7)}
     points = tuple(
         AccelerometerPoint(f"{name} {weight}", name, place, weight)
         for name, place in places.items()
         for weight in (True, False)
     )
-    plain, sections = PlainHubs(vehicle, drive, STEP), Sections(vehicle, points=points)
+    plain, sections = PlainHubs(vehicle, hub_inputs, STEP), Sections(vehicle, points=points)
     q, v = cut_state(vehicle, 4)
-    numbers = build("reference", vehicle, drive, STEP, STEP).numbers
+    numbers = build("reference", vehicle, hub_inputs, STEP, STEP).numbers
     row = sections.read(numbers, np.concatenate((q, v))[None], 1)[0]
     felt = {answer.name: value for answer, value in zip(sections.answers, row, strict=True)}
     motion, q2 = plain.bodies.move(q, v), plain.acceleration(0.0, q, v)
     for point in points:
-        at = motion.at(plain.bodies.points([(point.body, point.place)]))[0]
+        at = motion.at(plain.bodies.points([(point.body, point.position)]))[0]
         space = at[REST] + q2 @ at[FIRST:] + np.array([0.0, 0.0, vehicle.tree.gravity * point.gravity])
         expected = space @ motion.axes(plain.bodies.row[point.body])[PLACE]
         names = [name for name in felt if name.startswith(point.name)]
