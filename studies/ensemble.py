@@ -215,7 +215,6 @@ def _time(value: float) -> str:
 
 def _figure(times: np.ndarray, found: PathStatistics, options: Options, results: Results, folder: Path) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
-    from matplotlib.artist import setp
 
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, DARK, WIDE, heading, save, subplots
@@ -236,7 +235,8 @@ def _figure(times: np.ndarray, found: PathStatistics, options: Options, results:
     histogram.set_title(f"Drift-offs: paths [-] ({options.paths - counts.sum()} never)")
     if len(drifted):
         histogram.legend()
-    setp((fan, histogram), xlabel="time [s]")
+    for axes in (fan, histogram):
+        axes.set_xlabel("time [s]")
     title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
     heading(figure, title, results)
     save(figure, folder / "ensemble.png")
