@@ -164,3 +164,20 @@ def test_machine_code_of_a_class_that_is_gone_is_made_anew(tmp_path):
             text=True,
         )
         assert told.stdout == "3.0\n", told.stderr
+
+
+def test_machine_code_is_kept_in_the_users_folder_where_the_packages_is_closed(tmp_path):
+    """A file stands where the folder beside the source would be made, so that not even root can write there."""
+    (tmp_path / "kernel.py").write_text(RECORD.replace("NAME", "Fixed"))
+    (tmp_path / "__pycache__").write_text("")
+    plain = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    kept = tmp_path / "of the user"
+    told = subprocess.run(
+        [sys.executable, "-c", "import kernel"],
+        cwd=tmp_path,
+        env=plain | {"XDG_CACHE_HOME": str(kept), "PYTHONPATH": str(Path(models.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+    )
+    assert told.stdout == "3.0\n", told.stderr
+    assert [path.name for path in kept.rglob("*.nbc")], "numba's own way, as long as this passes"
