@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm, solve_continuous_lyapunov, solve_sylvester
+from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
@@ -153,11 +153,13 @@ def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarra
 def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """P of A P + P A' + Q = 0 in extended precision, the last correction, and the residual by its largest term.
 
-    scipy's solver (python-control's takes another one where slycot is installed), then refined: the
+    python-control with its method named (left alone it takes another where slycot is installed), then refined: the
     residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
     is askew, values that are not finite, shapes that do not fit, and an A that is not stable: its equation has a
     solution, which is no covariance.
     """
+    from control import lyap
+
     if A.shape != Q.shape or not (np.isfinite(A).all() and np.isfinite(Q).all()):
         raise InputError("", "A, Q", [list(A.shape), list(Q.shape)], "must be finite and of one shape (n, n)")
     if not abs(Q - Q.T).max(initial=0.0) <= SKEW * abs(Q).max(initial=0.0):
@@ -170,7 +172,7 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
     P = np.zeros_like(right)
     for _ in range(1 + REFINEMENTS):
         half = wide @ P
-        correction = solve_continuous_lyapunov(A, -(half + half.T + right).astype(float)).astype(np.longdouble)
+        correction = lyap(A, (half + half.T + right).astype(float), method="scipy").astype(np.longdouble)
         P = P + (correction + correction.T) / 2  # rounding leaves it askew, and half + half.T takes it to be symmetric
         if abs(correction).max() <= REFINED * abs(P).max():
             break
@@ -219,7 +221,9 @@ def _with_marginal(
         within += _window(split.M, after[0][j], met.delays[j + 1] - met.delays[j])
         cross += after[0][j] @ after[1][j].T - before[0][j + 1] @ before[1][j + 1].T
     if len(split.S):
-        cross = solve_sylvester(split.M, split.S.T, -cross)
+        from control import lyap
+
+        cross = lyap(split.M, split.S.T, cross, method="scipy")
     whole = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
     changed = np.zeros_like(whole)
     changed[k:, k:] = correction

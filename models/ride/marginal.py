@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from scipy.linalg import expm, matrix_balance, schur, solve_sylvester, svd, svdvals
+from scipy.linalg import expm, matrix_balance, schur, svd, svdvals
 
 from models.core.errors import InputError
 
@@ -180,7 +180,9 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
 def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
     """Take the coupling form[:k, k:] out of a block triangular form = W A V, by a Sylvester equation, in place."""
     if 0 < k < len(form):
-        Z = solve_sylvester(form[:k, :k], -form[k:, k:], -form[:k, k:])
+        from control import lyap
+
+        Z = lyap(form[:k, :k], -form[k:, k:], form[:k, k:], method="scipy")
         V[:, k:] += V[:, :k] @ Z
         W[:k] -= Z @ W[k:]
         form[:k, k:] = 0.0
