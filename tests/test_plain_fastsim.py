@@ -141,8 +141,8 @@ def test_derivatives_are_differences_of_the_plain_march(flexible):
                 moved = replace(ellipse, **{name: getattr(ellipse, name) + sign * step * scale[j]})
                 if name == "load":  # Hertz: the axes grow as the cube root, the flexibilities with them
                     grown = (moved.load / ellipse.load) ** (1.0 / 3.0)
-                    longer = tuple(grown * each for each in ellipse.l)
-                    moved = replace(moved, a=grown * ellipse.a, b=grown * ellipse.b, l=longer)
+                    longer = tuple(grown * each for each in ellipse.flexible)
+                    moved = replace(moved, a=grown * ellipse.a, b=grown * ellipse.b, flexible=longer)
                 ends.append(plain.fastsim(moved, program)[0][:3])
             slope = (ends[0] - ends[1]) / (2.0 * step)
             off = np.abs(slope - computed.slopes[i, :, j] * scale[j]) / units(ellipse)

@@ -46,7 +46,7 @@ class Ellipse:
     xi_x: float
     xi_y: float
     spin: float
-    l: tuple[float, float, float]  # noqa: E741  the letter of the papers
+    flexible: tuple[float, float, float]
 
     @property
     def c(self) -> float:
@@ -125,13 +125,13 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
 
 def stiffnesses(ellipse: Ellipse, peak: float, kind: str) -> Array:
     """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
-    three, creep = 1.0 / np.array(ellipse.l), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
+    three, creep = 1.0 / np.array(ellipse.flexible), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
     if kind == "three" or not creep.any():
         return three
     if kind == "one":
-        return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.l))
+        return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.flexible))
     square = creep**2
-    mean = square.sum() / (square @ ellipse.l)
+    mean = square.sum() / (square @ ellipse.flexible)
     return three + _part(ellipse, creep * ellipse.a * three / peak) * (mean - three)
 
 
