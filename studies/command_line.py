@@ -288,6 +288,8 @@ def identify(
     engine: Annotated[str | None, typer.Option(help="One of exudyn, mujoco, reference.")] = None,
     low_pass: Annotated[float, typer.Option(help="Hz, of run and measurement alike, without phase; 0 for none.")] = 0.0,
     profiles: Annotated[bool, typer.Option("--profiles", help="Profile likelihood of every parameter.")] = False,
+    workers: Workers = None,
+    cluster: Cluster = None,
     out: Out = None,
     resume: Resume = None,
     changes: Changes = None,
@@ -299,6 +301,7 @@ def identify(
     loaded, keys = load_scene(scene, changes), [key.strip() for key in parameters.split(",") if key.strip()]
     if not keys:
         raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
+    loaded = loaded.model_copy(update=given_crew(workers, cluster))
     engines = engines_of(engine, loaded.system)
     ready(loaded, engines)
     if not measurement.is_file():

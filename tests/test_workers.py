@@ -3,14 +3,18 @@
 import os
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import Blocks, in_order, run_paths
 from models.ensemble.workers import Crew, processes
+from models.identification.fit import fit
+from models.identification.problem import Clock, Parameter, Problem, measured_channel
+from models.identification.uncertainty import profile, uncertainty
 from models.systems.braking.stops import Stops
 from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
 from studies.command.asked import load_scene
@@ -41,6 +45,25 @@ def test_two_workers_give_the_bits_of_this_process(make, paths, pool):
     assert set(alone) == set(shared) and all(np.array_equal(alone[name], shared[name]) for name in alone)
     scattered = alone["distance" if "distance" in alone else "moments"]
     assert len({values.tobytes() for values in scattered}) == paths  # paths that were mixed up would be seen
+
+
+def straight(values):
+    """A model that is linear in its parameters."""
+    times = np.linspace(0.0, 1.0, 200)
+    return {"y": (times, values[0] + values[1] * times)}
+
+
+def test_profiles_of_a_fit_are_the_same_by_two_workers(pool):
+    times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
+    clock = Clock(times)
+    channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(200)), clock)
+    known = uncertainty(fit(Problem(straight, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
+    shared = list(in_order(partial(profile, known), iter([0, 1]), pool))
+    assert [k for k, _ in shared] == [0, 1]
+    for k, made in shared:
+        alone = profile(known, k)
+        assert np.array_equal(made.values, alone.values) and np.array_equal(made.rise, alone.rise)
+    assert not np.array_equal(shared[0][1].rise, shared[1][1].rise)
 
 
 def test_an_interrupt_between_blocks_and_a_resume_give_the_same_bits(tmp_path):

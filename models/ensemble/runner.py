@@ -9,7 +9,7 @@ first axis is the paths, together.
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
@@ -27,7 +27,8 @@ from models.ensemble.store import Arrays, Store
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
 AHEAD = 64
-"""Blocks under way at once, so that the memory for results on their way stays bounded."""
+"""Blocks under way at once, so that the memory for results on their way stays bounded; two per worker of a cluster that
+has more."""
 TOLD = 5
 """Failed blocks that a message names."""
 LIVES = 3
@@ -199,16 +200,17 @@ def each_block(
 
 
 def in_order(
-    function: Callable[[T], Arrays],
+    function: Callable[[T], Any],
     blocks: Iterator[T],
     executor: Executor | None = None,
     store: Store | None = None,
     ahead: int = AHEAD,
-) -> Generator[tuple[T, Arrays]]:
+) -> Generator[tuple[T, Any]]:
     """Each of some blocks with what a function gives for it, in their order, each as soon as those before it are there.
 
     The blocks are read as they are needed, ``ahead`` of them at most. store : keeps what is finished, of a folder that
-    the caller has claimed; what it has is not computed. Raises RunFailed for the first block that fails.
+    the caller has claimed, and takes named arrays alone; what it has is not computed. Raises RunFailed for the first
+    block that fails.
     """
     kept: Store | _Memory = _Memory() if store is None else store
     numbered, here, given = enumerate(blocks), dict[int, T](), 0
@@ -274,11 +276,12 @@ def _answers(
     if executor is None:
         yield from ((i, block, _attempt(job, block)) for i, block in missing)
         return
+    ahead = ahead if ahead == 1 else max(ahead, 2 * getattr(executor, "width", 0))
     queue, alone = deque(islice(missing, ahead)), deque[tuple[int, T]]()
     lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or alone or waiting:
-            while (queue and _near(queue[0][0], waiting, ahead)) or (alone and not waiting):
+            while (queue and _near(queue[0][0], waiting, alone, ahead)) or (alone and not waiting):
                 i, block = (queue or alone).popleft()
                 waiting[_submitted(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
@@ -297,9 +300,10 @@ def _answers(
             future.cancel()
 
 
-def _near(i: int, waiting: dict[Future, Any], ahead: int) -> bool:
-    """Whether a block may be begun beside those that wait."""
-    return len(waiting) < ahead and i < min((first for first, _ in waiting.values()), default=i) + ahead
+def _near(i: int, waiting: dict[Future, tuple[int, T]], alone: Collection[tuple[int, T]], ahead: int) -> bool:
+    """Whether a block may be begun beside those that wait, and before those that will be computed alone."""
+    first = min((other for other, _ in (*waiting.values(), *alone)), default=i)
+    return len(waiting) < ahead and i < first + ahead
 
 
 def _error(future: Future) -> BaseException | None:

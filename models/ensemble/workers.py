@@ -195,10 +195,11 @@ class OnCluster(Executor):
     """The executor of a Dask client, which sends a job to the cluster once, and with each block its numbers alone.
 
     A job is the result of a task, so that the scheduler can make it again where the workers that had it are gone.
+    width : workers at its beginning.
     """
 
     def __init__(self, client: Any) -> None:
-        self._client, self._executor = client, client.get_executor()
+        self._client, self._executor, self.width = client, client.get_executor(), len(client.nthreads())
         self._jobs: dict[int, tuple[Any, Any]] = {}
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:

@@ -7,7 +7,6 @@ residuals as alike as they are, where it is larger: short records scatter. Sourc
 Econometrica 55 (1987), 703-708; for the whole, Ljung, System Identification (1999), section 9.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -168,7 +167,7 @@ class Profile:
         return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
 
 
-def profile(known: Uncertainty, k: int, tell: Callable[[str, float], None] = lambda text, share: None) -> Profile:
+def profile(known: Uncertainty, k: int) -> Profile:
     """Profile likelihood of parameter ``k``; the misfit is weighted as its covariance is, so that residuals that stay
     alike do not count as many."""
     solved, problem = known.fit, known.fit.problem
@@ -179,10 +178,9 @@ def profile(known: Uncertainty, k: int, tell: Callable[[str, float], None] = lam
     weight = naive / known.deviations[k] ** 2 if np.isfinite(known.deviations[k]) and naive > 0.0 else 1.0
     values = [v for v in solved.values[k] + spread * np.array(PROFILE) if parameter.low < v < parameter.high]
     rises = []
-    for i, value in enumerate(values):
+    for value in values:
         there = fit(_held_inside(problem, k, value, solved.values))
         rises.append(2.0 * (there.cost - solved.cost) * weight)
-        tell(f"profile of {parameter.name}", (i + 1) / len(values))
     parabola = ((np.array(values) - solved.values[k]) / known.deviations[k]) ** 2
     return Profile(parameter.name, np.array(values), np.array(rises), parabola)
 

@@ -1,14 +1,17 @@
 """``twinrig identify``: keys of a scene from a measurement, with their errors and what the data do not determine."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from models.core.whole_files import write_whole
+from models.ensemble.runner import in_order
 from models.ensemble.store import Store, named_files
+from models.ensemble.workers import Crew, places_of
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
@@ -40,16 +43,21 @@ def identify(
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
     if folder is None:
-        return _solved(problem, None, profiles, tell)
-    store = Store(folder / STAGES)
-    with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
-        return _solved(problem, store, profiles, tell)
-
-
-def _solved(problem: Problem, store: Store | None, profiles: bool, tell: Tell) -> tuple[Uncertainty, list[Profile]]:
-    known = uncertainty(fit(problem, store, tell))
+        known = uncertainty(fit(problem, None, tell))
+    else:
+        store = Store(folder / STAGES)
+        with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
+            known = uncertainty(fit(problem, store, tell))
     wanted = [k for k in range(len(problem.parameters)) if profiles or not known.determined[k]]
-    return known, [profile(known, k, lambda text, share: tell(text, 0.9)) for k in wanted]
+    return known, list(_profiles(scene, known, wanted, tell))
+
+
+def _profiles(scene: Any, known: Uncertainty, wanted: list[int], tell: Tell) -> Iterator[Profile]:
+    """Profiles of some parameters, computed by the scene's crew."""
+    with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
+        for done, (k, made) in enumerate(in_order(partial(profile, known), iter(wanted), pool), start=1):
+            tell(f"profile of {known.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
+            yield made
 
 
 def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float) -> dict[str, Any]:
