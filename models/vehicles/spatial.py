@@ -298,7 +298,8 @@ class SpatialVehicle:
     ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
     of the axles from the front. ``limits`` : what a reduced vehicle has not, for closed forms of ride alone.
-    ``joint_elements`` : what acts along coordinates themselves.
+    ``joint_elements`` : what acts along coordinates themselves. ``towed`` : bodies that another one tows, each fixed to
+    a massless body at its hitch, whose turns are the joint between both.
     """
 
     name: str
@@ -313,6 +314,7 @@ class SpatialVehicle:
     gravity: float = 0.0
     limits: Limits = NONE
     joint_elements: tuple[JointElement, ...] = ()
+    towed: tuple[str, ...] = ()
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
         """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""
@@ -343,9 +345,18 @@ class SpatialVehicle:
         """A body and all that it rides on, down to the one without parent; nothing for None, the ground."""
         return () if name is None else (name, *self.chain(self.body(name).parent))
 
+    def towed_under(self, name: str | None) -> str | None:
+        """The towed body that carries a body, or is it; None where no towed body does."""
+        return next((body for body in self.chain(name) if body in self.towed), None)
+
     def turns(self, name: str | None) -> bool:
         """Whether a body may turn, by a freedom of its own or of what it rides on."""
         return any(freedom.startswith("r") for body in self.chain(name) for freedom in self.body(body).freedoms)
+
+
+def hitch_of(towed: str) -> str:
+    """Name of the massless body at the hitch of a towed one."""
+    return f"{towed} hitch"
 
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:

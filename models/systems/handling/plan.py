@@ -5,9 +5,12 @@ from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import joints_alone
+from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
 from models.vehicles.plausible import plausible
+from models.vehicles.spatial import hitch_of
+from models.vehicles.towing import hitch_load
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
@@ -34,6 +37,7 @@ def describe(scene: HandlingScene) -> str:
             "vehicle",
             f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
         ),
+        *(_line("trailer", _trailer(first, name)) for name in free.towed),
         _line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
         _line(
             "road",
@@ -50,6 +54,13 @@ def describe(scene: HandlingScene) -> str:
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
+
+
+def _trailer(handling: Handling, name: str) -> str:
+    hitch, load = handling.vehicle.body(hitch_of(name)), hitch_load(handling.vehicle, handling.held, name)
+    x, y, z = hitch.position
+    towing = handling.vehicle.chain(name)[2]
+    return f"{name}, towed by {towing} at ({x:g}, {y:g}, {z:g}) m, turns {' '.join(hitch.freedoms)}; {load:.0f} N on it"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

@@ -17,6 +17,7 @@ from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
+from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -27,7 +28,7 @@ LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0
 
 
 class HandlingVehicle(Strict):
-    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
+    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre; it may tow."""
 
     file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
     accept: list[Query] = accepted()
@@ -104,14 +105,17 @@ class HandlingScene(SceneFile):
         duration = self.manoeuvres[manoeuvre].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
+    def given(self) -> SpatialVehicle:
+        """The vehicle of the file, with what it tows."""
+        return load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
+
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
         manoeuvre, road = self.manoeuvres[name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
+        built = Handling(self.given(), Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
         return extended(built, self)
 
 
