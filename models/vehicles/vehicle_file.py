@@ -193,11 +193,11 @@ class _Builder:
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
             inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
             at, freedoms = _vector(ready.position), tuple(ready.freedoms)
-            body = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
+            whole = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
             if ready.hitch is not None:
-                hitch = self._hitch(body, _vector(ready.hitch))
-                done[hitch.name], body = hitch, replace(body, freedoms=(), parent=hitch.name)
-            done[ready.name] = body
+                hitch = self._hitch(whole, _vector(ready.hitch))
+                done[hitch.name], whole = hitch, replace(whole, freedoms=(), parent=hitch.name)
+            done[ready.name] = whole
             del waiting[ready.name]
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
 

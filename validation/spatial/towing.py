@@ -78,7 +78,7 @@ def headings(drive: Drive) -> list[float]:
     return [sum(yaws[each] for each in free.chain(name) if each in yaws) for name in free.towed]
 
 
-def circle_error(steer: float = 0.15, speed: float = 2.0) -> float:
+def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     """Angle of the shipped caravan beside the car at a walking pace, over that of wheels that roll where they head,
     less 1.
 
@@ -90,7 +90,7 @@ def circle_error(steer: float = 0.15, speed: float = 2.0) -> float:
     hitch = car.vehicle.body(hitch_of(car.vehicle.towed[0])).position[0]
     radius, back, bar = (front - rear) / math.tan(steer), rear - hitch, hitch - axle
     wanted = math.atan(back / radius) + math.asin(bar / math.hypot(radius, back))
-    (angle,) = headings(driven("mujoco", car, speed, 12.0))
+    (angle,) = headings(driven("mujoco", car, speed, 8.0))
     return -angle / wanted - 1.0
 
 
