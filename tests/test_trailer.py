@@ -10,16 +10,20 @@ import pytest
 from models.brake.sprung import sprung
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named, without
+from models.engines.free_vehicle import built_share, free_model
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.plan import describe
-from models.systems.handling.run import driven, energy, run, unaccounted
+from models.systems.handling.run import build as build_model
+from models.systems.handling.run import driven, driven_by, energy, run, unaccounted
 from models.systems.handling.scene import build
+from models.systems.handling.towed_springs import divided, numbers_beside
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from validation.common.checks import off
 from validation.spatial.towing import keep_to_the_car, levers_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
-from validation.spatial.written_equations import TURN, rolling_cars
+from validation.spatial.written_equations import TURN, rolling_cars, rolling_gap
 
 BOUND = 3e-3
 """Of the closed form of a settled turn: what is left of its settling after 3 s."""
@@ -85,6 +89,21 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
         InputError, match=r"vehicle\.file = .*mine\.toml': has bodies with a hitch: name a vehicle file"
     ):
         without(towing, "trailer")
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
+def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
+    car = rolling_cars()["train"]
+    division = divided(car, engine)
+    driven_by_both = replace(driven_by(car), numbers=numbers_beside(car, division), parts=division.native)
+    names, _ = built_share(engine, driven_by_both)
+    wanted = {spring.name for spring in car.given.springs if spring.frame in car.given.towed} | {"trailer's bar"}
+    assert set(names) == wanted
+    assert all("friction" in why for why in division.reasons.values()) and len(division.reasons) == 4
+    assert rolling_gap(car, engine, 3) < 1e-12 and rolling_gap(car.changed(forces="compiled"), engine, 3) < 1e-12
+    q, v = car.straight(20.0)
+    without = free_model(engine, replace(driven_by_both, parts=division.native[:-1])).acceleration(0.0, q + 0.01, v)
+    assert off(without, build_model(engine, car).acceleration(0.0, q + 0.01, v)) > 1e-6
 
 
 def test_a_train_that_jackknifes_is_no_result():

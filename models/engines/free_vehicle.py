@@ -7,7 +7,7 @@ march by the classical Runge-Kutta method.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -146,23 +146,23 @@ def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
     return share
 
 
-def joints_alone(vehicle: SpatialVehicle) -> tuple[tuple[str, str], ...]:
-    """Native joints of each engine for a vehicle whose springs keep to the heading of its carrier, and why no more:
-    heads and texts of a plan. Joints are counted in built models.
+def native_share(
+    vehicle: SpatialVehicle, native: Mapping[str, tuple[NativePart, ...]] | None = None
+) -> tuple[tuple[str, str], ...]:
+    """Native joints and springs of each engine for a vehicle whose springs keep to the heading of its carrier, and why
+    no more: heads and texts of a plan. They are counted in built models.
 
     Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it.
+    native : parts of each engine, of springs that keep to other bodies.
     """
-    driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None)
-    count, bars = len(vehicle.springs), len(vehicle.bars)
+    count, bars, lines = len(vehicle.springs), len(vehicle.bars), []
+    for engine in ENGINES:
+        driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None, (native or {}).get(engine, ()))
+        names, built_joints = built_share(engine, driven)
+        said = f"{built_joints} joints, {len(names)} of {count} springs and {bars} bars"
+        lines.append(("native", f"{engine}: bodies and {said}"))
     why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
-    native = tuple(
-        (
-            "native",
-            f"{engine}: bodies and {built_share(engine, driven)[1]} joints, 0 of {count} springs and {bars} bars",
-        )
-        for engine in ENGINES
-    )
-    return (*native, ("shared", f"springs, mounts and bars: {why}"))
+    return (*lines, ("shared", f"springs, mounts and bars: {why}"))
 
 
 def _module(engine: str) -> Any:

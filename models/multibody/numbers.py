@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -69,8 +70,9 @@ class Handling:
     """A vehicle on the road: what every implementation marches.
 
     given : the vehicle of the ride; waves (m, 4) : the road as ``road`` makes it; slope : of the whole road, uphill
-    along x (rad); pushes : forces from outside. ``vehicle`` is the free one, ``numbers`` its table, ``gravity`` (3,) in
-    m/s^2.
+    along x (rad); pushes : forces from outside; forces : whose the springs and bars of towed bodies are, the engine's
+    as far as it has them ("native") or the compiled forces' ("compiled"). ``vehicle`` is the free one, ``numbers`` its
+    table, ``gravity`` (3,) in m/s^2.
     """
 
     given: SpatialVehicle
@@ -79,6 +81,7 @@ class Handling:
     waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     slope: float = 0.0
     pushes: tuple[Push, ...] = ()
+    forces: Literal["native", "compiled"] = "native"
     vehicle: SpatialVehicle = field(init=False)
     held: Preloads = field(init=False)
     numbers: np.ndarray = field(init=False)

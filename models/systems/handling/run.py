@@ -23,6 +23,7 @@ from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
+from models.systems.handling.towed_springs import divided, numbers_beside
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import Freedom, hitch_of
@@ -266,7 +267,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    return free_model(engine, driven_by(handling), settings)
+    division = divided(handling, engine)
+    driven = replace(driven_by(handling), numbers=numbers_beside(handling, division), parts=division.native)
+    return free_model(engine, driven, settings)
 
 
 def _plain(handling: Handling) -> "PlainRolling":
@@ -276,7 +279,7 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: the bodies, and the compiled forces with their table."""
+    """The car as engines build it: the bodies, and the compiled forces with their whole table."""
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
 
 

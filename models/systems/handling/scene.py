@@ -64,6 +64,10 @@ class RunTable(Strict):
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
     )
+    forces: Literal["native", "compiled"] = Field(
+        default="native",
+        description="springs of what is towed: the engine's own as far as it has them, or compiled forces",
+    )
 
 
 class Manoeuvre(Strict):
@@ -115,7 +119,9 @@ class HandlingScene(SceneFile):
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        built = Handling(self.given(), Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
+        built = Handling(
+            self.given(), Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves, forces=self.run.forces
+        )
         return extended(built, self)
 
 
