@@ -11,6 +11,7 @@ from models.multibody import forces as at
 from models.multibody import parts
 from models.multibody.numbers import Handling
 from models.vehicles.cut_vehicle import Element, elements_of
+from models.vehicles.spatial import AntiRollBar, SpringDamper
 
 ACTS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, parts.ON_TRAVEL, parts.ON_RATE]
 """Columns of a part that are 0 where nothing of it is left."""
@@ -31,7 +32,8 @@ def numbers_beside(handling: Handling, division: Division) -> np.ndarray:
     first, count = int(numbers[at.OF_PARTS]), int(numbers[at.PARTS])
     rows = numbers[first : first + count * parts.PER_PART].reshape(count, parts.PER_PART)
     left = {element.name: element for element in division.shared}
-    for row, part in zip(rows, (*handling.vehicle.springs, *handling.vehicle.bars), strict=True):
+    whole: tuple[SpringDamper | AntiRollBar, ...] = (*handling.vehicle.springs, *handling.vehicle.bars)
+    for row, part in zip(rows, whole, strict=True):
         if part.name in native:
             _leave(row, left.get(part.name))
     kept = rows[rows[:, ACTS].any(axis=1)]
