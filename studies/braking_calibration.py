@@ -16,7 +16,7 @@ from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import processes
+from models.ensemble.workers import Crew, places_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
@@ -34,6 +34,8 @@ PAPER = {
 """What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
 ROUNDS = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
 """What is told of every round of the fit, and its unit."""
+BLOCK = 2
+"""Stops per block."""
 WANTED = {"deceleration": 1.36, "aside": 7.5}
 
 
@@ -47,7 +49,6 @@ class Options(Strict):
     rounds: int = Field(6, ge=1, le=50, description="of the fit")
     speed_spread: float = quantity("", "standard deviation of the initial speed, relative", default=0.002, zero=True)
     seed: int = Field(1, ge=0, le=2**62, description="of the speeds")
-    workers: int = Field(2, ge=1, le=256, description="processes that compute")
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
@@ -79,7 +80,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
     progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
-    with processes(options.workers) as pool:
+    with Crew.of(scene).at_work(options.runs, *places_of(scene)) as pool:
         for i in range(options.rounds):
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means(fitted(scene, options, scale, steer), options, options.runs, pool)
@@ -127,7 +128,7 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, blocks=Blocks(max(1, runs // (2 * options.workers))))
+    stops = run_paths(job, runs, executor=pool, blocks=Blocks(BLOCK))
     return {key: scatter(stops[key]) for key in PAPER}
 
 

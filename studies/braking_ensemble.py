@@ -1,7 +1,6 @@
 """How anti-lock braking scatters run by run: two ensembles of stops, their means, scatter and a test between them."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results, gathered
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.workers import processes
+from models.ensemble.workers import Crew, places_of
 from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
@@ -37,7 +36,6 @@ class Options(Strict):
     procedure: str = Field("straight", description="name of the procedure that is repeated")
     speed_spread: float = quantity("", "standard deviation of the initial speed, relative", default=0.002, zero=True)
     seed: int = Field(1, ge=0, le=2**62, description="of the speeds")
-    workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
     other: dict[str, Any] = Field(default_factory=dict, description="what the second ensemble has otherwise, as tables")
     names: list[str] = Field(["first", "second"], min_length=2, max_length=2, description="of both ensembles")
 
@@ -58,18 +56,18 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
-    ensembles, results = [], dict[str, Result]()
+    ensembles, results, blocks = [], dict[str, Result](), Blocks(BLOCK)
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(each, procedure=options.procedure, error=scene.error) for each in scenes]
-    with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
+    with Crew.of(scene).at_work(blocks.count(options.runs), *places_of(scene)) as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
             def tell(finished: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
 
-            store, blocks = folder / BLOCKS / options.names[i], Blocks(BLOCK)
+            store = folder / BLOCKS / options.names[i]
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
     units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
     scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]

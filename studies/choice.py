@@ -181,7 +181,7 @@ def _linear(scene: Any) -> SceneChoice:
             for effect, each in singles.items()
         ]
         further = {effect.name: change for effect, change in chooser.further(frozenset(linear.left_out)).items()}
-        watts = activity(chooser.wholes[len(chooser.wholes) // 2])
+        watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
     before, after = round(linear.before.calls), round(linear.after.calls)
     work = tuple(cost.work for cost in (linear.before, linear.before, linear.after))
     choice = Choice(
@@ -192,7 +192,7 @@ def _linear(scene: Any) -> SceneChoice:
         0.0 * linear.predicted,
         abs(linear.confirmed),
         0.0 * linear.predicted,
-        linear.kept,
+        linear.within_tolerance,
         (before, before, after),
         work,
         linear.rounds,
@@ -215,7 +215,7 @@ def _answer(answered: SceneChoice) -> dict[str, Any]:
             name: {part: float(getattr(choice, part)[i]) for part in ("predicted", "confirmed", "chance")}
             for i, name in enumerate(answered.scene.quantities)
         },
-        "kept": choice.kept,
+        "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "confirmations": choice.rounds,
         "would matter no more above": answered.further,

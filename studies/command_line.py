@@ -20,6 +20,7 @@ from models.core.whole_files import reason_of
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
 from studies.command.audits import blind_spot_audit, conformity_report
+from studies.command.crew import given_crew
 from studies.command.finishing import end, finish, folder_of, untold, watched
 from studies.command.waiting import waiting
 
@@ -63,6 +64,14 @@ Sweep = Annotated[
 NoError = Annotated[bool, typer.Option("--no-error", help="Do not estimate the error of steps or cells.")]
 Strictly = Annotated[bool, typer.Option("--strict", help="End with code 1 where an assumption is broken.")]
 Profile = Annotated[bool, typer.Option("--profile", help="Tell where the time goes: imports, kernels, marches.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, max=256, help="Processes for what repeats; no result depends on their number (default: 2)."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute instead, as tcp://host:8786."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
 
@@ -167,6 +176,8 @@ def run_scene(
     out: Out = None,
     resume: Resume = None,
     sweep: Sweep = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
     changes: Changes = None,
     no_error: NoError = False,
     strict: Strictly = False,
@@ -176,15 +187,17 @@ def run_scene(
     """Run a scene and save its results and figures."""
     telling = watched(profile)
     if sweep is not None:
+        from studies.command.crew import crew_of
         from studies.command.sweep import RECORDS, points
         from studies.command.sweep import run as run_points
 
         job = points(sweep, scene, changes or (), engine, not no_error)
+        crew = crew_of(job.check(), workers, cluster)
         folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
-        work = partial(run_points, replace(job, folder=folder))
+        work = partial(run_points, replace(job, folder=folder), crew=crew)
         return finish(telling(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
-    loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
+    loaded = loaded.model_copy(update={"error": loaded.error and not no_error, **given_crew(workers, cluster)})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
         with waiting("checking the scene", loaded.system):
@@ -360,14 +373,24 @@ def validate(
     blind_spots: Annotated[
         bool, typer.Option("--blind-spots", help="Which rows and tests notice each shared function 1 % off (hours).")
     ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(metavar="PATTERN", help="Of --blind-spots: functions of this name alone, as 'models.tyre.*'."),
+    ] = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
     out: Out = None,
     resume: Resume = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
+    if only is not None and not blind_spots:
+        raise InputError("--only", "", only, "goes with --blind-spots")
+    crew = given_crew(workers, cluster)
     if engine is not None:
         return conformity_report(engine, quick or blind_spots or against is not None or resume is not None, out)
     if blind_spots:
-        return blind_spot_audit(quick or against is not None, out, resume)
+        return blind_spot_audit(quick or against is not None, only, out, resume)
+    from models.ensemble.workers import Crew
     from validation.common.changes import read
     from validation.run import KEPT
     from validation.run import validate as run_all
@@ -375,7 +398,8 @@ def validate(
     earlier = None if against is None else read(against)
     folder = folder_of("validate-quick" if quick else "validate", KEPT, "", out, resume)
     try:
-        failed = run_all(folder, quick, " ".join(["twinrig", *sys.argv[1:]]), earlier, resume is not None)
+        command = " ".join(["twinrig", *sys.argv[1:]])
+        failed = run_all(folder, quick, command, earlier, resume is not None, Crew.given(**crew))
     except KeyboardInterrupt:
         end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)

@@ -8,8 +8,6 @@ that was killed, to the same bits. Each other engine repeats the first paths on 
 import json
 import math
 from collections.abc import Callable
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -26,13 +24,12 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
-from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import Blocks, each_block, run_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.statistics import deviation, percentiles, quantile
-from models.ensemble.store import Arrays
-from models.ensemble.workers import cluster, processes
+from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright
 from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
+from models.systems.pitch_plane.path_statistics import PITCH, PathStatistics
 from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower, measure, write_measurement
@@ -43,16 +40,17 @@ Progress = Callable[[str, float], None]
 BLOCKS = "blocks"
 """Folder of the finished blocks, within that of the results; a study that has one can be resumed."""
 QUANTILES = (0.05, 0.5, 0.95)
+HEAVE = 2
+"""Place of the heave among the states."""
 
 
 class Options(Strict):
     """[options] of this study."""
 
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
+    saved: int = Field(1000, ge=1, le=1_000_000, description="first paths that are saved; statistics are of all")
     engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
-    workers: int = Field(2, ge=1, le=256, description="processes that compute; the results do not depend on it")
-    cluster: str | None = Field(None, description="address of a Dask scheduler whose workers compute instead")
     rows: float = quantity("s", "spacing of the saved states", default=0.5)
     times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
     threshold: float = quantity("rad", "pitch error at which a path has drifted off", default=0.05)
@@ -84,40 +82,38 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = check(scene, engines)
     measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
     times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
+    true = measured.states[np.rint(times / scene.run.step).astype(int)]
+    found = PathStatistics(true, max(options.saved, options.engine_paths))
 
     def tell(finished: Done) -> None:
         progress(f"reference: {finished}", finished.done / finished.paths)
 
-    with TemporaryDirectory() as name, _workers(options) as pool:
+    crew = Crew.of(scene)
+    with TemporaryDirectory() as name, crew.at_work(Blocks().count(options.paths)) as pool:
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower(scene, Path(name))({}, {"force_noise": noise})
         first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
-        paths = run_paths(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell)
+        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell):
+            found.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
             if engine == "mujoco":
-                repeated = run_paths(mujoco_threads(*asked, options.workers), options.engine_paths)
+                repeated = run_paths(mujoco_threads(*asked, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
-            gaps[engine] = gap(paths, repeated, times)
+            gaps[engine] = gap(found.first, repeated, times)
     write_measurement(measured, folder, period)
-    true = measured.states[np.rint(times / scene.run.step).astype(int)]
-    channels = {
-        "states": Channel(("path", "time", "state"), paths["states"], "m, rad, m/s, rad/s"),
-        "drift_off": Channel("path", paths["drift_off"], "s", "drift-off, infinite if never"),
-        "failed": Channel("path", paths["failed"], "s", "last good time of a path that failed"),
-    }
-    axes = {"time": Channel("time", times, "s"), "state": Channel("state", list(STATE_NAMES))}
-    rows = _rows(options, times, paths["states"] - true)
-    saved = _told(result(noisy, channels, axes, engine="reference", threshold=options.threshold), first, rows, options)
-    saved.save(folder / "ensemble.nc")
-    table = text(options, scene, rows, paths, gaps)
+    rows = _rows(options, times, found)
+    channels, axes = _channels(times, found, options.saved)
+    saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
+    _told(saved, first, rows, options, found).save(folder / "ensemble.nc")
+    table = text(options, scene, rows, found, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(times, paths["states"][:, :, 3] - true[:, 3], paths["drift_off"], options, results, folder)
+    _figure(times, found, options, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -130,7 +126,30 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _told(saved: Result, first: Result, rows: list[dict[str, float]], options: Options) -> Result:
+def _channels(times: np.ndarray, found: PathStatistics, saved: int) -> tuple[dict[str, Channel], dict[str, Channel]]:
+    """The first paths and the statistics of all, with their axes."""
+    paths = {name: values[:saved] for name, values in found.first.items()}
+    units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
+    channels = {
+        "states": Channel(("path", "time", "state"), paths["states"], units),
+        "drift_off": Channel("path", paths["drift_off"], "s", "drift-off, infinite if never"),
+        "failed": Channel("path", paths["failed"], "s", "last good time of a path that failed"),
+        "mean_error": Channel(("time", "state"), found.covariance.mean, units, "mean of all paths less the true one"),
+        "covariance": Channel(("time", "state", "other_state"), found.covariance.covariance, units, "of all paths"),
+        "drift_offs": Channel("drift_off_time", found.drift_off.counts, "-", "number of all paths that drifted off"),
+    }
+    axes = {
+        "time": Channel("time", times, "s"),
+        "state": Channel("state", names),
+        "other_state": Channel("other_state", names),
+        "drift_off_time": Channel("drift_off_time", found.drift_off.values, "s"),
+    }
+    return channels, axes
+
+
+def _told(
+    saved: Result, first: Result, rows: list[dict[str, float]], options: Options, found: PathStatistics
+) -> Result:
     """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
     error = json.loads(first.data.attrs["error"])
     saved.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
@@ -139,36 +158,30 @@ def _told(saved: Result, first: Result, rows: list[dict[str, float]], options: O
         for name, unit in (("pitch", "rad"), ("heave", "m"))
         for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }
-    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", _steepest)]
+    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(found))]
     return of_chance(
         judged(saved, assumed), {f"deviation of {name}": breach for name, breach in worst.items()}, options.paths
     )
 
 
-def _steepest(run: Result) -> Watched:
+def _steepest(found: PathStatistics) -> Watched:
     """Largest pitch (rad) of all paths at each time; of those that left all bounds it is none."""
-    return {"any path": np.fmax.reduce(np.abs(run["states"][:, :, 3]), axis=0)}
+    return {"any path": found.steepest}
 
 
-def _workers(options: Options) -> AbstractContextManager[Executor | None]:
-    """Who computes: a cluster, processes, or this process alone."""
-    if options.cluster is not None:
-        return cluster(options.cluster)
-    return processes(options.workers) if options.workers > 1 else nullcontext()
-
-
-def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[str, float]]:
+def _rows(options: Options, times: np.ndarray, found: PathStatistics) -> list[dict[str, float]]:
     """Standard deviation and its standard error of pitch and heave at the asked times."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
-        figures = (float(times[row]), *deviation(errors[:, row, 3]), *deviation(errors[:, row, 2]))
+        pitch, heave = (found.moments.deviation(row, place) for place in (PITCH, HEAVE))
+        figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows
 
 
 def text(
-    options: Options, scene: Scene, rows: list[dict[str, float]], paths: Arrays, gaps: dict[str, float]
+    options: Options, scene: Scene, rows: list[dict[str, float]], found: PathStatistics, gaps: dict[str, float]
 ) -> list[str]:
     """The table as lines of text."""
     lines = [
@@ -183,10 +196,9 @@ def text(
     ]
     lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
     for level in QUANTILES:
-        value, low, high = quantile(paths["drift_off"], level)
+        value, low, high = found.drift_off.quantile(level)
         lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
-    lost = int(np.isfinite(paths["failed"]).sum())
-    lines += [f"  {lost} paths left all bounds and count as drifted off by then"] if lost else []
+    lines += [f"  {found.lost} paths left all bounds and count as drifted off by then"] if found.lost else []
     for engine, worst in gaps.items():
         differ = (
             f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
@@ -200,26 +212,25 @@ def _time(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "never"
 
 
-def _figure(
-    times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, results: Results, folder: Path
-) -> None:
+def _figure(times: np.ndarray, found: PathStatistics, options: Options, results: Results, folder: Path) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, DARK, WIDE, heading, plt, save
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
-    draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
+    draw_fan(fan, times[1:], found.fan[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )
     fan.legend(loc="lower right")
-    drifted = drift_off[np.isfinite(drift_off)]
-    histogram.hist(drifted, bins=40, color=BLUE, alpha=0.6)
+    there = np.isfinite(found.drift_off.values)
+    drifted, counts = found.drift_off.values[there], found.drift_off.counts[there]
+    histogram.hist(drifted, bins=40, weights=counts, color=BLUE, alpha=0.6)
     for level, style in zip(QUANTILES, (":", "-", ":"), strict=True):
-        value = quantile(drift_off, level)[0]
+        value = found.drift_off.quantile(level)[0]
         if np.isfinite(value):
             histogram.axvline(value, color=DARK, linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
-    histogram.set_title(f"Drift-offs: paths [-] ({len(drift_off) - len(drifted)} never)")
+    histogram.set_title(f"Drift-offs: paths [-] ({options.paths - counts.sum()} never)")
     if len(drifted):
         histogram.legend()
     plt.setp((fan, histogram), xlabel="time [s]")

@@ -111,7 +111,7 @@ def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[
     if options.prediction:
         other = plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
         return whole, _on(scene, other, RACE_CAR)
-    from models.systems.single_track.drive import read_drive
+    from models.measured.drive import read_drive
 
     times = read_drive(path).times
     middle = float(times[round(options.share * len(times))])

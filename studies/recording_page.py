@@ -56,7 +56,7 @@ def page(exam: Examination, folder: Path, result: Result) -> str:
         limits={"disagrees": DISAGREES, "force": FORCE, "damage": DAMAGE},
         forces=_forces(exam, exam.outcome, folder) if exam.outcome is not None else None,
         sizes=[math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf for each in exam.compared],
-        files=[(file, exam.scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(exam.scene.files)],
+        files=[(source, exam.scene.path(source.file, f"files.{i}.file")) for i, source in enumerate(exam.scene.files)],
         command=" ".join(sys.argv),
         versions={name: version(name) for name in dict.fromkeys(("twinrig", library, "numpy", "scipy"))},
         python=platform.python_version(),

@@ -73,7 +73,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         progress("single effects", 0.7)
         further = chooser.further(frozenset(choice.left_out))
         alone = [_alone(chooser, effect) for effect in chooser.effects]
-        watts = activity(chooser.wholes[len(chooser.wholes) // 2])
+        watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
@@ -119,7 +119,7 @@ def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) 
         "left out": [effect.name for effect in choice.left_out],
         "stay": [effect.name for effect in choice.candidates if effect not in choice.left_out],
         "errors": errors,
-        "kept": choice.kept,
+        "kept": choice.within_tolerance,
         "states": [choice.before.states, choice.after.states],
         "step": [choice.before.step, choice.after.step],
         "step limit": list(choice.stable),

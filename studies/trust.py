@@ -22,8 +22,9 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
-from models.ensemble.runner import run_paths
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.statistics import ERRORS_95, quantile
+from models.ensemble.workers import Crew
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene, assemble, changed
@@ -80,7 +81,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
-    spread = _ensemble(base, quiet, deviation, options, engines[0])
+    spread = _ensemble(base, quiet, deviation, options, engines[0], Crew.of(scene, usual=1))
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
@@ -126,7 +127,9 @@ def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
     return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
 
 
-def _ensemble(base: Scene, quiet: Result, deviation: float, options: Options, engine: str) -> dict[str, np.ndarray]:
+def _ensemble(
+    base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
+) -> dict[str, np.ndarray]:
     """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise, ``quiet``.
 
     The errors are nan from where a path left all bounds.
@@ -134,7 +137,8 @@ def _ensemble(base: Scene, quiet: Result, deviation: float, options: Options, en
     noisy = changed(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
     rows = np.arange(0, len(quiet.times), max(1, round(SPACING / base.run.step)))
     times, true = quiet.times[rows], quiet["pitch"]
-    paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths)
+    with crew.at_work(Blocks().count(options.paths)) as pool:
+        paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths, executor=pool)
     errors = np.abs(paths["states"][:, :, 3] - true[rows])
     return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
 

@@ -24,6 +24,7 @@ def scene(**tables):
 
 
 @pytest.mark.parametrize("loads", [(9e3, 24e3, -4e3, 26e3), (-1.0, 30e3, 8e3, 17e3), (20e3, 25e3, -2e3, 12e3)])
+@pytest.mark.grounds("closed form")
 def test_three_wheels_that_stay_hold_weight_and_moments(loads):
     place, shared = truck(PAPER).place, np.array(loads)
     share_out(shared, place)
@@ -32,6 +33,7 @@ def test_three_wheels_that_stay_hold_weight_and_moments(loads):
 
 
 @pytest.mark.parametrize(("loads", "side"), [((-3e3, 30e3, -4e3, 26e3), (0, 2)), ((30e3, 25e3, -4e3, -2e3), (2, 3))])
+@pytest.mark.grounds("closed form")
 def test_beyond_balance_two_wheels_bear_nothing(loads, side):
     shared = np.array(loads)
     share_out(shared, truck(PAPER).place)

@@ -28,6 +28,7 @@ def turning(speed, yaw=0.0, side=0.0):
     return moving
 
 
+@pytest.mark.grounds("closed form")
 def test_locked_wheels_stop_in_the_closed_form():
     for step in (1e-4, 5.5e-3, 2e-2):
         state = Moving(truck_on(constant(0.4)), 10.0).braked(LOCKING, step).state
@@ -44,6 +45,7 @@ def _locked_from_the_start(tables):
     return Moving(truck_on(tables, still), 10.0).braked(LOCKING * 1e9)
 
 
+@pytest.mark.grounds("closed form")
 def test_load_transfer_of_all_and_of_single_axles():
     assert max(transfer_errors().values()) < 1e-6  # of the loads at rest; the wheels' inertia is made 1e-9 kg m^2
 

@@ -26,6 +26,7 @@ from validation.cases import braking_reference as case
 
 
 @pytest.mark.parametrize("name", case.LAWS)
+@pytest.mark.grounds("plain counterpart")
 def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
     both, bound, _ = case.LAWS[name]
     assert laws.largest(*both(60, seed=5)) < bound
@@ -75,11 +76,14 @@ def test_loads_at_rest_are_those_of_levers():
         assert Suspension(own).loads == pytest.approx(truck(own.plane).static, rel=1e-9)
 
 
-def test_accelerations_and_a_piece_of_a_stop_are_those_of_the_engine():
-    for name in ("twin", "bent"):
-        own, count = whole.VEHICLES[name](), 5
-        found = whole.accelerations(own, "mujoco", count)
-        assert whole.apart(found, whole.plain_accelerations(name, count)) < 1e-12
+@pytest.mark.grounds("plain counterpart")
+@pytest.mark.parametrize(("name", "engine"), [("twin", "mujoco"), ("bent", "mujoco"), ("twin", "exudyn")])
+def test_accelerations_are_those_of_the_engine(name, engine):
+    compiled = whole.accelerations(whole.VEHICLES[name](), engine, 5)
+    assert whole.apart(compiled, whole.plain_accelerations(name, 5)) < 1e-12
+
+
+def test_a_piece_of_a_stop_is_that_of_the_engine():
     own = whole.asymmetric()
     assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
 

@@ -94,7 +94,7 @@ def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out(
 def test_a_pair_is_found_of_which_one_alone_ruins(monkeypatch):
     ruined = {frozenset("a"): 300.0, frozenset("ab"): 101.0, frozenset("b"): 104.5, frozenset(): 100.0}
     choice = chooser(monkeypatch, lambda left_out, times: ruined[left_out], ("a", "b")).choose()
-    assert choice.left_out == ("a", "b") and choice.kept and choice.confirmed[0] == pytest.approx(0.01)
+    assert choice.left_out == ("a", "b") and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.01)
 
 
 def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
@@ -108,7 +108,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     found.progress = shares.append
     choice = found.choose()
     own = found.whole.variants.of().counts["calls"]
-    assert choice.ended and choice.left_out == ("e00",) and choice.kept
+    assert choice.ended and choice.left_out == ("e00",) and choice.within_tolerance
     assert choose.RUNS * own < choice.spent < (choose.RUNS + 10) * own and max(shares) == 1.0
     assert not chooser(monkeypatch, quantity, names[:5]).choose().ended
 
@@ -135,7 +135,7 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     own.whole.variants._kept.clear()
     monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
     choice = own.choose()
-    assert choice.left_out == ("a",) and choice.kept and choice.confirmed[0] == pytest.approx(0.005)
+    assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.005)
 
 
 def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
@@ -192,7 +192,7 @@ def test_what_only_rounds_does_not_move():
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
     asked = drawn("pitch-plane", 3)
     choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
-    assert choice.kept and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
+    assert choice.within_tolerance and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
 
 
 def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():

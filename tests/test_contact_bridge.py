@@ -31,6 +31,7 @@ def native(wheels: Wheels, states: np.ndarray, integrator="RK4", threads=1) -> n
         return Marcher(model(wheels, STEP, integrator), threads).run(states, STEPS)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_forces_are_those_of_the_package():
     wheels = Wheels(2, cells=11)
     (q, v), f = wheels.state(), np.zeros(8)
@@ -53,6 +54,7 @@ def test_both_engines_give_one_path(count, theory, cells):
     np.testing.assert_allclose(path, exudyn(wheels, Forces(wheels).of), rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_every_bridge_gives_one_path():
     wheels = Wheels(2, cells=11)
     start, built = np.concatenate(wheels.state())[None], model(wheels, STEP, "RK4")
@@ -117,6 +119,7 @@ def test_wheels_that_are_none(wrong):
         _ = Wheels(**wrong).numbers
 
 
+@pytest.mark.grounds("closed form")
 def test_slopes_are_those_of_the_linear_theory_where_nothing_slips():
     wheels, found = Wheels(2, "linear"), np.zeros((8, 8))
     q, v = np.zeros(8), np.zeros(8)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from models.contact.fields import fastsim_fields
 from models.contact.material import Pair
 from models.core.errors import InputError
 from models.core.tables import NEWTONS, SHARES, blocks, read_table
+from models.ensemble.store import Store
 from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, HEADER, answer
 from models.systems.contact.run import Built, contact
@@ -320,3 +322,36 @@ def test_the_quick_rows_of_the_price_pass(tmp_path):
     assert missed == {"contact_price.mz.elliptic.wide.mean", "contact_price.mz.elliptic.wide.95"}
     assert {row.status for row in rows} == {"passed", "missed"}
     assert contact_price.tables(data) == [] == contact_price.draw(data)
+
+
+class Counting:
+    """A thread pool that counts what is submitted."""
+
+    def __init__(self):
+        self.pool, self.count = ThreadPoolExecutor(2), 0
+
+    def submit(self, *work):
+        self.count += 1
+        return self.pool.submit(*work)
+
+
+def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monkeypatch, tmp_path):
+    """Blocks of 2 rows, one of them with a wrong row; what was finished before the interrupt is not computed again."""
+    monkeypatch.setattr(cases_table, "blocks", partial(blocks, rows=2))
+    path, built = tmp_path / "cases.csv", partial(Built, Pair())
+    path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
+    alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))
+    assert answer(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
+    answer(path, shared, built, Method(), executor=Counting())
+    assert shared.read_bytes() == alone.read_bytes()
+
+    def stop(rows):
+        if rows >= 4:
+            raise KeyboardInterrupt
+
+    store, again = Store(tmp_path), Counting()
+    with pytest.raises(KeyboardInterrupt):
+        answer(path, resumed, built, Method(), stop, store=store)
+    assert not resumed.exists() and store.has(1)
+    answer(path, resumed, built, Method(), executor=again, store=store)
+    assert resumed.read_bytes() == alone.read_bytes() and again.count == 3

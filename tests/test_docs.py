@@ -106,8 +106,8 @@ def test_every_scene_and_vehicle_of_the_pages_is_valid(name, text, empty_folder)
     if "bodies" in table:
         build_vehicle(table, name)
     elif "title" in table:
-        scene = of_table(table, name, empty_folder, KNOWN)
         try:
+            scene = of_table(table, name, empty_folder, KNOWN)
             plan_of(scene).check(scene, engines_of(None, scene.system)[:1])
         except InputError as refused:
             assert "no such file" in str(refused)

@@ -19,7 +19,7 @@ from models.core import whole_files
 from models.core.errors import InputError, RunFailed
 from models.core.noise import normal
 from models.engines import protocol
-from models.ensemble import store
+from models.ensemble import store, workers
 from models.ensemble.runner import Blocks, PathFailed, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.workers import cluster, processes
@@ -115,18 +115,22 @@ def test_processes_change_nothing(folder, expected):
 def test_a_dask_cluster_changes_nothing(folder, expected):
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:  # noqa: SIM117
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:  # noqa: SIM117
         with cluster(local.scheduler_address) as executor:
             assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://here"])
-def test_a_cluster_that_is_not_there_is_named(address, monkeypatch):
-    import distributed
-
-    own = distributed.Client
-    monkeypatch.setattr(distributed, "Client", lambda *args, **options: own(*args, **options | {"timeout": "0.2s"}))
-    with pytest.raises(InputError, match="no Dask scheduler answers"), cluster(address):
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("tcp://127.0.0.1:9", "no Dask scheduler answers"),
+        ("tpc://127.0.0.1:8786", "did you mean 'tcp'"),
+        ("127.0.0.1:8786", "must read SCHEME://HOST:PORT"),
+    ],
+)
+def test_a_cluster_that_is_not_there_is_named(address, said, monkeypatch):
+    monkeypatch.setattr(workers, "PATIENCE", "0.2s")
+    with pytest.raises(InputError, match=said), cluster(address):
         pass
 
 
@@ -384,8 +388,8 @@ SHORT = (
     "options.times=[0.5, 1.0]",
     "--set",
     "options.paths=60",
-    "--set",
-    "options.workers=1",
+    "--workers",
+    "1",
     "--engine",
     "reference",
 )

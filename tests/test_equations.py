@@ -41,6 +41,7 @@ def paper_matrix(p, beta):
     return np.array([p.m1, p.m2, p.m3, p.I]), stiff, damp
 
 
+@pytest.mark.grounds("written equations")
 def test_force_excitation_is_equation_37(p):
     for _ in range(50):
         y, f = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2)
@@ -53,6 +54,7 @@ def test_force_excitation_is_equation_37(p):
         assert np.abs(found[4:] - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.grounds("written equations")
 def test_road_excitation_is_equation_38(p):
     for _ in range(50):
         y, u = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1, 1, 4)
@@ -69,6 +71,7 @@ def test_road_excitation_is_equation_38(p):
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.grounds("written equations")
 def test_prescribed_pitch_is_equation_39_with_its_third_row_repaired(p):
     for _ in range(50):
         y, f = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2)
@@ -93,6 +96,7 @@ def test_prescribed_pitch_is_equation_39_with_its_third_row_repaired(p):
         assert found[7] == second
 
 
+@pytest.mark.grounds("closed form")
 def test_linear_geometry_is_the_linearisation(p):
     mass, damping, stiffness = matrices(describe(p, "linear"))
     for _ in range(20):
@@ -101,6 +105,58 @@ def test_linear_geometry_is_the_linearisation(p):
         expected = np.linalg.solve(mass, weight - stiffness @ y[:4] - damping @ y[4:])
         found = derivative_of("road", "linear")(y, np.zeros(4), p.array())[4:]
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+def level(p, y, load):
+    """Accelerations (4,) by eq. (37) with A(0): linearised about zero pitch; load : N on the wheels and the chassis, N
+    m on its pitch."""
+    mass, stiff, damp = paper_matrix(p, 0.0)
+    return (stiff @ y[:4] + damp @ y[4:] + load) / mass
+
+
+@pytest.mark.grounds("written equations")
+def test_linear_forms_with_forces_and_guides_are_the_paper_s_at_no_pitch(p):
+    for _ in range(20):
+        y, f, guide = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2), RANDOM.uniform(-0.7, 0.7, 6)
+        load = np.array([p.m1 * p.g - f[0], p.m2 * p.g - f[1], p.m3 * p.g, 0.0])
+        free = derivative_of("force", "linear")(y.copy(), f, p.array())
+        assert free == pytest.approx(np.concatenate((y[4:], level(p, y, load))), rel=1e-12)
+        pitched = y.copy()
+        pitched[[3, 7]] = guide[:2]
+        by_pitch = derivative_of("pitch", "linear")(y.copy(), np.concatenate((f, guide[:3])), p.array())
+        expected = np.concatenate((pitched[4:], level(p, pitched, load)[:3], guide[2:3]))
+        assert by_pitch == pytest.approx(expected, rel=1e-12)
+        y[[2, 3, 6, 7]] = guide[:4]
+        both = derivative_of("heave-pitch", "linear")(y.copy(), np.concatenate((f, guide)), p.array())
+        assert both == pytest.approx(np.concatenate((y[4:], level(p, y, load)[:2], guide[4:])), rel=1e-12)
+
+
+def pushing(stiffness, damping, pressed, rate):
+    """Force (N) of a tyre that never pulls: none in the air; pressed, that of spring and damper between zero and twice
+    the spring's."""
+    return (
+        0.0 if pressed <= 0.0 else float(np.clip(stiffness * pressed + damping * rate, 0.0, 2.0 * stiffness * pressed))
+    )
+
+
+@pytest.mark.grounds("written equations")
+@pytest.mark.parametrize("geometry", ["exact", "linear"])
+def test_tyres_that_only_push_are_wheel_forces_of_equation_37(p, geometry):
+    """Pressed by a few centimetres, released and in the air; damping from none to twice the spring's force."""
+    seen = set()
+    for _ in range(60):
+        y, u = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-0.02, 0.02, 4)
+        y[:2] = RANDOM.uniform(-0.02, 0.04, 2)
+        u[2:] = y[4:6] + RANDOM.uniform(-1.0, 1.0, 2)
+        tyres = ((p.k1, 300.0), (p.k2, 500.0))
+        forces = [pushing(*tyre, y[i] - u[i], y[4 + i] - u[2 + i]) for i, tyre in enumerate(tyres)]
+        seen |= {force > 0.0 for force in forces}
+        mass, stiff, damp = paper_matrix(p, y[3] if geometry == "exact" else 0.0)
+        load = np.array([p.m1 * p.g - forces[0], p.m2 * p.g - forces[1], p.m3 * p.g, 0.0])
+        expected = np.concatenate((y[4:], (stiff @ y[:4] + damp @ y[4:] + load) / mass))
+        damped = p.model_copy(update={"d1": 300.0, "d2": 500.0})
+        assert derivative_of("lift-off", geometry)(y, u, damped.array()) == pytest.approx(expected, rel=1e-11)
+    assert seen == {True, False}
 
 
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
@@ -116,6 +172,7 @@ def test_equilibrium_of_the_published_vehicle():
     assert equilibrium(itwm_drift.PARAMETERS)[:4] == pytest.approx([0.0191295, 0.0191295, 0.055917, 0.0], abs=1e-9)
 
 
+@pytest.mark.grounds("closed form")
 def test_body_fixed_forces_have_no_cosine_in_their_moment(p):
     """Without wheel mass and gravity the pitch row of body-fixed forces is b f1 - a f2 at every angle."""
     light = p.model_copy(update={"m1": 1e-9, "m2": 1e-9, "g": 0.0})

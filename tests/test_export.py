@@ -19,7 +19,7 @@ from models.engines.native_parts import divide
 from models.engines.protocol import build
 from models.engines.spatial_exudyn import SpatialExudyn
 from models.engines.spatial_mujoco import SpatialMujoco
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import build as braking
 from models.systems.handling.run import driven_by
@@ -146,8 +146,8 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
         tree, lowered = realisable(tree)
         assert lowered == [text for text in answer.left_out if "inertia" in text]
     smooth = tuple(part.element for part in divide(whole, engine).native)
-    drive = Drive(np.zeros((3, 6 * len(whole.hubs))))
-    product = hub_model(engine, replace(whole, tree=tree, elements=smooth), drive, 1e-3, 1e-3, "native")
+    hub_inputs = HubInputs(np.zeros((3, 6 * len(whole.hubs))))
+    product = hub_model(engine, replace(whole, tree=tree, elements=smooth), hub_inputs, 1e-3, 1e-3, "native")
     assert product.division.shared == ()
     assert error(answer.text, engine, lambda q, v: product.acceleration(0.0, q, v), whole.size, tmp_path) < 1e-10
 

@@ -9,7 +9,7 @@ from models.core.discretisation import WARNED, errors_of
 from models.core.errors import InputError, Refused, RunFailed
 from models.core.result import load
 from models.engines.cut_vehicle import build
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
@@ -37,8 +37,8 @@ def test_without_symmetry_the_engines_agree_too():
 
 def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
     car = r19()
-    linear, n = linearise(replace(car.whole, gravity=0.0), 20.0), car.size
-    places = {place: i for i, place in enumerate(car.whole.coordinates())}
+    linear, n = linearise(replace(car.uncut, gravity=0.0), 20.0), car.size
+    places = {place: i for i, place in enumerate(car.uncut.coordinates())}
     order = [places["body", f] for f in ("x", "y", "z", "rz", "ry", "rx")]
     order += [places[place] for place in car.tree.coordinates()[6:]]
     bare = replace(
@@ -47,7 +47,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
         loads=0 * car.loads,
         elements=tuple(replace(element, held=0.0) for element in car.elements),
     )
-    model = build("reference", bare, Drive(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
+    model = build("reference", bare, HubInputs(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
     small = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (2, n))
     found = model.acceleration(0.0, *small)
     q, v = np.zeros((2, n))
@@ -59,16 +59,18 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
 @pytest.fixture(scope="module")
 def measured():
     car, step = r19(), 2e-3
-    drive = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
-    true = truth("mujoco", car, drive, "hub", step, 1.0)
+    hub_inputs = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
+    true = truth("mujoco", car, hub_inputs, "hub", step, 1.0)
     return car, true, *recorded(true, "hub", 1)
 
 
 def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
     car, true, forces, angles = measured
     less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
-    drives = [with_angles(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
-    whole, run = (build("mujoco", car, drive, 2e-3, 1.0).run() for drive in drives)
+    hub_input_sets = [
+        with_angles(own.hub_inputs(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)
+    ]
+    whole, run = (build("mujoco", car, hub_inputs, 2e-3, 1.0).run() for hub_inputs in hub_input_sets)
     assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6
     # 0.5 %: the heading, which is free, takes a little through the product of inertia
     assert (run.moments - whole.moments)[:, 0] == pytest.approx(np.full(501, 200.0), rel=5e-3)
@@ -83,7 +85,7 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
     free, drawn = (
         build("mujoco", car, d, 2e-3, 1.0).run()
-        for d in (shifted.drive(2e-3, 500), pulled(shifted.drive(2e-3, 500), car, tilt, 2e-3, 2.0))
+        for d in (shifted.hub_inputs(2e-3, 500), pulled(shifted.hub_inputs(2e-3, 500), car, tilt, 2e-3, 2.0))
     )
     off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
     assert off[0] > 0.3 and off[1] < 0.02

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.advice.choice.systems.hub_forces import answer
+from models.advice.choice.systems.hub_forces import computed_quantities
 from models.core.errors import InputError
 from models.core.scene_effects import beside, legal, named, without
 from models.systems.hub_forces.comparison import planned_runs
@@ -88,7 +88,7 @@ def test_quantities_are_those_of_the_run_that_the_scene_holds():
     """A price and a choice see a stabiliser by what it changes; angles that nothing reads change nothing."""
     free, held = scene(), scene(stabilise={"method": "kalman"})
     paths = [
-        answer(own, "mujoco").quantities["roll"].cases[0]
+        computed_quantities(own, "mujoco").quantities["roll"].cases[0]
         for own in (free, without(free, "angle_noise"), held, without(held, "angle_noise"))
     ]
     assert np.array_equal(paths[0], paths[1])
@@ -104,10 +104,10 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
     monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate", missing)
     monkeypatch.setattr("models.systems.hub_forces.run.enforced", missing)
     measurement = measure(scene(), "mujoco")
-    assert measurement.drive("none", 1e-3, 100).guide is None
+    assert measurement.hub_inputs("none", 1e-3, 100).guide is None
     for method in ("kalman", "prescribed"):
         with pytest.raises(AssertionError, match="was made"):
-            replace(measurement).drive(method, 1e-3, 100)
+            replace(measurement).hub_inputs(method, 1e-3, 100)
 
 
 def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one():

@@ -11,7 +11,7 @@ from models.core.errors import InputError, Refused
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import ENGINES, PLAIN, HubModel
 from models.multibody import cut_kernel
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import HubForces
 from models.systems.hub_forces.plan import check, describe
 from models.systems.hub_forces.run import measure, run
@@ -31,16 +31,16 @@ def scene(**more):
 def test_held_forces_move_the_centre_of_mass_along_parabolas():
     sizes = {engine: centre_gap(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
-    real = HubForces.drive
-    with patch.object(HubForces, "drive", lambda *given: replace(real(*given), held=False)):
+    real = HubForces.hub_inputs
+    with patch.object(HubForces, "hub_inputs", lambda *given: replace(real(*given), held=False)):
         assert centre_gap(r19(), "reference", "held") > 1e-6  # the last stage of a step reads the next sample
 
 
 def test_spans_end_where_samples_change_and_the_guide_goes_on():
     hubs = np.repeat([[1.0], [1.0], [2.0], [2.0], [2.0]], 2, axis=0)[:-1]
-    drive = Drive(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), held=True)
-    assert drive.spans() == [(0, 2), (2, 4)]
-    part = drive.during(2, 4)
+    hub_inputs = HubInputs(hubs, guide=np.arange(9.0)[:, None] * np.ones(6), held=True)
+    assert hub_inputs.spans() == [(0, 2), (2, 4)]
+    part = hub_inputs.during(2, 4)
     assert part.hubs.ravel().tolist() == [2.0] * 5 and part.guide[:, 0].tolist() == [4.0, 5.0, 6.0, 7.0, 8.0]
 
 
@@ -118,12 +118,12 @@ def test_what_is_not_offered_is_refused(more, message):
 def test_an_engine_is_not_asked_for_what_it_lacks():
     forces = samples(r19())
     with pytest.raises(Refused, match="DOPRI5 is not offered: RK4 or DOP853 or Radau or LSODA"):
-        HubModel("reference", r19(), forces.drive(2e-3, 44), Settings("DOPRI5", 2e-3, 0.088))
+        HubModel("reference", r19(), forces.hub_inputs(2e-3, 44), Settings("DOPRI5", 2e-3, 0.088))
     with pytest.raises(Refused, match="held forces change within a step"):
         HubModel("mujoco", r19(), replace(shaken_rows(), held=True), settings())
 
 
-def shaken_rows() -> Drive:
+def shaken_rows() -> HubInputs:
     """Forces that change at every half step of ``settings``."""
     rows = 2 * settings().steps + 1
     rest, one = static(r19(), rows), shaken(r19(), "hub", guide=False)

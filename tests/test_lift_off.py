@@ -75,6 +75,7 @@ def test_three_implementations_agree_and_never_pull(effects, geometry):
     assert pressed.min() == 0.0 and 0.05 < (pressed == 0.0).mean() < 0.5
 
 
+@pytest.mark.grounds("closed form")
 def test_the_law_at_hand_made_states():
     """In the air, pressed, released faster than the spring follows, hit faster than it gives way."""
     p = assemble(scene()).parameters
@@ -345,7 +346,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
     from models.engines.cut_vehicle import build as hub_model
 
     car = hubs(lift_off={})
-    car = replace(car, whole=replace(car.whole, tyres=tuple(replace(t, damping=500.0) for t in car.whole.tyres)))
+    car = replace(car, uncut=replace(car.uncut, tyres=tuple(replace(t, damping=500.0) for t in car.uncut.tyres)))
     drive = two_tracks(car, *(iso8608_road("E", seed) for seed in (1, 2)), 20.0, 1e-3, 100)
     own = hub_model("mujoco", car, replace(drive, frame="inertial"), 1e-3, 0.1)
     model, data = own.model.model, own.model.data
@@ -357,7 +358,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        for i, tyre in enumerate(car.whole.tyres):
+        for i, tyre in enumerate(car.uncut.tyres):
             body, jacobian = int(model.body(str(names.index(tyre.body))).id), np.zeros((3, model.nv))
             mujoco.mj_jac(model, data, jacobian, None, data.xpos[body], body)
             height, rate = drive.hubs[0, i], drive.hubs[0, 4 + i]

@@ -48,7 +48,10 @@ def short(**more):
 
 def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
     noisy = short()
-    told = [measured.answer(own, "mujoco") for own in (noisy, without(noisy, "sensor_noise"), beside(noisy, "offsets"))]
+    told = [
+        measured.computed_quantities(own, "mujoco")
+        for own in (noisy, without(noisy, "sensor_noise"), beside(noisy, "offsets"))
+    ]
     seats = [one.quantities["left seat F"].cases[0] for one in told]
     assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
     assert len({seat.tobytes() for seat in seats}) == 3
@@ -94,7 +97,7 @@ def test_the_pitch_plane_is_told_what_has_a_price():
         "s.toml",
     )
     with pytest.raises(InputError, match=r"vehicle.parameters.* for a vehicle in space: name vehicle.file"):
-        measured.answer(scene, "mujoco")
+        measured.computed_quantities(scene, "mujoco")
 
 
 @pytest.mark.full
@@ -109,7 +112,7 @@ def test_auto_leaves_out_what_the_question_does_not_see():
         virtual={"duration": 0.18, "format": "csv", "faults": faults},
     )
     choice = Chooser(scene, "mujoco", scene.quantities, scene.tolerance).choose()
-    assert choice.left_out == ("sensor_noise",) and choice.kept
+    assert choice.left_out == ("sensor_noise",) and choice.within_tolerance
 
 
 def test_a_stabiliser_leaves_for_none_as_the_other_one_costs_more():

@@ -8,7 +8,7 @@ import pytest
 from models.core.errors import InputError, Refused
 from models.engines.cut_vehicle import build, native_share
 from models.engines.native_parts import NO_CURVE, NO_FRAME, NO_TRAVEL, AxialTravel, divide
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces import run as running
 from models.systems.hub_forces.plan import describe
 from models.systems.hub_forces.run import run
@@ -131,7 +131,7 @@ def test_a_scene_chooses_whose_springs_it_has(monkeypatch):
 def test_an_enforced_tilt_is_refused_where_forces_are_in_two_places():
     car, guide = r19(), np.zeros((3, 6))
     with pytest.raises(Refused, match="enforced tilt"):
-        build("mujoco", car, Drive(static(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
+        build("mujoco", car, HubInputs(static(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
 
 
 def test_show_tells_what_is_native_and_what_is_shared():

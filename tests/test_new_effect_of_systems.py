@@ -366,7 +366,7 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     new_file(system, NEW[system].name, NEW[system].text)
     scene = bare(system)
     runs = system_of(scene)
-    less, more = (runs.answer(one, runs.ENGINE) for one in (scene, beside(scene, NEW[system].name)))
+    less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, beside(scene, NEW[system].name)))
     assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
 
 

@@ -171,7 +171,7 @@ def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding()
     own = ReducedScene.complete(scene)
     with pytest.raises(InputError, match="finite standard deviation above zero"):
         Chooser(own, [SPEED], ["pitch acceleration"], 0.02)
-    assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().kept
+    assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().within_tolerance
 
 
 ASKING = {
@@ -219,7 +219,7 @@ def test_rounding_is_not_taken_for_white_noise():
     own = Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
-    assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.kept
+    assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.within_tolerance
 
 
 def test_options_of_copies_are_refused_where_a_vehicle_is_linear(twinrig, capsys):
@@ -240,9 +240,9 @@ def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     name = excited(linearise(scene.vehicle), scene.excitation(), SPEED).names[0]
     chooser = Chooser(scene, [SPEED], [name], 0.5)
     damping = frozenset([named(scene)["tyre damping"]])
-    assert chooser.kept(damping)
+    assert chooser.within_tolerance(damping)
     monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
-    assert not chooser.kept(damping)
+    assert not chooser.within_tolerance(damping)
 
 
 def drawn_speeds(seed):
@@ -255,7 +255,11 @@ def drawn_speeds(seed):
 def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
     chooser, choice = drawn_speeds(2)
     chosen = frozenset(choice.left_out)
-    assert chosen and choice.kept and abs(choice.off).max() > abs(choice.between).max() >= abs(choice.confirmed).max()
+    assert (
+        chosen
+        and choice.within_tolerance
+        and abs(choice.off).max() > abs(choice.between).max() >= abs(choice.confirmed).max()
+    )
     assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.off).max() / 0.02
     saving = measured_step(chooser, chosen) / measured_step(chooser, frozenset())
     assert saving == pytest.approx(choice.before.calls / choice.after.calls, rel=0.02)

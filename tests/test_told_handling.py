@@ -114,12 +114,12 @@ def test_no_error_costs_no_run(monkeypatch):
 def test_a_part_from_the_middle_goes_on_as_the_run_did():
     """The driver's knots are moved along: repeated in the same step it is the run itself."""
     drive = run(scene(steer=[[0.05, 0.0], [0.4, 0.05]], brake=[[0.1, 0.0], [0.3, 900.0]]), "mujoco").detail
-    again = module.Again("mujoco", drive, 20.0)
-    half = again(0.5, 0.2)
+    rerun = module.ManoeuvreRerun("mujoco", drive, 20.0)
+    half = rerun(0.5, 0.2)
     rows = np.searchsorted(drive.run.times, half.times[::2] - 1e-9)
     assert np.abs(half.channels["fy"][::2] - drive["fy"][rows]).max() < 1e-3  # N: the error of the steps
     with pytest.raises(RunFailed, match="longer steps are left out"):
-        again(4.0, 0.4)
+        rerun(4.0, 0.4)
 
 
 @pytest.mark.full

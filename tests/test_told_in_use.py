@@ -2,7 +2,6 @@
 
 import csv
 import json
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -66,9 +65,9 @@ def pressing():
 
 def test_a_sweep_tells_in_table_columns_json_and_code(tmp_path, monkeypatch, capsys):
     (tmp_path / "s.toml").write_text(SCENE)
-    monkeypatch.setattr(sweep, "processes", lambda workers: nullcontext())  # computes here
     monkeypatch.setattr(sweep, "draw", lambda swept, folder: [])
     asked = [str(tmp_path / "s.toml"), "--engine", "reference", "--sweep", "effects.road.speed=5,20", "--strict"]
+    asked += ["--workers", "1"]
     with pytest.raises(SystemExit) as ended:
         app(["run", *asked, "--out", str(tmp_path / "a")], standalone_mode=False)
     out = capsys.readouterr().out

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.tyre.magic_formula import PACEJKA, SURFACES, by_similarity, surface
+from models.tyre.magic_formula import PACEJKA, SURFACES, Burckhardt, Curve, by_similarity, factors, graded, surface
+from models.tyre.tyre_source import named
 from models.tyre.tyre_table import Cells, TyreTable, across, along, place, stacked
 
 
@@ -34,6 +35,7 @@ def at(tables, number, angle, load, slip):
     return (1 - w) * mu[0] + w * mu[1], across(number, cells, k, w, tables.g, tables.h)
 
 
+@pytest.mark.grounds("closed form")
 def test_exact_at_nodes_linear_between_constant_beyond():
     table = small()
     tables = stacked([table])
@@ -72,6 +74,48 @@ def test_slopes_are_those_of_the_cell():
         assert (inner[1] - inner[0]) / 0.8 == pytest.approx(ends[1] - ends[0], rel=1e-12)
 
 
+@pytest.mark.grounds("closed form")
+def test_both_formulas_as_their_books_write_them():
+    """Pacejka's with the bracket (1 - E) B k + E atan(B k), Burckhardt's with the exponential written out."""
+    k = np.array([0.0, 0.01, 0.07, 0.3, 0.9, 1.7])
+    D, B, C, E = 0.935, 8.86, 1.19, -1.21
+    bracket = (1.0 - E) * B * k + E * np.arctan(B * k)
+    assert Curve(D, B, C, E)(k) == pytest.approx(D * np.sin(C * np.arctan(bracket)), rel=1e-13)
+    least = np.array([0.0, 0.01, 0.07, 0.3, 0.9, 1.0])
+    wanted = 0.857 * (1.0 - np.exp(-33.822 * least)) - 0.347 * least
+    assert Burckhardt(0.857, 33.822, 0.347)(k) == pytest.approx(wanted, rel=1e-13)
+
+
+@pytest.mark.grounds("closed form")
+def test_nodes_grow_as_a_geometric_series():
+    nodes = graded(2.0, 0.05, 31)
+    assert nodes + 0.05 == pytest.approx(0.05 * 41.0 ** (np.arange(31) / 30.0), rel=1e-13)
+
+
+@pytest.mark.grounds("closed form")
+def test_friction_across_as_a_product_by_least_squares():
+    """g is the slope of the best line through the origin, over the loads, of mu_y by h; h is mu_y without slip."""
+    mu = np.random.default_rng(4).uniform(0.1, 1.0, (3, 4, 5))
+    g, h = factors(mu)
+    assert np.array_equal(h, mu[:, :, 0]) and np.array_equal(g[0], g[1])
+    for a in (1, 2):
+        best = [np.linalg.lstsq(mu[a, :, :1], mu[a, :, k], rcond=None)[0][0] for k in range(5)]
+        assert g[a] == pytest.approx(best, rel=1e-12)
+
+
+@pytest.mark.grounds("closed form")
+def test_towards_no_angle_a_table_has_the_slope_of_its_formula():
+    """Across the wheel friction begins with the slope B C D; with a slip k it is mu(k) / k by it, to the angle's first
+    order."""
+    for name in ("dry", "ice/rear"):
+        across, table = PACEJKA[name][1], surface(name)
+        steepest = across.B * across.C * across.D
+        assert table.cornering == pytest.approx(steepest, rel=2e-3)  # a secant over the first cell of angles
+        assert table.g[0, 1:] == pytest.approx(across(table.slips[1:]) / table.slips[1:] / steepest, rel=1e-6)
+        along = PACEJKA[name][0](table.slips)
+        assert table.mu_x[0, 0] == pytest.approx(along, rel=1e-12)
+
+
 def between(table, exact):
     """Largest distance (x, y) of a table from its curves between nodes, and its largest resultant."""
     angles = np.concatenate((np.linspace(0, 0.25, 181), np.linspace(0.26, np.pi / 2, 90)))
@@ -84,6 +128,7 @@ def between(table, exact):
 
 
 @pytest.mark.parametrize("name", PACEJKA)
+@pytest.mark.grounds("closed form")
 def test_magic_formulas_are_met_between_nodes_and_never_above_their_peak(name):
     table, curves = surface(name), PACEJKA[name]
     off_x, off_y, most = between(table, curves)
@@ -92,6 +137,7 @@ def test_magic_formulas_are_met_between_nodes_and_never_above_their_peak(name):
     assert table.mu_x.max() == pytest.approx(curves[0].D, abs=1e-4)
 
 
+@pytest.mark.grounds("closed form")
 def test_one_curve_for_both_directions_is_not_above_its_peak():
     table = surface("dry asphalt")
     # nodes are capped at the peak; between them g times h bulges by 4e-6 of it
@@ -100,6 +146,7 @@ def test_one_curve_for_both_directions_is_not_above_its_peak():
     assert x == pytest.approx(1.2801 * (1 - np.exp(-23.99 * 0.17)) - 0.52 * 0.17, abs=1e-4)
 
 
+@pytest.mark.grounds("closed form")
 def test_friction_falls_with_the_load_as_asked():
     table = surface("dry", load=2e4, fall=0.1)
     slips, angles = np.array([0.12]), np.array([0.1])
@@ -110,7 +157,12 @@ def test_friction_falls_with_the_load_as_asked():
     assert (half[0][0, 0], half[1][0, 0]) == pytest.approx((x[2] / 2, y[2] / 2), rel=1e-12)
 
 
+@pytest.mark.grounds("closed form")
 def test_front_and_rear_differ():
+    assert named("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
+    assert named("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and named("ice").h.max() == pytest.approx(
+        0.162, abs=1e-4
+    )
     assert surface("dry").h.max() == pytest.approx(0.935, abs=1e-4)
     assert surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
 

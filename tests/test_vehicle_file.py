@@ -81,10 +81,10 @@ def test_the_example_means_what_it_says():
     # pitch is positive nose down: a point ahead sinks; the digressive damper's slope at rest is (4000 + 2500) / 2
     front, rear = np.array([1, -1.2, -1, 0]), np.array([1, 1.4, 0, -1])
     np.testing.assert_allclose(linear.damping, 3250 * np.outer(front, front) + 1500 * np.outer(rear, rear))
-    np.testing.assert_allclose(linear.outputs[0].acceleration, [1, -0.2, 0, 0])
-    np.testing.assert_allclose(linear.outputs[1].displacement, -front)  # positive in compression
-    np.testing.assert_allclose(linear.outputs[2].displacement, [0, 0, -190e3, 0])
-    np.testing.assert_allclose(linear.outputs[2].road, [190e3, 0])
+    np.testing.assert_allclose(linear.outputs[0].acceleration_factors, [1, -0.2, 0, 0])
+    np.testing.assert_allclose(linear.outputs[1].displacement_factors, -front)  # positive in compression
+    np.testing.assert_allclose(linear.outputs[2].displacement_factors, [0, 0, -190e3, 0])
+    np.testing.assert_allclose(linear.outputs[2].road_factors, [190e3, 0])
 
 
 def test_every_table_is_built():
@@ -133,11 +133,12 @@ def test_shipped_vehicles():
         "r19_caravan",
         "r19_free",
         "r19_ride",
+        "race_car",
         "seven_freedoms",
         "three_axle_truck",
     )
     sizes = [len(load_vehicle(name, towing=True).coordinates()) for name in shipped()]
-    assert sizes == [4, 2, 2, 24, 19, 19, 7, 13]
+    assert sizes == [4, 2, 2, 24, 19, 19, 14, 7, 13]
 
 
 def test_a_file_of_ones_own(tmp_path):

@@ -34,6 +34,7 @@ def turn(roll, yaw):
 
 
 @pytest.mark.parametrize("side", [RIGHT, LEFT])
+@pytest.mark.grounds("closed form")
 def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side):
     y, z, roll, yaw = POSE
     radius, half_gauge, conicity, head = CONE
@@ -70,6 +71,7 @@ def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     assert CHOSEN.coned(0.2).equivalent_conicity == pytest.approx(0.2, rel=1e-9)
 
 
+@pytest.mark.grounds("closed form")
 def test_klingels_wave():
     # Spin creepage and its lateral force leave 1e-5 of it.
     assert kinematic_wavelength(CHOSEN) == pytest.approx(klingel(CHOSEN), rel=3e-5)
@@ -121,6 +123,7 @@ def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
+@pytest.mark.grounds("closed form")
 def test_energy_is_what_the_forces_do(law):
     """d(T + U)/dt by the energies' own expressions against the power of the contacts, at a lively state."""
     w = CHOSEN.changed(damping_x=0.0, damping_y=0.0, damping_z=0.0, flange_clearance=0.02)

@@ -58,6 +58,12 @@ def test_a_car_on_tyres_moves_as_in_mujoco(name):
     assert rolling_path_gap(car, "mujoco", 0.01) < PATH
 
 
+@pytest.mark.grounds("plain counterpart")
+def test_a_car_on_tyres_accelerates_as_in_exudyn():
+    """Whose compiled forces lie in one block of numbers."""
+    assert rolling_gap(rolling_cars()["twin"], "exudyn", 3) < INSTANT
+
+
 def test_bristles_are_those_of_the_kernel():
     assert bristles_gap(20) < INSTANT
 

@@ -8,7 +8,6 @@ and beyond.
 import csv
 import json
 import math
-import os
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -27,7 +26,7 @@ from models.core.result import provenance
 from models.core.whole_files import whole_file, write_whole
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.store import Arrays, code, locked
-from models.ensemble.workers import processes
+from models.ensemble.workers import Crew
 from validation.cases import CASES
 from validation.common.changes import against, lines
 from validation.common.rows import STATUSES, Row, Saved, failed, rested
@@ -52,10 +51,6 @@ ALONE = {
 """Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
 of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
 that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
-WORKERS = 2
-"""Processes that measure the other cases."""
-
-
 KEPT = "cases"
 """Folder of finished cases."""
 
@@ -107,7 +102,7 @@ def _array(records: list[Saved]) -> Arrays:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
-def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
+def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
     """Rows and seconds of all cases; those that an earlier go has finished are taken from there.
 
     alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
@@ -132,14 +127,22 @@ def _broken(name: str, reason: str) -> Row:
     return failed(f"{name}.broken", f"case {name}", reason)
 
 
-def validate(folder: Path, quick: bool, command: str, earlier: Saved | None = None, resumed: bool = False) -> int:
-    """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report.
+def validate(
+    folder: Path,
+    quick: bool,
+    command: str,
+    earlier: Saved | None = None,
+    resumed: bool = False,
+    crew: Crew | None = None,
+) -> int:
+    """Measure all cases into ``folder``; returns the number of failed rows.
 
-    resumed : the folder may hold cases that have ended; the time of them all together is then not known.
+    crew : measures the cases that need not be alone; its workers see the folder, too. earlier : ``changes.read`` of a
+    report. resumed : the folder may hold cases that have ended; the time of them all together is then not known.
     """
     start, begun = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
-    with locked(folder), processes(min(WORKERS, os.cpu_count() or 1)) as pool:
+    with locked(folder), (crew or Crew.given()).at_work(len(CASES), folder) as pool:
         outcomes = _outcomes(pool, quick, folder)
         rows = [row for name in CASES for row in outcomes[name][0]]
         seconds = {name: outcomes[name][1] for name in CASES}
@@ -164,7 +167,7 @@ def _data() -> str:
     return f"{len(sizes)} measured files of {sum(sizes) / 1e6:.3g} MB, in the folder that TWINRIG_DATA names"
 
 
-def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
+def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
     """Rows and seconds of every case: first of those that may share the machine, then of the others."""
     from rich.console import Console
     from rich.progress import Progress
@@ -173,9 +176,10 @@ def _outcomes(pool: Executor, quick: bool, folder: Path) -> Outcomes:
     together = tuple(sorted((name for name in CASES if name not in alone), key=_lasting, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
-        first = measured(Cases(together, quick, folder), pool, lambda done: bar.update(task, completed=done))
+        here = folder.resolve()
+        first = measured(Cases(together, quick, here), pool, lambda done: bar.update(task, completed=done))
         return first | measured(
-            Cases(alone, quick, folder), pool, lambda done: bar.update(task, completed=len(together) + done), alone=True
+            Cases(alone, quick, here), pool, lambda done: bar.update(task, completed=len(together) + done), alone=True
         )
 
 
@@ -184,21 +188,25 @@ def _lasting(name: str) -> float:
     return float(full()[name]["seconds"]) if name in full() else math.inf
 
 
-def _in(pool: Executor, function: Callable[..., Any], *arguments: Any) -> Any:
+def _in(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
     """Value of a function that a prepared process of the pool runs; this process runs it once a process of the pool
     died."""
+    if pool is None:
+        return function(*arguments)
     try:
         return pool.submit(function, *arguments).result()
     except BrokenProcessPool:
         return function(*arguments)
 
 
-def _written(pool: Executor, folder: Path) -> Path:
+def _written(pool: Executor | None, folder: Path) -> Path:
     """The report, its figures drawn by the pool; by this process, once one of the pool's died."""
     from validation.report.page import write
 
+    if pool is None:
+        return write(folder)
     try:
-        return write(folder, pool.map)
+        return write(folder.resolve(), pool.map)
     except BrokenProcessPool:
         return write(folder)
 

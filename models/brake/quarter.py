@@ -24,11 +24,11 @@ REGULAR = 0.1
 
 
 class QuarterPath(NamedTuple):
-    """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), place (m), speed (m/s), turning of
+    """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), position (m), speed (m/s), turning of
     the wheel (rad/s), and the time (s) within the step for which the wheel was locked."""
 
     time: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     speed: np.ndarray
     turning: np.ndarray
     locked: np.ndarray
@@ -83,7 +83,7 @@ class QuarterStop:
     @property
     def distance(self) -> float:
         """Way (m) from the start to the end of the path."""
-        return float(self.path.place[-1] - self.path.place[0])
+        return float(self.path.position[-1] - self.path.position[0])
 
     @property
     def released(self) -> float:
@@ -110,7 +110,7 @@ def march(motion, torques, step, vehicle, path):
             return -2
         if used < step and rest < 0:
             rest = n + 1
-        path.time[n + 1], path.place[n + 1] = path.time[n] + step, motion.state[0, 0]
+        path.time[n + 1], path.position[n + 1] = path.time[n] + step, motion.state[0, 0]
         path.speed[n + 1], path.turning[n + 1] = motion.state[1, 0], motion.turning[0]
         path.locked[n + 1] = report_of(motion.report).locked[0] if used == step else 0.0
     return rest

@@ -96,7 +96,7 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def some_samples(commands, record, sample, braking, motion, time, *others):
+def some_samples(commands, record, sample, braking, motion, simulated_time, *others):
     """Move a vehicle that is at a time (s) on by as many samples as it is told for, less only where it does not move
     any further, by ``go``, which is ``advance`` or stands in for it. How the last sample ended, and the time (s)."""
     air, chambers, brakes, torques = braking
@@ -107,15 +107,15 @@ def some_samples(commands, record, sample, braking, motion, time, *others):
         else:
             by_pressures(commands.pressures, air, brakes, torques)
         status, used = go(motion, torques, step, commands.steer, *others)
-        time += used
+        simulated_time += used
         if status not in (FINE, AT_REST):
             break
-        record.now[0] = time
+        record.now[0] = simulated_time
         moved_to(record.now, record.rows[record.left[0]])
         record.left[0] += 1
-        if status == AT_REST or time >= record.until:
+        if status == AT_REST or simulated_time >= record.until:
             break
-    return status, time
+    return status, simulated_time
 
 
 some: Callable[..., Any] = some_samples
@@ -128,10 +128,10 @@ def samples(commands, record, sample, braking, motion, *others):
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
     (m/s) and the supply (bar).
     """
-    status, time = FINE, 0.0
+    status, simulated_time = FINE, 0.0
     while True:
-        yield status, time, math.hypot(motion.state[1, 0], motion.state[1, 1]), braking.air.supply[0]
-        status, time = some(commands, record, sample, braking, motion, time, *others)
+        yield status, simulated_time, math.hypot(motion.state[1, 0], motion.state[1, 1]), braking.air.supply[0]
+        status, simulated_time = some(commands, record, sample, braking, motion, simulated_time, *others)
 
 
 def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:

@@ -60,6 +60,9 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
         left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])
     ):
         raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
+    if vehicle.joint_elements:
+        said = "acts along coordinates: a braked vehicle on its suspension has springs between points alone"
+        raise InputError(vehicle.name, vehicle.joint_elements[0].name, None, said)
     centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0))
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:

@@ -30,14 +30,14 @@ class Patch:
     """One valley of a distance.
 
     cut : which sides (low x, high x, low y, high y) touch another valley. lean : angle (rad) between the patch's normal
-    and the direction in which the bodies approach, which is that of the load. place : where its y = 0 lies along the
-    contour (m), to tell how far patches are apart.
+    and the direction in which the bodies approach, which is that of the load. contour_position : where its
+    y = 0 lies along the contour (m), to tell how far patches are apart.
     """
 
     distance: Distance
     cut: tuple[bool, bool, bool, bool] = (False, False, False, False)
     lean: float = 0.0
-    place: float = 0.0
+    contour_position: float = 0.0
 
     @cached_property
     def bottom(self) -> tuple[float, float, float]:

@@ -68,7 +68,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     """Net of a patch at a depth (m)."""
     x, y, low = patch.bottom
     nothing = np.zeros((1, 1))
-    empty = Net(nothing + x, nothing + y + patch.place, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
+    empty = Net(nothing + x, nothing + y + patch.contour_position, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
     if depth <= low:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
@@ -78,7 +78,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
         return empty
     dx, dy = mesh_of(box, cells)
     middles = np.arange(cells) + 0.5
-    y, x = np.meshgrid(box[2] + middles * dy + patch.place, box[0] + middles * dx, indexing="ij")
+    y, x = np.meshgrid(box[2] + middles * dy + patch.contour_position, box[0] + middles * dx, indexing="ij")
     return Net(x, y, height, pressure, cover, (dx, dy), volume)
 
 

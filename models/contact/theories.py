@@ -147,7 +147,7 @@ class OnPatches(Contact):
     def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
         """Fields with y along the contour of the rail, so that several patches lie beside one another."""
         pairs = zip(fields, self.pressed.patches, strict=True)
-        return tuple(replace(cells, y=cells.y + part.patch.place) for cells, part in pairs)
+        return tuple(replace(cells, y=cells.y + part.patch.contour_position) for cells, part in pairs)
 
 
 class Simplified(OnPatches):

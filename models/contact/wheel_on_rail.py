@@ -102,7 +102,7 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class WheelAndRail:
     """One wheel on one rail. rail : as it lies in the track, y from the middle of the track."""
 
     wheel: Profile
@@ -169,7 +169,7 @@ def wheel_on_rail(
     track, wheelset = track or Track(), wheelset or Wheelset()
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-    side = Side(wheel, laid(rail, track), wheelset)
+    side = WheelAndRail(wheel, laid(rail, track), wheelset)
     touches = touches_of(side, placed(side, lateral_shift, yaw))
     if not touches:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
@@ -193,7 +193,7 @@ def laid(rail: Profile, track: Track) -> Profile:
     return Profile(y - face + track.gauge / 2.0, z, inclined.smoothing)
 
 
-def lowest_point(side: Side, pose: Pose) -> Array:
+def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
     """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
     points, gap = side.gaps(pose)
     k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
@@ -207,7 +207,7 @@ def _share(gap: Array, k: int) -> float:
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
-def placed(side: Side, shift: float, yaw: float, left: Side | None = None) -> Pose:
+def placed(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
     """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
     other = left or side
 
@@ -220,7 +220,7 @@ def placed(side: Side, shift: float, yaw: float, left: Side | None = None) -> Po
     return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
 
 
-def touches_of(side: Side, pose: Pose) -> list[Touch]:
+def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
     """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
     points, gap = side.gaps(pose)
     touches = []
@@ -231,7 +231,7 @@ def touches_of(side: Side, pose: Pose) -> list[Touch]:
     return sorted(touches, key=lambda touch: touch.gap)
 
 
-def _touch(side: Side, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
+def _touch(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
     """One touching place, where the parabola through three gaps is least, and the distance around it."""
     first, k, last = at
     share = _share(gap, k)
@@ -253,7 +253,7 @@ def _touch(side: Side, pose: Pose, points: Array, gap: Array, at: tuple[int, int
     return Touch(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
 
 
-def distance_over(side: Side, pose: Pose, place: Array, angle: float, ends: tuple[float, float]) -> Distance:
+def distance_over(side: WheelAndRail, pose: Pose, place: Array, angle: float, ends: tuple[float, float]) -> Distance:
     """Distance over the plane that touches the rail at a place, between two ends along the rail's contour.
 
     place : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
@@ -275,7 +275,7 @@ def _rail_heights(rail: Profile, place: Array, angle: float) -> tuple[Array, Arr
     return s[keep], n[keep]
 
 
-def _wheel_heights(side: Side, pose: Pose, place: Array, angle: float, x: Array, s: Array) -> Array:
+def _wheel_heights(side: WheelAndRail, pose: Pose, place: Array, angle: float, x: Array, s: Array) -> Array:
     """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
     ahead, along, into = np.array(
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]

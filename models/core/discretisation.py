@@ -124,7 +124,7 @@ class Series(NamedTuple):
     units: Mapping[str, str] = MappingProxyType({})
 
 
-Again = Callable[[float, float], Series]
+Rerun = Callable[[float, float], Series]
 """The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer;
 raises InputError or RunFailed where that cannot be."""
 
@@ -132,7 +132,7 @@ raises InputError or RunFailed where that cannot be."""
 def estimated(
     run: Result,
     fine: Series,
-    again: Again,
+    rerun: Rerun,
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
@@ -144,7 +144,7 @@ def estimated(
     what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
     that is not its own deviation. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    told, how = by_steps(fine, again, order, step, growth, sizes)
+    told, how = by_steps(fine, rerun, order, step, growth, sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     known |= fine.units
     return stated(run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in told.items()}, how)
@@ -152,7 +152,7 @@ def estimated(
 
 def by_steps(
     fine: Series,
-    again: Again,
+    rerun: Rerun,
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
@@ -164,19 +164,19 @@ def by_steps(
     be, half of it over a part tells. growth, sizes : as in ``estimated``.
     """
     try:
-        told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
+        told, how = _by_longer_steps(fine, rerun, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, again, order, step, growth or {}), "a part in half the step"
+        told, how = _by_half_steps(fine, rerun, order, step, growth or {}), "a part in half the step"
     for name, size in (sizes or {}).items():
         told[name] = rescaled(told[name], size, step)
     return told, how
 
 
-def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
-    coarse = again(2.0, 1.0)
+def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
+    coarse = rerun(2.0, 1.0)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
-        coarser = again(4.0, WINDOW).channels
+        coarser = rerun(4.0, WINDOW).channels
     rows = rows_at(fine.times, coarse.times)
     return {
         name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
@@ -185,10 +185,10 @@ def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> d
 
 
 def _by_half_steps(
-    fine: Series, again: Again, order: float, step: float, growth: Mapping[str, float]
+    fine: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
     """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
-    finer = again(0.5, FINE_WINDOW)
+    finer = rerun(0.5, FINE_WINDOW)
     slack = 1e-9 * finer.times[-1]
     part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
     rows = rows_at(finer.times, fine.times[part])

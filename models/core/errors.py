@@ -9,6 +9,8 @@ if TYPE_CHECKING:  # the command line imports this file before it knows whether 
 
 LONGEST = 80
 """Characters of an offending value that a message shows."""
+MOST_NAMES = 40
+"""Accepted names that a message lists; of more it lists those most like the user's."""
 
 
 class InputError(ValueError):
@@ -46,7 +48,13 @@ def _shown(value: Any) -> str:
 
 def nearest(name: object, choices: tuple[str, ...]) -> str:
     """Phrase that lists the accepted names and offers the one most like ``name``."""
-    return f" (allowed: {', '.join(sorted(choices))}){suggestion(name, choices)}" if choices else ""
+    if not choices:
+        return ""
+    listed, more = sorted(choices), ""
+    if len(choices) > MOST_NAMES:
+        listed = get_close_matches(str(name), choices, n=5, cutoff=0.3) or listed[:5]
+        more = f", and {len(choices) - len(listed)} others"
+    return f" (allowed: {', '.join(listed)}{more}){suggestion(name, choices)}"
 
 
 def suggestion(name: object, choices: tuple[str, ...]) -> str:

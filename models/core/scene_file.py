@@ -25,6 +25,12 @@ class SceneFile(Strict):
     quantities: list[str] = Field(default_factory=list, description="what a choice of effects must hold")
     tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
     error: bool = Field(default=True, exclude=True, description="whether the error of steps or cells is estimated")
+    workers: int | None = Field(
+        default=None, ge=1, le=256, exclude=True, description="processes for what repeats; no result depends on it"
+    )
+    cluster: str | None = Field(
+        default=None, exclude=True, description="address of a Dask scheduler whose workers compute in their place"
+    )
     file: str = Field(default="", exclude=True)
     folder: str = Field(default=".", exclude=True)
 

@@ -103,7 +103,7 @@ def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: fl
     return float(np.sqrt(rigid_pitch(p).growth(fast(pitch_rate, period, cutoff)).mean()))
 
 
-def growth_until(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
+def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
     """lambda (n,) in 1/s that stands in the sinh law at each time, for a motion that is not the same all along.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the

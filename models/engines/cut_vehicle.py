@@ -29,7 +29,7 @@ from models.multibody.cut_kernel import (
     report,
     set_joint_forces,
 )
-from models.multibody.cut_table import Drive, table
+from models.multibody.cut_table import HubInputs, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
@@ -52,7 +52,7 @@ class HubRun(Trajectory):
     """A run, the chassis' six coordinates first, and its forces.
 
     elements (m, e): forces of springs, mounts and bars in the chassis' axes, compression positive, N or N m
-    wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the drive's frame
+    wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the frame of the hub inputs
     moments (m, 2): of the stabiliser on roll and pitch, N m
     """
 
@@ -95,7 +95,7 @@ class HubModel:
     """
 
     def __init__(
-        self, engine: str, vehicle: CutVehicle, drive: Drive, settings: Settings, forces: Route = "compiled"
+        self, engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, settings: Settings, forces: Route = "compiled"
     ) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step.
 
@@ -104,22 +104,22 @@ class HubModel:
         equations of the reference are the same either way. An enforced tilt needs them "compiled".
         """
         check_divides(engine, settings)
-        self.engine, self.vehicle, self.drive, self.settings = engine, vehicle, drive, settings
+        self.engine, self.vehicle, self.hub_inputs, self.settings = engine, vehicle, hub_inputs, settings
         step, self.step, self.steps, self.size = settings.step, settings.step, settings.steps, vehicle.size
         self.adaptive = settings.integrator != FIXED
-        _check(engine, vehicle, drive, 2 * self.steps + 1)
+        _check(engine, vehicle, hub_inputs, 2 * self.steps + 1)
         _check_settings(engine, vehicle, settings)
-        self.numbers = table(vehicle, drive, step)
+        self.numbers = table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.plain = _plain(vehicle, drive, step, self.adaptive) if engine == PLAIN else None
+        self.plain = _plain(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN else None
         division, numbers = Division((), vehicle.elements), self.numbers
         if forces == "native" and engine not in (PLAIN, "reference"):
-            if drive.guide is not None and drive.pull is None:
+            if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
             division = divide(vehicle.tree, vehicle.elements, engine)
-            numbers = table(replace(vehicle, elements=division.shared), drive, step)
+            numbers = table(replace(vehicle, elements=division.shared), hub_inputs, step)
         self.division = division
-        if drive.held or self.adaptive:
+        if hub_inputs.held or self.adaptive:
             numbers = numbers.copy()  # forces are reported by the whole table, read at its rows
         self.model = self._in_engine(
             Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
@@ -138,11 +138,11 @@ class HubModel:
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
         """From coordinates and rates (n,), unguarded; RunFailed where it stops."""
-        if not self.drive.held:
+        if not self.hub_inputs.held:
             return self._march(q, v, self.steps)
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
         states[0] = np.concatenate((q, v))
-        for first, last in self.drive.spans():
+        for first, last in self.hub_inputs.spans():
             self._hold(first, last)
             try:
                 path = self._march(states[first, : self.size], states[first, self.size :], last - first)
@@ -167,11 +167,11 @@ class HubModel:
 
     def _hold(self, first: int, last: int) -> None:
         """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
-        drive = self.drive.during(first, last)
+        hub_inputs = self.hub_inputs.during(first, last)
         if self.plain:
-            self.plain.drive = drive
+            self.plain.hub_inputs = hub_inputs
         else:
-            rows = drive.rows
+            rows = hub_inputs.rows
             parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
@@ -214,17 +214,17 @@ def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states
 
 
 def build(
-    engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Route = "compiled"
+    engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, step: float, duration: float, forces: Route = "compiled"
 ) -> HubModel:
     """A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco" for steps (s) of Runge-Kutta 4 over a duration
     (s), as ``HubModel``; raises Refused."""
-    return HubModel(engine, vehicle, drive, Settings(FIXED, step, duration), forces)
+    return HubModel(engine, vehicle, hub_inputs, Settings(FIXED, step, duration), forces)
 
 
-def _plain(vehicle: CutVehicle, drive: Drive, step: float, any_time: bool) -> "PlainHubs":
+def _plain(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bool) -> "PlainHubs":
     from models.multibody.plain.hubs import PlainHubs
 
-    return PlainHubs(vehicle, drive, step, any_time)
+    return PlainHubs(vehicle, hub_inputs, step, any_time)
 
 
 @dataclass(frozen=True)
@@ -248,16 +248,18 @@ def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
     """Refused where a mode of the vehicle on its tyres, which are stiffer than none, would grow at a step (s)."""
-    check_modes(engine, linearise(replace(vehicle.whole, side_forces=())), Settings("RK4", step, duration))
+    check_modes(engine, linearise(replace(vehicle.uncut, side_forces=())), Settings("RK4", step, duration))
 
 
-def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
-    width = (2 if drive.road else WRENCH) * len(vehicle.hubs)
-    if drive.hubs.shape != (rows, width) or not np.isfinite(drive.hubs).all():
+def _check(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -> None:
+    width = (2 if hub_inputs.road else WRENCH) * len(vehicle.hubs)
+    if hub_inputs.hubs.shape != (rows, width) or not np.isfinite(hub_inputs.hubs).all():
         raise Refused(engine, f"inputs must be {rows} rows (half steps) of {width} finite numbers")
-    if drive.guide is not None and (drive.guide.shape != (rows, 6) or not np.isfinite(drive.guide).all()):
+    if hub_inputs.guide is not None and (
+        hub_inputs.guide.shape != (rows, 6) or not np.isfinite(hub_inputs.guide).all()
+    ):
         raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
-    if drive.held and not np.array_equal(drive.hubs[1::2], drive.hubs[:-1:2]):
+    if hub_inputs.held and not np.array_equal(hub_inputs.hubs[1::2], hub_inputs.hubs[:-1:2]):
         raise Refused(engine, "held forces change within a step: it must divide the period of their samples")
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.native_parts import GroundSpring, NativePart
+from models.engines.native_parts import GroundSpring, NativePart, joint_parts
 from models.engines.protocol import guard, timed
 from models.vehicles.spatial import SpatialVehicle
 
@@ -152,17 +152,18 @@ def native_share(
     """Native joints and springs of each engine for a vehicle whose springs keep to the heading of its carrier, and why
     no more: heads and texts of a plan. They are counted in built models.
 
-    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it.
-    native : parts of each engine, of springs that keep to other bodies.
+    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it. What
+    acts along coordinates is native. native : further parts of each engine, of springs that keep to other bodies.
     """
-    count, bars, lines = len(vehicle.springs), len(vehicle.bars), []
+    along, bars, lines = joint_parts(vehicle), len(vehicle.bars), []
+    count = len(vehicle.springs) + len(along)
     for engine in ENGINES:
-        driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None, (native or {}).get(engine, ()))
-        names, built_joints = built_share(engine, driven)
-        said = f"{built_joints} joints, {len(names)} of {count} springs and {bars} bars"
-        lines.append(("native", f"{engine}: bodies and {said}"))
+        parts = (*along, *(native or {}).get(engine, ()))
+        names, joints = built_share(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
+        told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
+        lines.append(("native", told))
     why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
-    return (*lines, ("shared", f"springs, mounts and bars: {why}"))
+    return (*lines, *([("shared", f"springs, mounts and bars: {why}")] if vehicle.springs or bars else []))
 
 
 def _module(engine: str) -> Any:

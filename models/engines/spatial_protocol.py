@@ -79,12 +79,19 @@ def build(
 
 
 def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
-    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, and axes that turn with a body."""
+    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, axes that turn with a body,
+    and springs along coordinates."""
     if vehicle.limits:
         raise Refused(
             engine,
             "a reduced vehicle has bodies without mass, rigid springs or locked freedoms, which only "
             "the closed form of the reference has: use --engine reference, or the whole vehicle",
+        )
+    if vehicle.joint_elements:
+        raise Refused(
+            engine,
+            f"{vehicle.joint_elements[0].name} acts along coordinates: in ride the engines know springs between points "
+            "along axes that are fixed in the space; use --engine reference, whose closed form has the others",
         )
     for spring in (spring for spring in vehicle.springs if spring.frame is not None):
         raise Refused(

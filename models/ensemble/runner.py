@@ -1,20 +1,22 @@
-"""Many paths on any executor: progress, finished blocks kept, resumed with the same bits.
+"""Blocks of work on any executor: progress, finished blocks kept, resumed with the same bits.
 
-A job is called with a range of path numbers and gives named arrays whose first axis is these paths. It must
-depend on the numbers alone, so that the result does not depend on who computes which block, or when. The paths are
-cut into blocks of fixed size; each finished block is saved whole, and all of them are put together in the order of
-their numbers.
+A job is called with a block and gives named arrays. It must depend on the block alone, so that the result does not
+depend on who computes which block, or when. ``each_block`` gives the arrays of all blocks in their order, and holds no
+more of them than are under way. ``run_paths`` cuts numbered paths into blocks of fixed size and puts the arrays, whose
+first axis is the paths, together.
 """
 
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -32,6 +34,10 @@ LIVES = 3
 """Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
 
 
+T = TypeVar("T")
+"""A block of work."""
+
+
 class Blocks(NamedTuple):
     """How an ensemble's paths are cut into blocks: ``size`` paths per block, of which at most ``ahead`` are under way
     at once."""
@@ -39,9 +45,13 @@ class Blocks(NamedTuple):
     size: int = BLOCK
     ahead: int = AHEAD
 
-    def cut(self, paths: int) -> list[range]:
-        """Path numbers of each block."""
-        return [range(first, min(first + self.size, paths)) for first in range(0, paths, self.size)]
+    def count(self, paths: int) -> int:
+        """Number of blocks."""
+        return -(-paths // self.size)
+
+    def block(self, number: int, paths: int) -> range:
+        """Path numbers of a block."""
+        return range(number * self.size, min((number + 1) * self.size, paths))
 
 
 BLOCKS = Blocks()
@@ -91,6 +101,7 @@ class _Failure:
 
     reason: str
     full: bool = False
+    gone: bool = False
 
 
 @dataclass
@@ -109,6 +120,26 @@ class _Memory:
         return self.blocks.pop(block)
 
 
+@dataclass
+class _Counted:
+    """Counts finished paths and tells the time that the others take."""
+
+    paths: int
+    done: int
+    tell: Callable[[Progress], None]
+    begun: float = field(default_factory=time.perf_counter)
+    before: int = 0
+
+    def __post_init__(self) -> None:
+        self.before = self.done
+        self.tell(Progress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
+
+    def add(self, paths: int) -> None:
+        self.done += paths
+        rate = (self.done - self.before) / (time.perf_counter() - self.begun)
+        self.tell(Progress(self.done, self.paths, rate, (self.paths - self.done) / rate))
+
+
 def run_paths(
     job: Job,
     paths: int,
@@ -120,78 +151,168 @@ def run_paths(
 ) -> Arrays:
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
+    The arguments are those of ``each_block``.
+    """
+    arrays = list(each_block(job, paths, folder, executor, blocks, progress, lost))
+    return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
+
+
+def each_block(
+    job: Job,
+    paths: int,
+    folder: Path | None = None,
+    executor: Executor | None = None,
+    blocks: Blocks = BLOCKS,
+    progress: Callable[[Progress], None] = lambda state: None,
+    lost: Callable[[range, str], Arrays] | None = None,
+) -> Generator[Arrays]:
+    """Arrays of the blocks of paths 0 to ``paths`` - 1, in their order, each as soon as those before it are there.
+
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
-    an InputError that names the difference; None keeps them in memory. executor : a process pool
+    an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
     (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
     -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
     """
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
-    cut = blocks.cut(paths)
+    count, block = blocks.count(paths), partial(blocks.block, paths=paths)
     store = _Memory() if folder is None else Store(folder)
     with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
-        failed = _compute(job, cut, store, executor, progress, blocks.ahead)
+        failed = dict[int, str]()
+        counted = _Counted(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
+        missing = ((i, block(i)) for i in range(count) if not store.has(i))
+        answers = _answers(job, missing, executor, blocks.ahead)
+        with closing(answers):  # an interrupt drops at once what waits
+            given = 0
+            while given < count:
+                if store.has(given) and not failed:
+                    yield store.load(given)
+                    given += 1
+                elif lost is not None and (store.has(given) or given in failed):
+                    yield lost(block(given), failed[given]) if given in failed else store.load(given)
+                    given += 1
+                elif not _next_kept(answers, store, failed, counted):
+                    break
         if failed and lost is None:
-            told = [f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {reason}" for i, reason in failed.items()]
-            kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
-            more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
-            raise RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
-        arrays = [lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))]
-        return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
+            raise _failure({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
-def _compute(
-    job: Job,
-    cut: list[range],
-    store: Store | _Memory,
-    executor: Executor | None,
-    progress: Callable[[Progress], None],
-    ahead: int,
-) -> dict[int, str]:
-    """Compute and save the missing blocks; returns the reasons of those that failed."""
-    missing = [i for i in range(len(cut)) if not store.has(i)]
-    paths = sum(map(len, cut))
-    done = before = paths - sum(len(cut[i]) for i in missing)
-    start, failed = time.perf_counter(), dict[int, str]()
-    progress(Progress(done, paths, 0.0, math.inf if missing else 0.0))
-    with closing(_answers(job, cut, missing, executor, ahead)) as answers:  # an interrupt drops at once what waits
-        for i, answer in answers:
-            if isinstance(answer, _Failure) and answer.full:
-                raise _full(answer.reason, store)
+def in_order(
+    function: Callable[[T], Arrays],
+    blocks: Iterator[T],
+    executor: Executor | None = None,
+    store: Store | None = None,
+    ahead: int = AHEAD,
+) -> Generator[tuple[T, Arrays]]:
+    """Each of some blocks with what a function gives for it, in their order, each as soon as those before it are there.
+
+    The blocks are read as they are needed, ``ahead`` of them at most. store : keeps what is finished, of a folder that
+    the caller has claimed; what it has is not computed. Raises RunFailed for the first block that fails.
+    """
+    kept: Store | _Memory = _Memory() if store is None else store
+    numbered, here, given = enumerate(blocks), dict[int, T](), 0
+    for given, block in numbered:
+        here[given] = block
+        if not kept.has(given):
+            break
+        yield here.pop(given), kept.load(given)
+
+    def missing() -> Iterator[tuple[int, T]]:
+        for i, block in chain([*here.items()], numbered):
+            here[i] = block
+            if not kept.has(i):
+                yield i, block
+
+    with closing(_answers(function, missing(), executor, ahead)) as answers:
+        for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                failed[i] = answer.reason
-                continue
-            _keep(store, i, answer)
-            done += len(cut[i])
-            rate = (done - before) / (time.perf_counter() - start)
-            progress(Progress(done, paths, rate, (paths - done) / rate))
-    return failed
+                raise (_full if answer.full else _gone)(f"block {i}: {answer.reason}", kept)
+            _keep(kept, i, answer)
+            while given in here and kept.has(given):
+                yield here.pop(given), kept.load(given)
+                given += 1
+    for i in sorted(here):
+        yield here[i], kept.load(i)
+
+
+def _next_kept(
+    answers: Iterator[tuple[int, range, Arrays | _Failure]],
+    store: Store | _Memory,
+    failed: dict[int, str],
+    counted: _Counted,
+) -> bool:
+    """Keep the next answer, or note why it failed; whether there was one."""
+    i, block, answer = next(answers, (-1, range(0), _Failure("")))
+    if i < 0:
+        return False
+    if isinstance(answer, _Failure):
+        if answer.full:
+            raise _full(answer.reason, store)
+        if answer.gone:
+            raise _gone(answer.reason, store)
+        failed[i] = answer.reason
+        return True
+    _keep(store, i, answer)
+    counted.add(len(block))
+    return True
+
+
+def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
+    """The failure that names blocks and paths."""
+    told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
+    kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
+    more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
+    return RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
 
 
 def _answers(
-    job: Job, cut: list[range], missing: list[int], executor: Executor | None, ahead: int
-) -> Generator[tuple[int, Arrays | _Failure]]:
-    """Blocks and their answers, as they come."""
+    job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
+) -> Generator[tuple[int, T, Arrays | _Failure]]:
+    """Blocks and their answers, as they come: at most ``ahead`` are under way, none further before the first of them
+    than that."""
     if executor is None:
-        yield from ((i, _attempt(job, cut[i])) for i in missing)
+        yield from ((i, block, _attempt(job, block)) for i, block in missing)
         return
-    queue, alone, lost, waiting = deque(missing), deque[int](), Counter[int](), dict[Future, int]()
+    queue, alone = deque(islice(missing, ahead)), deque[tuple[int, T]]()
+    lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or alone or waiting:
-            while (queue and len(waiting) < ahead) or (alone and not waiting):
-                i = (queue or alone).popleft()
-                waiting[_submitted(executor, job, cut[i])] = i
+            while (queue and _near(queue[0][0], waiting, ahead)) or (alone and not waiting):
+                i, block = (queue or alone).popleft()
+                waiting[_submitted(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                error, i = future.exception(), waiting.pop(future)
-                lost[i] += isinstance(error, BrokenExecutor)
-                if isinstance(error, BrokenExecutor) and lost[i] < LIVES:
-                    (alone if lost[i] == LIVES - 1 else queue).append(i)
+                i, block = waiting.pop(future)
+                error = _error(future)
+                died = _worker_died(error)
+                if died:
+                    lost[i] += 1
+                if died and lost[i] < LIVES:
+                    alone.append((i, block)) if lost[i] == LIVES - 1 else queue.appendleft((i, block))
                 else:
-                    yield i, future.result() if error is None else _said(error)
+                    yield i, block, future.result() if error is None else _said(error)
+            queue.extend(islice(missing, max(ahead - len(queue), 0)))
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _near(i: int, waiting: dict[Future, Any], ahead: int) -> bool:
+    """Whether a block may be begun beside those that wait."""
+    return len(waiting) < ahead and i < min((first for first, _ in waiting.values()), default=i) + ahead
+
+
+def _error(future: Future) -> BaseException | None:
+    """What a future failed with; of a cluster that is gone it is cancelled."""
+    try:
+        return future.exception()
+    except CancelledError as error:
+        return error
+
+
+def _worker_died(error: BaseException | None) -> bool:
+    """Whether a block lost its worker; a Dask scheduler says so by an exception of its own."""
+    return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
 def _keep(store: Store | _Memory, block: int, arrays: Arrays) -> None:
@@ -209,29 +330,38 @@ def _full(reason: str, store: Store | _Memory) -> RunFailed:
     return RunFailed("ensemble", f"{reason}{kept}")
 
 
-def _submitted(executor: Executor, job: Job, paths: range) -> Future:
-    """Future of a block of paths; of a pool that has lost its workers, a failed future."""
+def _gone(reason: str, store: Store | _Memory) -> RunFailed:
+    kept = f"; the finished blocks are kept in {store.folder}: resume there" if isinstance(store, Store) else ""
+    return RunFailed("ensemble", f"{reason}{kept}")
+
+
+def _submitted(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
+    """Future of a block; of a pool that has lost its workers, a failed future."""
     try:
-        return executor.submit(_attempt, job, paths)
+        return executor.submit(_attempt, job, block)
     except BrokenExecutor as error:
         lost: Future = Future()
         lost.set_exception(error)
         return lost
 
 
-def _attempt(job: Job, paths: range) -> Arrays | _Failure:
+def _attempt(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
     """One block, in the worker."""
     try:
-        arrays = job(paths)
+        arrays = job(block)
     except Exception as error:
         return _said(error)
-    short = [name for name, values in arrays.items() if len(values) != len(paths)]
+    if not isinstance(block, range):
+        return arrays
+    short = [name for name, values in arrays.items() if len(values) != len(block)]
     return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
 
 
 def _said(error: BaseException) -> _Failure:
-    if isinstance(error, BrokenExecutor):
+    if _worker_died(error):
         return _Failure("its worker died: killed, or out of memory")
+    if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":
+        return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", gone=True)
     full = isinstance(error, OSError) and error.errno in FULL
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
     return _Failure(said, full)

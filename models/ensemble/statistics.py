@@ -19,14 +19,20 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
     By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
     value is none. Raises InputError for fewer than ``FEWEST`` values, of which two have an error of 0 by this.
     """
-    if len(values) < FEWEST:
-        raise InputError("", "values", len(values), f"a standard deviation and its error need {FEWEST} values or more")
+    if not len(values):
+        return deviation_of(0, 0.0, 0.0)
     centred = values - values.mean()
-    second, fourth = np.mean(centred**2), np.mean(centred**4)
-    spread = math.sqrt(second * len(values) / (len(values) - 1))
+    return deviation_of(len(values), float(np.mean(centred**2)), float(np.mean(centred**4)))
+
+
+def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float]:
+    """Standard deviation and its standard error, by the second and fourth central moments of ``count`` values."""
+    if count < FEWEST:
+        raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST} values or more")
+    spread = math.sqrt(second * count / (count - 1))
     if spread == 0.0:
         return 0.0, 0.0
-    return spread, math.sqrt(max(fourth - second**2, 0.0) / len(values)) / (2 * math.sqrt(second))
+    return spread, math.sqrt(max(fourth - second**2, 0.0) / count) / (2 * math.sqrt(second))
 
 
 def percentiles(errors: np.ndarray) -> np.ndarray:
@@ -42,10 +48,17 @@ def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
     """
     if not len(values) or np.isnan(values).any():
         raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
+    ordered = np.sort(values)
+    middle, low, high = (float(ordered[rank]) for rank in ranks(len(values), level))
+    return middle, low, high
+
+
+def ranks(count: int, level: float) -> tuple[int, int, int]:
+    """Ranks, from 0, of a quantile of ``count`` values and of the ends of its 95 % interval; InputError for a level
+    that is not between 0 and 1."""
     if not 0.0 < level < 1.0:
         raise InputError("", "level", level, "must be between 0 and 1")
-    ordered, count = np.sort(values), len(values)
     half = ERRORS_95 * math.sqrt(count * level * (1 - level))
-    ranks = (math.ceil(count * level) - 1, math.floor(count * level - half) - 1, math.ceil(count * level + half) - 1)
-    quantiles = [float(ordered[min(max(rank, 0), count - 1)]) for rank in ranks]
-    return quantiles[0], quantiles[1], quantiles[2]
+    places = (count * level, math.floor(count * level - half), count * level + half)
+    middle, low, high = (min(max(math.ceil(place) - 1, 0), count - 1) for place in places)
+    return middle, low, high

@@ -38,19 +38,21 @@ class Fit:
         return (self.values - low < near) | (high - self.values < near)
 
 
-def fit(problem: Problem, kept: Store | None = None, tell: Told = lambda text, share: None, first: int = 0) -> Fit:
+def fit(
+    problem: Problem, stage_store: Store | None = None, tell: Told = lambda text, share: None, first: int = 0
+) -> Fit:
     """Estimates by scipy's least squares; InputError where the model fails at the start.
 
-    kept : finished stages, the first of them block ``first``; tell : told after each stage.
+    stage_store : finished stages, the first of them block ``first``; tell : told after each stage.
     """
     values, cost, converged = problem.start, np.inf, False
     for stage in range(MOST_STAGES):
-        if kept is not None and kept.has(first + stage):
-            block = kept.load(first + stage)
+        if stage_store is not None and stage_store.has(first + stage):
+            block = stage_store.load(first + stage)
         else:
             block = _stage(problem, values)
-            if kept is not None:
-                kept.save(first + stage, block)
+            if stage_store is not None:
+                stage_store.save(first + stage, block)
         values, before, cost = block["values"], cost, float(block["cost"])
         converged = before - cost <= SETTLED * cost
         size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))

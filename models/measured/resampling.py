@@ -10,41 +10,41 @@ SAME = 1e-6
 """Relative difference of two rates that are one."""
 
 
-def onto(times: np.ndarray, values: np.ndarray, period: float, grid: np.ndarray) -> np.ndarray:
+def onto(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
     """Values (n,) at the times of an even grid (n,), s.
 
-    times (m,) : s, strictly rising, mostly ``period`` apart; values (m,) : NaN where nothing was measured. NaN wherever
-    two samples more than 1.5 periods apart lie around a point, and outside.
+    times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
+    wherever two samples more than 1.5 periods apart lie around a point, and outside.
     """
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         return np.full(len(grid), np.nan)
     times, values = times[known], values[known]
-    new = float(grid[1] - grid[0]) if len(grid) > 1 else period
-    if period < new * (1.0 - SAME):
-        samples = _decimated(times, values, period, new, grid)
+    new = float(grid[1] - grid[0]) if len(grid) > 1 else source_period
+    if source_period < new * (1.0 - SAME):
+        samples = _decimated(times, values, source_period, new, grid)
     else:
         samples = np.interp(grid, times, values)
-    samples[_unknown(times, period, grid)] = np.nan
+    samples[_unknown(times, source_period, grid)] = np.nan
     return samples
 
 
-def _unknown(times: np.ndarray, period: float, grid: np.ndarray) -> np.ndarray:
+def _unknown(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
     """Points (n,) that lie in a gap or outside, but for what rounding puts there."""
     right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
-    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN * period
-    wide = times[right] - times[right - 1] > GAP * period
+    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN * source_period
+    wide = times[right] - times[right - 1] > GAP * source_period
     return ((grid < times[0]) | (grid > times[-1]) | wide) & ~near
 
 
-def _decimated(times: np.ndarray, values: np.ndarray, period: float, new: float, grid: np.ndarray) -> np.ndarray:
+def _decimated(times: np.ndarray, values: np.ndarray, source_period: float, new: float, grid: np.ndarray) -> np.ndarray:
     """Low-pass by a symmetric kernel, which has no phase, then a cubic spline, which at that rate is exact enough."""
     from scipy.interpolate import CubicSpline
     from scipy.signal import firwin, kaiserord, oaconvolve
 
-    count = round((times[-1] - times[0]) / period) + 1
-    even = times[0] + period * np.arange(count)
-    nyquist, rate = 0.5 / period, 1.0 / new
+    count = round((times[-1] - times[0]) / source_period) + 1
+    even = times[0] + source_period * np.arange(count)
+    nyquist, rate = 0.5 / source_period, 1.0 / new
     taps, beta = kaiserord(ATTENUATION, (STOP - PASS) * rate / nyquist)
     kernel = firwin(taps | 1, 0.5 * (PASS + STOP) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
     reach = min(len(kernel) // 2, count - 1)

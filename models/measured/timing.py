@@ -136,9 +136,9 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
             )
         keep = keep[np.argsort(times[keep], kind="stable")]
         order = keep
-    again = np.diff(times[keep]) == 0
-    if again.any():
-        first, count = float(times[keep][1:][again][0]), int(np.count_nonzero(again))
+    repeated = np.diff(times[keep]) == 0
+    if repeated.any():
+        first, count = float(times[keep][1:][repeated][0]), int(np.count_nonzero(repeated))
         text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
         if count > SEVERAL * len(keep):
             say(
@@ -152,7 +152,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
             )
         else:
             say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
-        keep = keep[np.concatenate(([True], ~again))]
+        keep = keep[np.concatenate(([True], ~repeated))]
         order = keep
     kept = times[keep]
     _gaps(kept, period, say)

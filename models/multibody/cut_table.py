@@ -14,8 +14,8 @@ from models.vehicles.spatial import Vector
 
 
 @dataclass(frozen=True)
-class Drive:
-    """Drive of a cut vehicle and its stabiliser, at half steps: rows i at the time i step / 2.
+class HubInputs:
+    """Inputs at the hubs of a cut vehicle and of its stabiliser, at half steps: rows i at the time i step / 2.
 
     hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
         (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)
@@ -50,8 +50,8 @@ class Drive:
         ends = [0, *changes.tolist(), len(begins)]
         return list(itertools.pairwise(ends))
 
-    def during(self, first: int, last: int) -> "Drive":
-        """The drive of one span of steps, whose time begins with it."""
+    def during(self, first: int, last: int) -> "HubInputs":
+        """The hub inputs of one span of steps, whose time begins with it."""
         hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last - first) + 1, axis=0)
         return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last + 1])
 
@@ -74,7 +74,7 @@ def joints(vehicle: CutVehicle) -> Joints:
     return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
-def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
+def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
     """All numbers for a run at a step (s)."""
     joined = joints(vehicle)
     bodies = []
@@ -83,16 +83,20 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
         bodies.append([joined.last[body.name], body.mass, *arm, *np.ravel(body.inertia)])
     elements = [_element(element, joined) for element in vehicle.elements]
     hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
-    inputs = drive.rows
+    inputs = hub_inputs.rows
     head = np.zeros(kernel.HEADER)
     counts = [len(rows) for rows in (joined.rows, bodies, elements, hubs)]
     head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = counts
-    head[[kernel.ROAD, kernel.FRAME, kernel.SPEED]] = drive.road, kernel.FRAMES.index(drive.frame), drive.speed
+    head[[kernel.ROAD, kernel.FRAME, kernel.SPEED]] = (
+        hub_inputs.road,
+        kernel.FRAMES.index(hub_inputs.frame),
+        hub_inputs.speed,
+    )
     head[[kernel.PER_TIME, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
-    head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, drive.holding
-    if drive.guide is not None:
-        head[kernel.GUIDE] = kernel.PULLED if drive.pull else kernel.HELD
-    head[kernel.ROLL_STIFFNESS : kernel.PITCH_DAMPING + 1] = drive.pull or 0.0
+    head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, hub_inputs.holding
+    if hub_inputs.guide is not None:
+        head[kernel.GUIDE] = kernel.PULLED if hub_inputs.pull else kernel.HELD
+    head[kernel.ROLL_STIFFNESS : kernel.PITCH_DAMPING + 1] = hub_inputs.pull or 0.0
     rows = np.array(elements, float).reshape(-1, kernel.PER_ELEMENT)
     parts = (head, joined.rows, np.array(bodies, float), rows, np.array(hubs), inputs)
     curves = _put_curves(vehicle, rows, sum(part.size for part in parts))
@@ -123,8 +127,8 @@ def _element(e: Element, joined: Joints) -> list[float]:
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
     """A hub, with the tyre that was there."""
-    tyre = vehicle.whole.tyres[i]
-    side = next((force for force in vehicle.whole.side_forces if force.name == tyre.name), None)
+    tyre = vehicle.uncut.tyres[i]
+    side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
     arm = np.subtract(tyre.point, joined.origin[tyre.body])
     return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]

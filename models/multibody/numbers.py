@@ -13,7 +13,7 @@ from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.tyre.bristles import net, shape_factor
 from models.vehicles.free_vehicle import CARRIER, anchor, chassis_of, free_vehicle, joints, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import Preloads, preloads
+from models.vehicles.spatial_linear import Preloads, preloaded, preloads
 
 Control = tuple[tuple[float, float], ...]
 """Knots (s, value); a control rests at each and goes from one to the next by the smoothest step of degree 5."""
@@ -92,8 +92,9 @@ class Handling:
         for name in set(tyres.fixed) - set(names):
             raise InputError(self.given.name, "fixed", name, "no such tyre", names)
         free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), tyres.spin_inertia, tyres.fixed)
-        object.__setattr__(self, "vehicle", free)
-        object.__setattr__(self, "held", preloads(free))
+        held = preloads(free)
+        object.__setattr__(self, "vehicle", preloaded(free, held))
+        object.__setattr__(self, "held", held)
         object.__setattr__(self, "numbers", table(self))
 
     @property

@@ -34,14 +34,14 @@ class ModelFile:
 def read(path: Path, without: Collection[str] = ()) -> ModelFile:
     """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``."""
     document = guarded(path)
-    model, notes = _compiled(document)
-    _check_sane(model, path.name)
+    model, notes = compiled(document)
+    check_sane(model, path.name)
     left_out = check_and_leave_out(model, document, without)
     twin = described(model, path.stem)
     return ModelFile(document, twin, tuple(left_out), tuple(ranges(model)), tuple(notes))
 
 
-def _compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
+def compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
     """By MuJoCo's own parser; InputError with its words, and notes."""
     path, notes = document.path, list[str]()
     try:
@@ -68,7 +68,7 @@ def _without_shapes(path: Path) -> tuple[str, int]:
     return ElementTree.tostring(root, encoding="unicode"), dropped
 
 
-def _check_sane(model: mujoco.MjModel, name: str) -> None:
+def check_sane(model: mujoco.MjModel, name: str) -> None:
     """InputError where nothing moves, or a number that moves something is not finite."""
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")

@@ -44,12 +44,17 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
-    elements = (*_joint_elements(model), *_tendon_elements(model), *_actuator_elements(model))
+    elements = joint_elements(model)
     vehicle = SpatialVehicle(name, tuple(_bodies(model, design)), (), (), (), joint_elements=elements)
     gravity = np.zeros(3) if _disabled(model, "GRAVITY") else np.array(model.opt.gravity)
     loads = tuple(_lifted(model, design, gravity))
     driven = Driven(vehicle, gravity, np.zeros(1), None, None, joint_parts(vehicle), loads)
     return TwinModel(name, model, driven, Coordinates(model, design))
+
+
+def joint_elements(model: mujoco.MjModel) -> tuple[JointElement, ...]:
+    """What acts along the coordinates of joints: springs, dampers and rotors of joints and fixed tendons, actuators."""
+    return (*_joint_elements(model), *_tendon_elements(model), *_actuator_elements(model))
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:

@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, Side, Touch, placed, touches_of
+from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, placed, touches_of
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
@@ -156,7 +156,7 @@ class Contact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
     0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
 
-    side: Side
+    side: WheelAndRail
     load: float
     speed: float
     friction: float = 0.0

@@ -94,7 +94,7 @@ def _pressed(
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))
             return [
-                _share(solved.pressure * (owner == k), x, y, patch.place, cell, pieces)
+                _share(solved.pressure * (owner == k), x, y, patch.contour_position, cell, pieces)
                 for k, patch in enumerate(patches)
             ], approach
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
@@ -103,8 +103,8 @@ def _pressed(
 def _grid(near: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
     """Centres (m) of the cells along x and along the contour."""
     x0, x1 = min(part.box[0] for part in near), max(part.box[1] for part in near)
-    y0 = min(part.box[2] + part.patch.place for part in near)
-    y1 = max(part.box[3] + part.patch.place for part in near)
+    y0 = min(part.box[2] + part.patch.contour_position for part in near)
+    y1 = max(part.box[3] + part.patch.contour_position for part in near)
     high = margin * (y1 - y0)
     narrowest = min(part.box[3] - part.box[2] for part in near)
     rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / coarser)
@@ -115,7 +115,7 @@ def _grid(near: Sequence[PatchPressure], margin: float, coarser: float) -> tuple
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along its normal, on the common contour."""
-    known, across = patch.distance, y - patch.place
+    known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), FAR)
     heights[over] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[over][:, None])

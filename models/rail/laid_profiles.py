@@ -13,7 +13,7 @@ from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
-from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, placed
+from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, laid, placed
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
@@ -61,10 +61,10 @@ class Profiles(Strict):
                 raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
         return self.model_copy(update=files)
 
-    def side(self, radius: float) -> Side:
+    def side(self, radius: float) -> WheelAndRail:
         """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
         rail = _profile(self.rail, "rail", self.smoothing)
-        return Side(
+        return WheelAndRail(
             _profile(self.wheel, "wheel", self.smoothing),
             laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
             Wheelset(radius, self.back_to_back, self.taping),
@@ -122,7 +122,7 @@ def _even(y: Array, z: Array, spacing: float) -> Array:
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
-def _first(side: Side, shift: float) -> tuple[float, Array, Array] | None:
+def _first(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
     """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
         pose = placed(side, shift, 0.0)
@@ -133,7 +133,7 @@ def _first(side: Side, shift: float) -> tuple[float, Array, Array] | None:
     return float(places[np.argmin(gap)]), places, gap
 
 
-def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) -> float | None:
+def _ridge(side: WheelAndRail, before: tuple[float, float], after: tuple[float, float]) -> float | None:
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
     while abs(after[1] - before[1]) > APART:
         middle = (before[0] + after[0]) / 2.0

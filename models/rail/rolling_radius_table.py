@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array, quantity
-from models.contact.wheel_on_rail import Pose, Side, lowest_point, placed
+from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, placed
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
@@ -117,7 +117,7 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
 
 def rolling_radii_of(
-    right: Side, left: Side, displacements: Array, told: Callable[[float], Any] = lambda share: None
+    right: WheelAndRail, left: WheelAndRail, displacements: Array, told: Callable[[float], Any] = lambda share: None
 ) -> RollingRadiusTable:
     """The table of two wheels on their rails; the left one is described as a right one seen in a mirror.
 
@@ -140,13 +140,13 @@ def rolling_radii_of(
     return RollingRadiusTable(y, of_right - of_left)
 
 
-def _radii(right: Side, left: Side, shift: float) -> tuple[float, float]:
+def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
     pose = placed(right, shift, 0.0, left)
     return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
 
 
-def rolling_radius(side: Side, pose: Pose) -> float:
+def rolling_radius(side: WheelAndRail, pose: Pose) -> float:
     """Radius (m) of a wheel where it comes nearest to its rail."""
     across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
     return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))

@@ -61,13 +61,13 @@ def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> Del
         A[at, at] = speed * excitation.F
         noise[n : 2 * n] = root * by_rate @ H @ excitation.G
         noise[at] = root * excitation.G
-    C = read.acceleration @ A[n : 2 * n]
-    C[:, :n] += read.displacement
-    C[:, n : 2 * n] += read.rate
+    C = read.acceleration_factors @ A[n : 2 * n]
+    C[:, :n] += read.displacement_factors
+    C[:, n : 2 * n] += read.rate_factors
     D = []
     for at, H, noise in zip(filters, excitation.heights, B, strict=True):
-        C[:, at] += read.road @ H + speed * read.road_rate @ H @ excitation.F
-        D.append(read.acceleration @ noise[n : 2 * n] + root * read.road_rate @ H @ excitation.G)
+        C[:, at] += read.road_factors @ H + speed * read.road_rate_factors @ H @ excitation.F
+        D.append(read.acceleration_factors @ noise[n : 2 * n] + root * read.road_rate_factors @ H @ excitation.G)
     return _system(vehicle, excitation, speed, A, B, C, D)
 
 
@@ -151,17 +151,17 @@ def first_order(
     B = np.concatenate([by_rate @ noise, each], axis=1)
     q, read = np.hstack([states.Q, states.direct @ stiff]), vehicle.read
     v = q @ A
-    C = read.displacement @ q + read.rate @ v + read.acceleration @ v @ A
-    C[:, x:] += read.road @ heights + read.road_rate @ rate
+    C = read.displacement_factors @ q + read.rate_factors @ v + read.acceleration_factors @ v @ A
+    C[:, x:] += read.road_factors @ heights + read.road_rate_factors @ rate
     return _system(vehicle, excitation, speed, A, B, C, _direct(read, q, v, B, noise)), q
 
 
 def _direct(read: Rows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
-    seen = read.rate @ q @ B + read.acceleration @ v @ B + read.road_rate @ noise
-    size = abs(read.rate) @ abs(q) @ abs(B) + abs(read.acceleration) @ abs(v) @ abs(B)
-    told = abs(seen) > NOTHING * (size + abs(read.road_rate) @ abs(noise))
-    worse = abs(read.acceleration @ (q @ B)) > NOTHING * (abs(read.acceleration) @ abs(q) @ abs(B))
+    seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
+    size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
+    told = abs(seen) > NOTHING * (size + abs(read.road_rate_factors) @ abs(noise))
+    worse = abs(read.acceleration_factors @ (q @ B)) > NOTHING * (abs(read.acceleration_factors) @ abs(q) @ abs(B))
     return np.where(worse, np.inf, np.where(told, seen, 0.0))
 
 

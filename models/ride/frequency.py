@@ -61,8 +61,8 @@ def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
     motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
     read = vehicle.read
-    rows = read.displacement + s * read.rate + s**2 * read.acceleration
-    return rows @ motion + read.road + s * read.road_rate
+    rows = read.displacement_factors + s * read.rate_factors + s**2 * read.acceleration_factors
+    return rows @ motion + read.road_factors + s * read.road_rate_factors
 
 
 def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:

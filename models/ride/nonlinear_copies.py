@@ -206,7 +206,7 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     """Motion of the vehicle for compiled loops: ``plain`` is the one without what bends these springs."""
     n = len(plain.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
-    rows = np.array([o.displacement for o in linearise(watched, speed).outputs]).reshape(-1, n)
+    rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
     pushing = [tyre for tyre in vehicle.tyres if tyre.pushes_only]
     kinematics = Kinematics(vehicle)
     heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
@@ -216,7 +216,18 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     read = np.array([[float((o.kind, _part(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
         [
-            [np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration]) for o in plain.outputs],
+            [
+                np.concatenate(
+                    [
+                        o.displacement_factors,
+                        o.rate_factors,
+                        o.road_factors,
+                        o.road_rate_factors,
+                        o.acceleration_factors,
+                    ]
+                )
+                for o in plain.outputs
+            ],
             read.reshape(len(plain.outputs), -1),
         ]
     )

@@ -139,7 +139,7 @@ class _Search:
         self.watched = replace(vehicle, outputs=(*vehicle.outputs, *watched))
         self.plain = linearise(self.watched, speed, {s.name: (s.stiffness, s.damping) for s in self.springs})
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
-        self.rows = np.array([output.displacement for output in with_forces]).reshape(-1, len(self.plain.mass))
+        self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
     def solved(self, scale: float) -> StatisticallyLinear:
         """Iterate to the fixed point."""
@@ -232,7 +232,7 @@ class _Search:
 
     def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
         """Means (p,) of the outputs; the force of a bent spring is not its gain times its mean travel."""
-        means = np.array([output.displacement @ position for output in linear.outputs])
+        means = np.array([output.displacement_factors @ position for output in linear.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
             if isinstance(spec, PartOutput) and spec.kind == "force" and spec.part in springs:
                 means[i] = springs[spec.part].force
@@ -275,7 +275,7 @@ def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> Lin
     """The vehicle with forces along rows (f, n) in place of the road's heights; ``reading`` (p, f): read at once."""
     none = np.zeros(len(rows))
     outputs = tuple(
-        Output(o.name, o.unit, o.kind, o.acceleration, o.rate, o.displacement, read, none)
+        Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, none)
         for o, read in zip(linear.outputs, reading, strict=True)
     )
     wheels = tuple(Wheel(str(i), 0.0, 0.0, 0) for i in range(len(rows)))

@@ -6,7 +6,7 @@ roads and speeds, a road's in path), and divisions by differences of eigenvalues
 sum over pairs, -Q_mn / (s_m + s_n*).
 
 Digits are lost where eigenvectors are nearly parallel, where two eigenvalues of different blocks nearly meet and
-where terms of a sum cancel. ``loss`` estimates how many; beyond LOSS the direct way is taken instead.
+where terms of a sum cancel. ``relative_error`` estimates how many; beyond LOSS the direct way is taken instead.
 """
 
 from collections import Counter
@@ -112,7 +112,7 @@ def _quick(
     none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
     status, reason = verdicts(hits(system).D, quick.variance, quick.floor, none, quick.fastest, accuracy)
     finite = np.array(status) == FINITE
-    if (quick.loss[finite] > LOSS).any():
+    if (quick.relative_error[finite] > LOSS).any():
         return "terms cancel"
     return np.where(finite, quick.variance, np.inf), status, reason
 
@@ -169,14 +169,14 @@ class Shared:
 
 @dataclass(frozen=True)
 class Modal:
-    """Per output (p,): variance, ``floor`` that rounding makes of zero, relative error it may have left (``loss``).
+    """Per output (p,): variance, ``floor`` that rounding makes of zero, and ``relative_error`` that may be left.
 
     fastest : rate of the system in 1/s
     """
 
     variance: np.ndarray
     floor: np.ndarray
-    loss: np.ndarray
+    relative_error: np.ndarray
     fastest: float
 
 
@@ -237,5 +237,5 @@ def _summed(
     if not np.isfinite(size).all():
         return "two eigenvalues of vehicle, road and weighting meet"
     floor = silence(C, P)
-    loss = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
-    return Modal(variance.clip(0.0), floor, np.where(size > floor, loss, 0.0), float(abs(s).max()))
+    relative_error = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+    return Modal(variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(s).max()))

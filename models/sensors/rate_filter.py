@@ -69,11 +69,11 @@ def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) ->
     filter_.predict(period * change)
 
 
-def _entries(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _entries(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Entries of skew(w)^2 = w w^T - |w|^2 I."""
-    return w[first] * w[other] - (first == other) * (w @ w)
+    return w[first] * w[second] - (first == second) * (w @ w)
 
 
-def _jacobian(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _jacobian(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Derivatives (entries, 3) of the measured rate products by the angular rate w."""
-    return w[first, None] * EYE[other] + w[other, None] * EYE[first] - 2 * (first == other)[:, None] * w
+    return w[first, None] * EYE[second] + w[second, None] * EYE[first] - 2 * (first == second)[:, None] * w

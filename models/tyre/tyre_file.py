@@ -85,8 +85,8 @@ def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: 
     order = np.argsort(number, kind="stable")
     twice = np.flatnonzero(np.diff(number[order]) == 0)
     if twice.size:
-        first, again = lines[order[twice[0]]], lines[order[twice[0] + 1]]
-        raise InputError(path, f"line {again}", None, f"has the slip angle, load and slip of line {first}")
+        first, repeated = lines[order[twice[0]]], lines[order[twice[0] + 1]]
+        raise InputError(path, f"line {repeated}", None, f"has the slip angle, load and slip of line {first}")
     missing = np.flatnonzero(np.bincount(number, minlength=int(np.prod(shape))) == 0)
     if missing.size:
         angle, load, slip = (nodes[i] for (nodes, _), i in zip(axes, np.unravel_index(missing[0], shape), strict=True))

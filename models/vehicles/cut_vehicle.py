@@ -13,6 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
+from models.vehicles.sliding_springs import sliding_springs
 from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import Preloads, preloads
 
@@ -67,21 +68,21 @@ class CutVehicle:
     """A vehicle cut at its hubs: the bodies above the cut.
 
     tree : bodies and joints, carriers first, then the chassis; without springs and tyres
-    whole : the vehicle that was cut, all its bodies on the chassis, loaded; tyres are listed there
+    uncut : the vehicle that was cut, all its bodies on the chassis, loaded; tyres are listed there
     elements : springs, mounts, seats and bars, in that order
     loads : (hubs,) static load of every tyre, N
     """
 
     chassis: str
     tree: SpatialVehicle
-    whole: SpatialVehicle
+    uncut: SpatialVehicle
     elements: tuple[Element, ...]
     loads: np.ndarray
 
     @property
     def hubs(self) -> tuple[str, ...]:
         """Names of the tyres that were cut off."""
-        return tuple(tyre.name for tyre in self.whole.tyres)
+        return tuple(tyre.name for tyre in self.uncut.tyres)
 
     @property
     def size(self) -> int:
@@ -92,7 +93,8 @@ class CutVehicle:
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
     _check(vehicle, chassis)
-    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
+    sprung = sliding_springs(guided(vehicle, chassis))
+    whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
     return CutVehicle(chassis, _tree(whole, chassis), whole, elements_of(whole, held), loads)
@@ -213,11 +215,11 @@ class Rigid:
 
 def rigid(vehicle: CutVehicle) -> Rigid:
     """All bodies in the design position as one."""
-    bodies = vehicle.whole.bodies
+    bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
     centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass
     inertia = np.zeros((3, 3))
     for body in bodies:
         arm = np.subtract(body.position, centre)
         inertia += np.array(body.inertia) + steiner(body.mass, arm)
-    return Rigid(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.whole.tyres]) - centre)
+    return Rigid(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Vector
+from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Tyre, Vector
 
 CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
 SPECK = 1e-9
@@ -28,9 +28,9 @@ def free_vehicle(
 ) -> SpatialVehicle:
     """The vehicle on a carrier, bodies in the order of a walk through their tree, without side forces, drag, outputs.
 
-    gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle, 0 for wheels that do not spin; fixed : tyres
-    whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six freedoms and no parent, and
-    where a body that carries a tyre turns about the vertical beside it.
+    gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle where its tyre names none, 0 for wheels that do
+    not spin; fixed : tyres whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six
+    freedoms and no parent, and where a body that carries a tyre turns about the vertical beside it.
     """
     chassis = chassis_of(vehicle)
     _check_headings(vehicle, chassis.name)
@@ -40,15 +40,23 @@ def free_vehicle(
         replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
         for body in guided(vehicle, chassis.name).bodies
     ]
-    turning = ((0.0, 0.0, 0.0), (0.0, spin_inertia, 0.0), (0.0, 0.0, 0.0))
     bodies += [
-        Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), turning, tyre.body)
+        Body(rotor(tyre.name), SPECK, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
         for tyre in vehicle.tyres
         if spin_inertia and tyre.name not in fixed
     ]
     bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
     free = replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
     return free.in_frame(CARRIER)
+
+
+def spinning(tyre: Tyre, spin_inertia: float) -> float:
+    """Inertia (kg m^2) of a wheel about its axle; ``spin_inertia`` where its tyre names none."""
+    return spin_inertia if tyre.spin_inertia is None else tyre.spin_inertia
+
+
+def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
+    return (0.0, 0.0, 0.0), (0.0, inertia, 0.0), (0.0, 0.0, 0.0)
 
 
 def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:

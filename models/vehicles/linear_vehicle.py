@@ -21,28 +21,29 @@ class Wheel:
 class Output:
     """One thing that an engineer reads: a linear function of motion and road.
 
-    acceleration, rate, displacement (n,): factors of q'', q', q; road, road_rate (w,): factors of the heights under
-    the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel", "force", ...).
+    acceleration_factors, rate_factors, displacement_factors (n,): of q'', q', q. road_factors, road_rate_factors (w,):
+    of the heights under the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel",
+    "force", ...).
     """
 
     name: str
     unit: str
     kind: str
-    acceleration: np.ndarray
-    rate: np.ndarray
-    displacement: np.ndarray
-    road: np.ndarray
-    road_rate: np.ndarray
+    acceleration_factors: np.ndarray
+    rate_factors: np.ndarray
+    displacement_factors: np.ndarray
+    road_factors: np.ndarray
+    road_rate_factors: np.ndarray
 
 
 class Rows(NamedTuple):
     """Rows of all outputs' matrices, as ``Output`` has them of one output: (p, n), those by the road (p, w)."""
 
-    acceleration: np.ndarray
-    rate: np.ndarray
-    displacement: np.ndarray
-    road: np.ndarray
-    road_rate: np.ndarray
+    acceleration_factors: np.ndarray
+    rate_factors: np.ndarray
+    displacement_factors: np.ndarray
+    road_factors: np.ndarray
+    road_rate_factors: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,11 @@ class VehicleFigures:
             if s.second_body is not None and wheel in (s.first_body, s.second_body) and abs(s.axis[2]) > UPRIGHT
         ]
 
+    def on_joints(self, wheel: str) -> bool:
+        """Whether a spring along coordinates holds a wheel or an axle."""
+        chain = self.vehicle.chain(wheel)
+        return any(e.stiffness and body in chain for e in self.vehicle.joint_elements for body, _ in e.coordinates)
+
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
     """All queries about a vehicle, in SI, but for those of checks that the user accepts; empty for a usual one."""
@@ -185,6 +190,8 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
     """Corners without a strut, and struts far from their wheels."""
     for wheel, tyres in figures.wheels.items():
         struts = figures.struts(wheel)
+        if figures.on_joints(wheel):
+            continue
         if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != figures.carried.name:
             kind = "damper alone" if struts else "strut"
             yield _query(

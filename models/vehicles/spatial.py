@@ -40,8 +40,8 @@ class Body:
 
     axes : right-handed directions that stand for x, y and z in all six freedoms, unit vectors in the design position,
     rows of the matrix; with A their transpose, c = c_parent + R_parent (... + A (x, y, z)) and R = R_parent A Rx Ry Rz
-    A^T. All else of the body stays parallel to the vehicle's axes. Other than PARALLEL, ``models.own_model`` alone
-    has them.
+    A^T. All else of the body stays parallel to the vehicle's axes. Other than PARALLEL, only models of ``twinrig twin``
+    have them.
     """
 
     name: str
@@ -63,7 +63,8 @@ class JointElement:
 
     F = held + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body, freedom).
     held (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what turns with d
-    alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` alone has them.
+    alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` reads them from MJCF and URDF; in a
+    vehicle of a scene ``held`` is the preload that ``spatial_linear.preloads`` finds.
     """
 
     name: str
@@ -185,7 +186,8 @@ class Tyre:
     h is how far the point has risen from its design position, zeta the height of the road under it (m). ``axle``
     counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. A tyre that
     ``pushes_only`` has max(0, min(F, 2 S)) instead, S = F0 + stiffness (zeta - h) what its spring alone has: the law
-    of ``models.systems.pitch_plane.effects.lift_off``.
+    of ``models.systems.pitch_plane.effects.lift_off``. spin_inertia : of the wheel about its axle (kg m^2), beside the
+    body's; None where the scene says it.
     """
 
     name: str
@@ -195,6 +197,7 @@ class Tyre:
     stiffness: float
     damping: float = 0.0
     pushes_only: bool = False
+    spin_inertia: float | None = None
 
 
 @dataclass(frozen=True)
@@ -298,8 +301,9 @@ class SpatialVehicle:
     ``gravity`` (m/s^2) acts along -z on every body. At 0 the vehicle is unloaded; above, the spring-dampers, bars
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
     of the axles from the front. ``limits`` : what a reduced vehicle has not, for closed forms of ride alone.
-    ``joint_elements`` : what acts along coordinates themselves. ``towed`` : bodies that another one tows, each fixed to
-    a massless body at its hitch, whose turns are the joint between both.
+    ``joint_elements`` : what acts along coordinates themselves. ``ranges`` : lowest and highest values (m, rad) of
+    coordinates whose stops are left out. ``notes`` : sentences on what reading a file left out or changed. ``towed`` :
+    bodies that another one tows, each fixed to a massless body at its hitch, whose turns are the joint between both.
     """
 
     name: str
@@ -314,6 +318,8 @@ class SpatialVehicle:
     gravity: float = 0.0
     limits: Limits = NONE
     joint_elements: tuple[JointElement, ...] = ()
+    ranges: tuple[tuple[tuple[str, Freedom], float, float], ...] = ()
+    notes: tuple[str, ...] = ()
     towed: tuple[str, ...] = ()
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:

@@ -14,6 +14,7 @@ from models.vehicles.spatial import (
     PARALLEL,
     AntiRollBar,
     Body,
+    JointElement,
     Limits,
     PartOutput,
     PointOutput,
@@ -115,9 +116,6 @@ def _check_parallel(vehicle: SpatialVehicle) -> None:
     turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
     if turned is not None:
         raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")
-    if vehicle.joint_elements:
-        place = f"joint_elements[{vehicle.joint_elements[0].name}]"
-        raise InputError(vehicle.name, place, None, "is for models read from MJCF and URDF alone")
 
 
 def linearise(
@@ -176,6 +174,9 @@ def mass(vehicle: SpatialVehicle) -> np.ndarray:
     for body in vehicle.bodies:
         shift, turn = motion.shift(body.name, body.position), motion.turn(body.name)
         total += body.mass * shift.T @ shift + turn.T @ np.array(body.inertia) @ turn
+    for element in vehicle.joint_elements:
+        row = _along(motion, element)
+        total += element.inertia * np.outer(row, row)
     return total
 
 
@@ -189,7 +190,8 @@ def slopes_at_rest(spring: SpringDamper) -> Gains:
 
 
 class Preloads(NamedTuple):
-    """F0 of every spring-damper (N) and bar (N m) by name, and of every tyre (N) by name: 0 without gravity."""
+    """F0 of every spring-damper (N), bar (N m) and joint element (N, N m) by name, and of every tyre (N) by name: 0
+    without gravity."""
 
     parts: dict[str, float]
     tyres: dict[str, float]
@@ -232,7 +234,7 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
 
 
 def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
-    """Spring-dampers and bars by name."""
+    """Spring-dampers, bars and joint elements by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
         ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
@@ -243,7 +245,14 @@ def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gain
             motion.turned_axis(spring.frame, spring.axis),
         )
         rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
-    return rows | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+    rows |= {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
+    return rows | {e.name: (_along(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
+
+
+def _along(motion: Kinematics, element: JointElement) -> np.ndarray:
+    """Row (n,) of a joint element's d, which is linear in the coordinates."""
+    places = zip(element.coordinates, element.factors, strict=True)
+    return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
@@ -256,6 +265,12 @@ def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
 
 def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
     return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
+
+
+def preloaded(vehicle: SpatialVehicle, held: Preloads) -> SpatialVehicle:
+    """The vehicle with the preloads of its joint elements in them."""
+    elements = tuple(replace(element, held=held.parts[element.name]) for element in vehicle.joint_elements)
+    return replace(vehicle, joint_elements=elements)
 
 
 def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
@@ -316,7 +331,7 @@ UNITS = {
     "tyre force": "N",
     "tyre deflection": "m",
 }
-"""Unit of each kind of output; of an anti-roll bar rad, rad/s and N m."""
+"""Unit of each kind of output; of an anti-roll bar and of a joint element that turns rad, rad/s and N m."""
 
 
 def _output(
@@ -338,13 +353,19 @@ def _output(
         row, *force_gains = parts[spec.part]
         gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[spec.kind]
         rows[:2] = np.outer(gains, row)
-        if any(bar.name == spec.part for bar in vehicle.bars):
+        turning = {bar.name for bar in vehicle.bars} | {e.name for e in vehicle.joint_elements if _turns(e)}
+        if spec.part in turning:
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
         row, *force_gains = tyres[spec.tyre]
         gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[spec.kind]
         rows[:2], road[:, list(tyres).index(spec.tyre)] = -np.outer(gains, row), gains
     return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
+
+
+def _turns(element: JointElement) -> bool:
+    """Whether the d of a joint element is an angle."""
+    return all(freedom.startswith("r") for _, freedom in element.coordinates)
 
 
 def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> tuple[LinearVehicle, np.ndarray]:
@@ -356,7 +377,12 @@ def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> t
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
     outputs = tuple(
-        replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
+        replace(
+            o,
+            acceleration_factors=o.acceleration_factors @ N,
+            rate_factors=o.rate_factors @ N,
+            displacement_factors=o.displacement_factors @ N,
+        )
         for o in linear.outputs
     )
     return replace(

@@ -61,7 +61,8 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
     springs = [(spring.first_body, spring.second_body or GROUND) for spring in vehicle.springs]
     tyres = [(tyre.body, GROUND) for tyre in vehicle.tyres]
     bars = [(bar.body, end) for bar in vehicle.bars for end in (bar.left, bar.right)]
-    return springs + tyres + bars
+    along = [(body, vehicle.body(body).parent or GROUND) for e in vehicle.joint_elements for body, _ in e.coordinates]
+    return springs + tyres + bars + along
 
 
 def _inert(vehicle: SpatialVehicle, file: str) -> None:

@@ -79,7 +79,7 @@ def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str
     """Where the file of a vehicle is, which ``load_vehicle`` reads; raises InputError."""
     if not name.endswith(".toml"):
         if name not in shipped():
-            raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml", shipped())
+            raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped())
         return SHIPPED / f"{name}.toml"
     return existing(name, Path(folder), file, place)
 

@@ -123,8 +123,9 @@ def against(run: Path, measurement: Path) -> bool:
 def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
     """Lay a measurement over a run, largest relative error first.
 
-    Headers are ``name [unit]``, names those of the run's channels; units are converted. shift : s, what the
-    measurement's clock shows at the run's time 0; sought where None. Raises InputError for a file without any channel
+    Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
+    channel of each under a name. shift : s, what the measurement's clock shows at the run's time 0; sought where None.
+    Raises InputError for a file without any channel
     of the run, and for a unit that does not fit.
     """
     timed = ((name, each) for name, each in channels_of(run.data) if each.over == OVER and len(each.grid) > 3)
@@ -132,24 +133,32 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
     if not ours:
         raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
     source = open_source(file)
-    named = [channel for channel in source.channels if channel.name in ours]
+    engines = [str(engine) for engine in run.data.coords["engine"].values] if "engine" in run.data.coords else []
+    named = {name: channel for channel in source.channels for name in _by_engine(channel.name, engines, ours)}
     if not named:
         theirs = [channel.name for channel in source.channels]
         name = next((each for each in theirs if suggestion(each, tuple(ours))), theirs[0] if theirs else None)
         raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
-    pairs = {channel.name: _pair(source, channel, ours[channel.name]) for channel in named}
+    pairs = {name: _pair(source, channel, ours[name]) for name, channel in named.items()}
     moved_by = time_shift(list(pairs.values())) if shift is None else Shift(shift, np.nan)
     matches = [_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
     kept = [match for match in matches if match is not None]
     if not kept:
         raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
-    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours)])
+    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours, engines)])
 
 
-def _notes(source: Source, ours: Mapping[str, Quantity]) -> Iterator[str]:
+def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
+    """Channels of the run that a measured channel is laid over: that of its name, or of its name in each engine."""
+    if name in ours:
+        return [name]
+    return [each for each in (f"{name}, {engine}" for engine in engines) if each in ours]
+
+
+def _notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> Iterator[str]:
     """Channels of the file that the run does not have, each with the nearest name."""
     for channel in source.channels:
-        if channel.name not in ours:
+        if not _by_engine(channel.name, engines, ours):
             yield f"not compared: {channel.name!r} is no channel of the run{suggestion(channel.name, tuple(ours))}"
 
 

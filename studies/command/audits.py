@@ -21,16 +21,18 @@ def conformity_report(engine: str, more: bool, out: Path | None) -> None:
     sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
 
 
-def blind_spot_audit(more: bool, out: Path | None, resume: Path | None) -> None:
-    """Audit all shared functions; raises InputError for options that go with a report."""
+def blind_spot_audit(more: bool, only: str | None, out: Path | None, resume: Path | None) -> None:
+    """Audit all shared functions, or those whose name is like ``only``; raises InputError for options that go with a
+    report."""
     if more:
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
-    from validation.blind_spots.audit import TRACE, audit, summary
+    from validation.blind_spots.audit import TRACE, audit, audit_of, summary
 
+    again = "twinrig validate --blind-spots" + ("" if only is None else f" --only '{only}'")
     folder = folder_of("blind-spots", TRACE, "", out, resume)
     try:
         with waiting("blind spots") as progress:
-            lines = audit(folder, progress)
+            lines = audit(folder, progress) if only is None else audit_of(only, folder, progress)
     except KeyboardInterrupt:
-        end(f"interrupted; finished functions are kept: twinrig validate --blind-spots --resume {folder}", 130)
+        end(f"interrupted; finished functions are kept: {again} --resume {folder}", 130)
     print("\n".join(summary(lines, folder)))

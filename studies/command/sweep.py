@@ -14,7 +14,7 @@ import shutil
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.store import Arrays, code, locked, named_files
-from models.ensemble.workers import processes
+from models.ensemble.workers import Crew
 from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
 from studies.command.summary_numbers import numbers
 from studies.command.sweep_figure import Columns, Swept, draw, moves, there
@@ -39,8 +39,6 @@ RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
 MOST = 10_000
 """Points of a sweep."""
-WORKERS = 2
-"""Processes, if there are so many cores; the results do not depend on it."""
 
 Record = dict[str, Any]
 
@@ -72,23 +70,24 @@ class Points:
         engines = engines_of(engine, scene.system)
         return scene, engines, ready(scene, engines)
 
-    def check(self) -> None:
-        """Raise the InputError of the first point if every point is refused: then it is not one value that is wrong."""
+    def check(self) -> Any:
+        """The scene of the first point that can be run; the InputError of the first one if every point is refused: then
+        it is not one value that is wrong."""
         first: InputError | None = None
         for i in range(len(self.values)):
             try:
-                self.ready(i)
-                return
+                return self.ready(i)[0]
             except InputError as error:
                 first = first or error
-        if first:
-            raise first
+        assert first is not None
+        raise first
 
     def record(self, i: int) -> Record:
         """Numbers of one point by their names, what failed, by engine where the study told it, and what its results say
         of themselves."""
         try:
             scene, engines, study = self.ready(i)
+            scene = scene.model_copy(update={"workers": 1, "cluster": None})
             with whole_folder(self.folder / RUNS / f"{i:04d}") as place:
                 summary = study.run(scene, engines, place, lambda text, part: None)
         except (InputError, RunFailed) as error:
@@ -195,12 +194,12 @@ def _writable(value: Any) -> bool:
         return False
 
 
-def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
-    """All points that are not finished yet, then table and figures."""
+def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
+    """All points that are not finished yet, computed by a crew, then table and figures."""
     with locked(job.folder):
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
-        records = _records(job, progress)
+        records = _records(job, progress, crew)
         swept = _swept(job, records)
         _save(job.folder, swept)
         pages = draw(swept, job.folder)
@@ -244,7 +243,7 @@ def _unit(job: Points) -> str:
     return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
-def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:
+def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
     """Records of all points; InputError if none of them has a number although none failed."""
 
     def tell(finished: Done) -> None:
@@ -253,12 +252,19 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
     def lost(points: range, reason: str) -> Arrays:
         return _array(_failed(reason) for _ in points)
 
-    with processes(min(WORKERS, os.cpu_count() or 1, len(job.values))) as pool:
+    if crew.cluster is not None:  # whose workers compute in folders of their own
+        job = replace(job, folder=job.folder.resolve(), scene=_absolute(job.scene))
+    with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
         kept = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
     records = [json.loads(str(text_of_record)) for text_of_record in kept]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
     return records
+
+
+def _absolute(scene: str) -> str:
+    """The path of a scene file, from any folder; the name of a scene that comes with twinrig."""
+    return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
 def _save(folder: Path, swept: Swept) -> None:

@@ -127,8 +127,8 @@ def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
     report = paths(file.twin) if wanted.paths else None
     price: tuple[str, ...] = ()
     if wanted.tolerance is not None:
+        from models.advice.own_model_price import priced
         from models.advice.price.text import lines as price_lines
-        from models.own_model.price import priced
 
         tell("pricing", 2 / 3)
         price = tuple(price_lines(priced(file.twin, wanted.tolerance, wanted.quantity)))

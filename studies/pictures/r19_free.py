@@ -82,9 +82,9 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
 def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
     forces = [
-        run.rates @ output.rate
-        + run.positions @ output.displacement
-        + road @ np.concatenate([output.road, output.road_rate])
+        run.rates @ output.rate_factors
+        + run.positions @ output.displacement_factors
+        + road @ np.concatenate([output.road_factors, output.road_rate_factors])
         for output in linearise(vehicle, SPEED).outputs
     ]
     held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()

@@ -17,12 +17,13 @@ TILE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PassingRoad:
-    """Heights (m) over a way (m) at the lateral places ``tracks`` (m), passed with a speed (m/s).
+    """Heights (m) at the ``distances`` (m) along the road and the lateral places ``tracks`` (m), passed with a speed
+    (m/s).
 
     up : the vertical component of the direction up, 1 or -1; magnified : of the heights; half : width (m).
     """
 
-    way: np.ndarray
+    distances: np.ndarray
     heights: np.ndarray
     tracks: tuple[float, float]
     speed: float
@@ -51,7 +52,7 @@ class PassingRoad:
 
     def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""
-        left, two = (np.interp(distance, self.way, column) for column in self.heights.T)
+        left, two = (np.interp(distance, self.distances, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
         return self.magnified * (left + share * (two - left))
 

@@ -52,30 +52,30 @@ def write(folder: Path) -> None:
 def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the scene's run, as an engine is handed it, and its path."""
     measurement, step = measure(scene, engine), scene.run.step
-    drive = measurement.drive(scene.stabilise.method, step, STEPS)
-    model = build(engine, measurement.vehicle, drive, step, scene.run.duration)
+    hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEPS)
+    model = build(engine, measurement.vehicle, hub_inputs, step, scene.run.duration)
     head = model.numbers
-    period = drive.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
-    curved = not drive.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    period = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
+    curved = not hub_inputs.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
     noisy_forces, noisy_angles = _noisy(measurement)
     counts = {
         "runs on tyres": int(measurement.truth is not None),
-        "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.whole.tyres),
+        "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.uncut.tyres),
         "noisy forces": noisy_forces,
         "noisy angles": noisy_angles,
-        "held forces": drive.held * WRENCH * int(head[kernel.HUBS]),
+        "held forces": hub_inputs.held * WRENCH * int(head[kernel.HUBS]),
         "pulled angles": 2 * int(head[kernel.GUIDE] == kernel.PULLED),
         "enforced angles": 2 * int(head[kernel.GUIDE] == kernel.HELD),
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
         "curves between samples": int(curved),
     }
-    return counts, model.run(*np.split(measurement.start(drive), 2)).states.tobytes()
+    return counts, model.run(*np.split(measurement.start(hub_inputs), 2)).states.tobytes()
 
 
 def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
     """A run of the scene over so many of its steps, built beforehand."""
     measurement, step = measure(scene, engine), scene.run.step
-    return build(engine, measurement.vehicle, measurement.drive("none", step, steps), step, steps * step).run
+    return build(engine, measurement.vehicle, measurement.hub_inputs("none", step, steps), step, steps * step).run
 
 
 def _noisy(measurement: Measurement) -> list[int]:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -157,25 +158,46 @@ class Asked:
         return Line(function, ended, len(callers), left, noticed, failed, grounded, commit)
 
 
-def audit(folder: Path, progress: Progress, wanted: list[str] | None = None) -> list[Line]:
-    """Lines of all shared functions, or of the wanted; those that ``folder`` holds already are not run again.
+def audit(folder: Path, progress: Progress) -> list[Line]:
+    """Lines of all shared functions; those that ``folder`` holds already are not run again.
 
     Raises InputError where the folder belongs to other functions than the sources have now.
     """
     functions = prepare(folder)
     with Probes(folder) as probes:
         traced = trace(probes, functions, jobs(with_grounds=True), progress)
-        shared = wanted or in_order(shared_functions(traced.numbers))
+        shared = in_order(shared_functions(traced.numbers))
         lines = measured(folder / JUDGES, shared, Asked(probes, traced, judges=True), progress)
         write(lines.values(), folder / TABLE)
         traced = trace(probes, functions, jobs(with_grounds=False), progress)
-        shared = wanted or in_order(shared_functions(traced.numbers))
+        shared = in_order(shared_functions(traced.numbers))
         doubtful = [name for name in shared if name not in lines or not lines[name].is_covered]
         more = measured(folder / OTHERS, doubtful, Asked(probes, traced, judges=False), progress)
     whole = [lines[name].with_others(more[name]) if name in lines else more[name] for name in doubtful]
     whole += [line for name, line in lines.items() if name not in doubtful]
     write(whole, folder / TABLE)
     return whole
+
+
+def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers: int = WORKERS) -> list[Line]:
+    """Lines of the shared functions whose ``module:name`` is like ``only``, by judges alone.
+
+    by : what the names of the cases and test files that are asked are like; the fewer, the shorter the trace. Raises
+    InputError where no function or judge is like that, or as ``audit`` does.
+    """
+    functions = prepare(folder)
+    asked = [job for job in jobs(with_grounds=True) if fnmatchcase(called(job), by)]
+    if not asked:
+        raise InputError("", "by", by, "no case, and no test file that names independent grounds, is called so")
+    if not any(fnmatchcase(name, only) for name in functions):
+        raise InputError("--only", "", only, "no shared function is called so: module:name, as in 'models.tyre.*'")
+    with Probes(folder, workers) as probes:
+        traced = trace(probes, functions, asked, progress)
+        run = [name for name in shared_functions(traced.numbers) if by == "*" or traced.callers(name, judges=True)]
+        wanted = [name for name in in_order(run) if fnmatchcase(name, only)]
+        lines = measured(folder / JUDGES, wanted, Asked(probes, traced, judges=True), progress)
+    write(lines.values(), folder / TABLE)
+    return list(lines.values())
 
 
 def measured(path: Path, functions: list[str], asked: Asked, progress: Progress) -> dict[str, Line]:
@@ -233,11 +255,17 @@ def jobs(with_grounds: bool) -> list[Job]:
     return [([name], []) for name in judged_cases()] + [([], [file]) for file in chosen]
 
 
+def called(job: Job) -> str:
+    """The case or the file of tests of a job of the trace."""
+    cases, tests = job
+    return (*cases, *tests)[0]
+
+
 def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
     """The trace, read from the folder, or made now."""
 
     def run_once(job: Job) -> Path:
-        path = probes.folder / TRACE / f"{Path(*job[0], *job[1]).stem}.jsonl"
+        path = probes.folder / TRACE / f"{Path(called(job)).stem}.jsonl"
         if not path.is_file():
             probes.run(job, path.with_suffix(".part"), {}, ())
             path.with_suffix(".part").rename(path)

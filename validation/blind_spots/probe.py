@@ -1,15 +1,16 @@
 """A process of an audit: runs cases and tests, and tells what of each failed and which functions it ran.
 
-It reads jobs from its standard input and imports the cases that they name, each once, without a fault. For each job it
-starts a fork of itself, in which nothing is left of an earlier fault, and answers how that has ended. A job is a line
-of JSON: "cases" and "tests" (what pytest is given); "out", a file to which a line of JSON is added for each case and
-test that has ended; "faults", by the place of the function; "sound", ids that fail without a fault; "patience", seconds
-of the processor after which the fork is stopped; and "budgets", seconds of the processor after which nothing more
-begins: if something independent has noticed, and if not.
+It reads jobs from its standard input and imports the cases that they name, and what the named tests import, each once,
+without a fault. For each job it starts a fork of itself, in which nothing is left of an earlier fault, and answers how
+that has ended. A job is a line of JSON: "cases" and "tests" (what pytest is given); "out", a file to which a line of
+JSON is added for each case and test that has ended; "faults", by the place of the function; "sound", ids that fail
+without a fault; "patience", seconds of the processor after which the fork is stopped; and "budgets", seconds of the
+processor after which nothing more begins: if something independent has noticed, and if not.
 """
 
 import json
 import os
+import re
 import signal
 import sys
 from contextlib import suppress
@@ -22,7 +23,10 @@ import pytest
 from numba.core import event
 
 from validation.blind_spots import memory
+from validation.blind_spots.rewriting import ROOT
 from validation.blind_spots.table import is_independent
+
+IMPORT = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", re.MULTILINE)
 
 
 def clock() -> float:
@@ -154,12 +158,18 @@ def work(job: dict[str, Any]) -> None:
             run_case(name, told)
 
 
+def imported_by(tests: list[str]) -> list[str]:
+    """Modules that the files of some tests (as pytest is given them) import at their outermost level."""
+    files = dict.fromkeys(test.partition("::")[0] for test in tests)
+    return list(dict.fromkeys(name for file in files for name in IMPORT.findall((ROOT / file).read_text("utf-8"))))
+
+
 def ended(job: dict[str, Any]) -> str:
     """Do a job in a fork; returns how it ended, as ``Line.ended`` tells it."""
     memory.clear(memory.FAULTS)
-    for name in job["cases"]:
-        with suppress(Exception):  # a module that breaks as it is imported breaks again where its case is run
-            import_module(f"validation.cases.{name}")
+    for module in [*(f"validation.cases.{name}" for name in job["cases"]), *imported_by(job["tests"])]:
+        with suppress(Exception):  # a module that breaks as it is imported breaks again where its case or test is run
+            import_module(module)
     child = os.fork()
     if child == 0:
         with suppress(BaseException):

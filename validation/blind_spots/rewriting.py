@@ -1,11 +1,12 @@
 """The source of a module whose functions can be spoiled: what they return, yield or write into their arguments.
 
 Numbers that one puts into an argument, or into a part of one, are spoiled as they are put there. An array that
-functions which it calls write into is spoiled as a whole instead, where it ends; behind a pointer, whose length nobody
-knows, the numbers are that those functions are given.
+functions which it calls write into is spoiled as a whole instead, where it ends; so is an array that it sees behind a
+pointer. Where it sees none, nobody knows the length, and the numbers are that those functions are given.
 """
 
 import ast
+import copy
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -161,11 +162,33 @@ def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> se
     return {root_of(given, known) for given, parameter in pairs if parameter in touched} - {""}
 
 
-class _Spoil(ast.NodeTransformer):
-    """Spoils what one function gives: caller, its module and name; last, arguments that are spoiled where it ends."""
+def arrays_behind(function: Function, known: dict[str, str], roots: set[str]) -> dict[str, list[ast.Call]]:
+    """Arrays that a function sees behind pointers, by argument: ``array(pointer, shape)`` of names that are given, or
+    set in its outermost statements."""
+    outermost = {*parameters(function)}
+    for statement in function.body:
+        if isinstance(statement, ast.Assign):
+            outermost |= {each.id for each in ast.walk(statement) if isinstance(each, ast.Name)}
+    behind = dict[str, list[ast.Call]]()
+    for node in _inside(function):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "array":
+            pointer, names = node.args[0], {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+            root = known.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
+            if root in roots and names <= outermost | {"array"}:
+                behind.setdefault(root, []).append(node)
+    return {root: list({ast.unparse(each): each for each in calls}.values()) for root, calls in behind.items()}
 
-    def __init__(self, caller: tuple[str, str], known: dict[str, str], last: list[str], place: int) -> None:
-        self.caller, self.known, self.last, self.place = caller, known, last, place
+
+class _Spoil(ast.NodeTransformer):
+    """Spoils what one function gives: caller, its module and name; last, arguments that are spoiled where it ends;
+    behind, see ``arrays_behind``, of those that are pointers."""
+
+    def __init__(self, caller: tuple[str, str], function: Function, last: list[str], place: int) -> None:
+        self.caller, self.known, self.last, self.place = caller, roots(function), last, place
+        self.behind = {
+            root: [copy.deepcopy(each) for each in calls]
+            for root, calls in arrays_behind(function, self.known, {*last}).items()
+        }
 
     def body(self, statements: list[ast.stmt]) -> list[ast.stmt]:
         """The statements of the function."""
@@ -194,7 +217,7 @@ class _Spoil(ast.NodeTransformer):
     def visit_Expr(self, node: ast.Expr) -> ast.Expr:
         """Spoil the value that a call writes behind a pointer before the call; an array is spoiled at the end."""
         if isinstance(node.value, ast.Call):
-            for root in sorted(handed(self.caller, node.value, self.known))[:1]:
+            for root in sorted(handed(self.caller, node.value, self.known) - {*self.behind})[:1]:
                 given = [each if root_of(each, self.known) else self._into(each, root) for each in node.value.args]
                 node.value.args = given
         return node
@@ -223,7 +246,8 @@ class _Spoil(ast.NodeTransformer):
 
     def _endings(self) -> list[ast.stmt]:
         """Statements that spoil arguments as a whole."""
-        return [ast.Expr(self._call(SCALED, ast.Name(name, ast.Load()))) for name in self.last]
+        wholes = [whole for name in self.last for whole in self.behind.get(name, [ast.Name(name, ast.Load())])]
+        return [ast.Expr(self._call(SCALED, whole)) for whole in wholes]
 
     def _call(self, name: str, *arguments: ast.expr) -> ast.Call:
         return ast.Call(ast.Name(name, ast.Load()), [*arguments, ast.Constant(self.place)], [])
@@ -235,7 +259,7 @@ def rewritten(source: str, module: str, names: dict[str, int]) -> ast.Module:
     for name, place in names.items():
         function = function_of(parsed, name)
         last = sorted(written(module, name))
-        function.body = _Spoil((module, name), roots(function), last, place).body(function.body)
+        function.body = _Spoil((module, name), function, last, place).body(function.body)
     helpers: list[ast.stmt] = [ast.ImportFrom("validation.blind_spots.spoiling", [*map(_as_helper, HELPERS)], 0)]
     if COMPILES.search(source):
         helpers += [ast.Import([ast.alias("validation.blind_spots.compiled_spoiling", "_compiled_by_audit")])]

@@ -4,18 +4,26 @@ Independent are rows whose other side does not share the function: an exact answ
 its own (``validation.common.rows.Independence``); of tests, those that name such grounds by the mark ``grounds``.
 Rows of planted faults are none: they judge checks, not values.
 
-``python -m validation.blind_spots.table FOLDER`` keeps the table of an audit in the sources.
+A fault that changes no value needs no judge: ``harmless.csv`` names such functions, why, and the test that proves it.
+
+``python -m validation.blind_spots.table FOLDER`` keeps the table of an audit in the sources, and the kept lines of
+functions that it did not spoil.
 """
 
 import csv
 import sys
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 
 from models.core.whole_files import whole_file
 
 KEPT = Path(__file__).with_name("blind_spots.csv")
+HARMLESS = Path(__file__).with_name("harmless.csv")
+WHY_HARMLESS = ("harmless, as they change cost alone", "harmless, without a number of their own")
+"""Why a fault changes no value: it moves a starting point or a step of a search, whose end stays within the stated
+error; or the function gives views of its arguments, new arrays that are written over, zeros, or nothing."""
 INDEPENDENT = ("closed form", "published", "native", "written equations", "plain counterpart")
 CHECKS_OF_CHECKS = "planted."
 JOINED = "; "
@@ -87,6 +95,19 @@ def is_independent(id: str, grounds: str) -> bool:
     return grounds in INDEPENDENT and not id.startswith(CHECKS_OF_CHECKS)
 
 
+@cache
+def harmless() -> dict[str, tuple[str, str]]:
+    """Functions whose faults change no value: why, one of ``WHY_HARMLESS``, and the id of the test that proves it."""
+    with HARMLESS.open(newline="", encoding="utf-8") as file:
+        return {each["function"]: (each["why"], each["proof"]) for each in csv.DictReader(file)}
+
+
+def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
+    """The measured lines, and the kept ones of all other functions that are still there."""
+    lines = {line.function: line for line in (*kept, *measured)}
+    return [lines[name] for name in functions if name in lines]
+
+
 def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
     """Functions that nothing independent notices, by what there is instead.
 
@@ -94,10 +115,12 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
     """
     known = {line.function: line for line in lines}
     gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": []}
-    gaps |= {"run by nothing": [], "not audited": []}
+    gaps |= {"run by nothing": [], "not audited": [], **{why: [] for why in WHY_HARMLESS}}
     for name in functions:
         line = known.get(name)
-        if line is None or line.ended == "not spoiled":
+        if name in harmless():
+            gaps[harmless()[name][0]].append(name)
+        elif line is None or line.ended == "not spoiled":
             gaps["not audited"].append(name)
         elif line.ended == "not run":
             gaps["run by nothing"].append(name)
@@ -108,4 +131,6 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
 
 
 if __name__ == "__main__":
-    write(read(Path(sys.argv[1]) / KEPT.name), KEPT)
+    from validation.blind_spots.shared import candidates
+
+    write(merged(read(), read(Path(sys.argv[1]) / KEPT.name), candidates()), KEPT)

@@ -145,7 +145,7 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
         "does not stop": brakes and stopped.rest < 0,
         "creeps": stopped.rest >= 0
-        and bool(np.abs(speed[stopped.rest :]).max() > 0.0 or np.ptp(path.place[stopped.rest :]) > 0.0),
+        and bool(np.abs(speed[stopped.rest :]).max() > 0.0 or np.ptp(path.position[stopped.rest :]) > 0.0),
     }
     return [name for name, wrong in broken.items() if wrong]
 

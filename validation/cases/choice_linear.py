@@ -57,13 +57,13 @@ class Judged:
     def honest(self) -> bool:
         """Whether no route finds a tolerance broken that was reported as kept."""
         changes = self.choice.confirmed if self.by_frequency is None else self.by_frequency
-        return not self.choice.kept or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
+        return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
 def judged(scene: Drawn, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
     chooser = asked(scene)
-    choice, whole = chooser.choose(), chooser.wholes[0]
+    choice, whole = chooser.choose(), chooser.full_scenes[0]
     rest = whole.reduced(without(scene.scene, choice.left_out))
     two, deviation = Screen(whole.full, chooser.rows).identity(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
@@ -94,7 +94,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _kept_rows(choices: list[Judged]) -> list[Row]:
-    share = float(np.mean([each.choice.kept for each in choices]))
+    share = float(np.mean([each.choice.within_tolerance for each in choices]))
     lies = sum(not each.honest for each in choices)
     second = [each for each in choices if each.by_frequency is not None]
     gap = max(float(abs(each.by_frequency - each.choice.confirmed).max()) for each in second)
@@ -282,11 +282,11 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
 def _activity_rows() -> list[Row]:
     """Pitch inertia is active, and irrelevant to bounce."""
     chooser = _paper()
-    watts = activity(chooser.wholes[0])
+    watts = activity(chooser.full_scenes[0])
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     share = finite["inertia body ry"] / sum(finite.values())
     locked = next(effect for effect in chooser.effects if effect.name == "body ry")
-    rest = chooser.wholes[0].reduced(without(chooser.scene, [locked]))
+    rest = chooser.full_scenes[0].reduced(without(chooser.scene, [locked]))
     change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
         Observed(
@@ -313,7 +313,7 @@ def _shown(judged_choice: Judged) -> dict[str, Any]:
         "predicted": choice.predicted.tolist(),
         "confirmed": choice.confirmed.tolist(),
         "saving": judged_choice.saving,
-        "kept": choice.kept,
+        "kept": choice.within_tolerance,
         "nearby": judged_choice.nearby,
         "measured": judged_choice.measured,
         "said": list(choice.said),

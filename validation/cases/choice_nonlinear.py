@@ -78,7 +78,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _kept(choices: list[JudgedByRuns]) -> list[Row]:
-    kept = float(np.mean([each.choice.kept and each.honest for each in choices]))
+    kept = float(np.mean([each.choice.within_tolerance and each.honest for each in choices]))
     return [
         Observed(
             "choice_nonlinear.kept", SYSTEM, f"share of {len(choices)} random scenes whose tolerance is kept", kept, ""
@@ -171,7 +171,7 @@ def _shown(judged_choice: JudgedByRuns) -> Saved:
         "times": choice.times,
         "predicted": choice.predicted.tolist(),
         "confirmed": choice.confirmed.tolist(),
-        "kept": choice.kept,
+        "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "seconds": list(choice.seconds),
     }

@@ -335,9 +335,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 def _said(shapes: dict[str, dict[str, Any]]) -> str:
     """Sentence on the errors of the ways of fitting: means over all shapes."""
 
-    def mean(way: str, key: str) -> str:
+    def mean(variant: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
-        return f"{scale * np.nanmean([abs(case['ways'][way][key]) for case in shapes.values()]):.1f} %"
+        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in shapes.values()]):.1f} %"
 
     apart = shapes["two patches"]["ways"]
     return (

@@ -14,7 +14,7 @@ import numpy as np
 from models.core.noise import normal
 from models.core.result import Result
 from models.core.signals import Sampled
-from models.drift.growth import growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
+from models.drift.growth import pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
 from models.drift.score import section_forces
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
@@ -181,7 +181,7 @@ def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, flo
 def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     """Standard deviation (2,) in rad at WINDOW by the closed law, from the smoothed forces (n, 2) alone."""
     p, period = assembly.parameters, 1 / NOISY_RATE
-    rates = growth_until(pitch_rate_of_forces(forces, period, p), period, p)
+    rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
     at = np.rint(np.array(WINDOW) / period).astype(int)
     return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
 

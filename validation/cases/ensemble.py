@@ -276,8 +276,8 @@ def _price_rows(prices: dict[str, float]) -> list[Row]:
     ]
 
 
-def _slug(way: str) -> str:
-    return way.replace(", ", ".").replace(" ", "-")
+def _slug(label: str) -> str:
+    return label.replace(", ", ".").replace(" ", "-")
 
 
 def _half_step_row(forces: Path) -> Row:

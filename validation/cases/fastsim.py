@@ -141,10 +141,10 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariants(batches: int, count: int, first: int) -> list[Row]:
+def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
-    for i in range(batches):
+    for i in range(batch_count):
         options = OPTIONS[i % len(OPTIONS)]
         for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
@@ -163,7 +163,7 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
         "similarity": "difference of the forces at eight times the load and twice the size from the law of similarity",
         "stick": "excess of the share of stick beyond 0 to 1",
     }
-    total = batches * count
+    total = batch_count * count
     return [
         Observed(
             f"fastsim.always.{name.replace(' ', '_')}",

@@ -14,11 +14,11 @@ from models.core.signals import Sampled
 from models.drift.growth import (
     CUTOFF,
     growth_rate,
-    growth_until,
     heave_variance,
     pitch_rate_of_forces,
     pitch_variance,
     rigid_pitch,
+    sinh_law_rate,
 )
 from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
@@ -82,7 +82,7 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
     spreads = {
-        f"law, {name}": np.sqrt(pitch_variance(times, growth_until(rate, 1 / RATE, p)[at], q))
+        f"law, {name}": np.sqrt(pitch_variance(times, sinh_law_rate(rate, 1 / RATE, p)[at], q))
         for name, rate in rates.items()
     }
     spreads |= {
@@ -251,7 +251,7 @@ def _twin_row(folder: Path) -> Row:
     assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
     q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
-    expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
+    expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / RATE, p)[at], q)))
     deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = (
         "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",

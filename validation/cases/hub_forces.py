@@ -12,7 +12,7 @@ from models.core.signals import Interpolation
 from models.engines.cut_vehicle import ENGINES, HubRun, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTER, Comparison, compare
 from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
@@ -71,7 +71,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     q, v = anywhere(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
     written = build("reference", bare, static(bare, 3), STEP, STEP).acceleration(0.0, q, v)
-    slack = SpringDamper("none", vehicle.chassis, vehicle.whole.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
+    slack = SpringDamper("none", vehicle.chassis, vehicle.uncut.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
     expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(0.0, q, v)
     expected -= GRAVITY * np.eye(len(q))[Z]
     return [
@@ -98,11 +98,12 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     """Joint forces of the hubs' wrenches by the kernel and by MuJoCo's own Jacobians."""
     (q, _), worst = anywhere(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
-        drive = shaken(vehicle, frame, guide=False)
+        hub_inputs = shaken(vehicle, frame, guide=False)
         built, bare = (
-            build("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
+            build("mujoco", vehicle, replace(hub_inputs, hubs=part * hub_inputs.hubs), STEP, STEP)
+            for part in (1.0, 0.0)
         )
-        expected = by_jacobians(built, q, drive.hubs[0], frame)
+        expected = by_jacobians(built, q, hub_inputs.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()
         worst = max(worst, float(off / np.abs(expected).max()))
     return Observed(
@@ -165,8 +166,8 @@ def _toppling(vehicle: CutVehicle) -> Row:
 def _together(vehicle: CutVehicle, duration: float) -> Row:
     """Free on noise in every engine."""
     steps = round(duration / STEP)
-    drive = static(vehicle, steps + 1)
-    noisy = HubForces(drive.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
+    hub_inputs = static(vehicle, steps + 1)
+    noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
     paths = [model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
     return Observed(
         "hub_forces.engines_on_noise",
@@ -178,7 +179,7 @@ def _together(vehicle: CutVehicle, duration: float) -> Row:
     ).at_most(1e-9, "same tableau, same step", "shared kernel")
 
 
-def _rough(vehicle: CutVehicle, duration: float) -> Drive:
+def _rough(vehicle: CutVehicle, duration: float) -> HubInputs:
     """A class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
     return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
@@ -302,8 +303,10 @@ def _exact(frame: str, comparison: Comparison) -> Row:
     measurement = comparison.measurement
     assert measurement.truth is not None
     steps = measurement.scene.steps
-    drive = with_angles(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
-    run = build("mujoco", measurement.vehicle, drive, STEP, steps * STEP).run()
+    hub_inputs = with_angles(
+        measurement.forces.hub_inputs(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP
+    )
+    run = build("mujoco", measurement.vehicle, hub_inputs, STEP, steps * STEP).run()
     ratios = np.array([*comparison.damages(run.elements).values()])
     return Observed(
         f"hub_forces.prescribed_{frame}",
@@ -320,9 +323,9 @@ def _faults(scene: HubScene) -> list[Row]:
     Over 5 s: in 2 s another frame cannot be told from an offset of 30 N at a wheel, which is no contradiction.
     """
     vehicle, duration = r19(), 5.0
-    drive = _rough(vehicle, duration)
-    clean, angles = recorded(truth("mujoco", vehicle, drive, "hub", STEP, duration), "hub", 2)
-    in_space, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
+    hub_inputs = _rough(vehicle, duration)
+    clean, angles = recorded(truth("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
+    in_space, _ = recorded(truth("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
     parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {

@@ -55,11 +55,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     if shutil.which("valgrind") is None:
         return [not_run(ID, SYSTEM, WHAT, "valgrind is not installed")], {"instructions": {}}
     try:
-        first, again = _counted(folder / "instructions")
+        first, second = _counted(folder / "instructions")
     except (subprocess.SubprocessError, OSError) as error:
         reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
         return [not_run(ID, SYSTEM, WHAT, reason)], {"instructions": {}}
-    off = np.abs(again / first - 1.0).max(axis=1)
+    off = np.abs(second / first - 1.0).max(axis=1)
     rows = [
         Observed(
             f"{ID}.{engine}",

@@ -79,10 +79,10 @@ def own_vehicle(folder: Path) -> str:
     """A vehicle file of a user's own: R19-free with every spring, damper and mass another, none symmetric."""
     text, number = (SHIPPED / "r19_free.toml").read_text(encoding="utf-8"), count()
 
-    def changed(match: re.Match[str]) -> str:
+    def scaled(match: re.Match[str]) -> str:
         return f"{match[1]} = {float(match[2]) * (1.0 + 0.02 * (next(number) % 11 - 5))!r}"
 
-    (folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", changed, text, flags=re.M))
+    (folder / "own.toml").write_text(re.sub(r"^(mass|stiffness|damping) = ([\d.e+]+)$", scaled, text, flags=re.M))
     return "own.toml"
 
 
@@ -136,7 +136,7 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
         for form in proof.formats:
             place = folder / f"{form}{path}"
             recording = recorded(true, samples, proof.vehicle, form, place)
-            off[form] = max(off[form], _changed(recording, true, samples))
+            off[form] = max(off[form], _largest_channel_change(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
             damage = next((damages for other, damages in known if _same(values, other)), None)
             if damage is None:
@@ -158,9 +158,9 @@ def _same(first: np.ndarray, two: np.ndarray) -> bool:
     return bool(np.allclose(first / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
-def _changed(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:
+def _largest_channel_change(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:
     """Largest change of a hub channel by file, map and clock, by the channel's largest value."""
-    changed = 0.0
+    largest_change = 0.0
     for i, signal in enumerate(true.signals):
         if signal.at in true.vehicle.hubs:
             back = recording.samples(next(s for s in recording.signals if s.channel == signal.channel))
@@ -168,8 +168,8 @@ def _changed(recording: Recording, true: VirtualMeasurement, samples: np.ndarray
             if (np.isnan(back) != gone).any():
                 return np.inf
             off = float(np.nanmax(np.abs(back - samples[:, i]))) / max(float(np.nanmax(np.abs(samples[:, i]))), 1e-300)
-            changed = max(changed, off)
-    return changed
+            largest_change = max(largest_change, off)
+    return largest_change
 
 
 def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[Row]:
@@ -336,7 +336,7 @@ def _quick(folder: Path) -> list[Row]:
             "measured_virtual.values",
             SYSTEM,
             "change of hub channels by a CSV file, map and clock, over their largest value",
-            _changed(recording, true, samples),
+            _largest_channel_change(recording, true, samples),
             "1",
         ).at_most(1e-12, "units cost a rounding", "native"),
         Observed(

@@ -13,7 +13,7 @@ from models.identification.held_out import Identified, Search, identified
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
-from models.systems.single_track.drive import read_drive
+from models.measured.drive import read_drive
 from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build

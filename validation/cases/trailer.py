@@ -10,7 +10,7 @@ from models.systems.handling.run import Drive, driven, energy, unaccounted
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
-from validation.spatial.trains import caravan, train, loose_train
+from validation.spatial.trains import caravan, loose_train, train
 from validation.spatial.written_equations import TURN
 
 TITLE = "A car with a trailer on its suspension"

@@ -38,22 +38,22 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     left = without(chooser.scene, choice.left_out)
     ratios = [
         _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
-        for whole in chooser.wholes
+        for whole in chooser.full_scenes
     ]
     return largest(np.sqrt(ratios) - 1)
 
 
-def _by_frequency(whole: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
-    rest = whole.reduced(scene)
-    densities = spectra(rest.vehicle, rest.excitation, whole.speed, OMEGA)[:, rows]
+    rest = full_scene.reduced(scene)
+    densities = spectra(rest.vehicle, rest.excitation, full_scene.speed, OMEGA)[:, rows]
     return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 
 def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     """Largest change, by the tolerance, at random speeds of the range and with every parameter off at random."""
     random, rest, worst = np.random.default_rng(seed), chooser.rest(chosen), 0.0
-    low, high = chooser.wholes[0].speed, chooser.wholes[-1].speed
+    low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = parameters(chooser.scene.vehicle)
     for _ in range(draws):
         factors = dict(zip(names, 1.0 + OFF * random.uniform(-1.0, 1.0, len(names)), strict=True))
@@ -83,25 +83,25 @@ class JudgedByRuns:
     @property
     def honest(self) -> bool:
         """Whether no tolerance is broken that was reported as kept."""
-        return not self.choice.kept or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
+        return not self.choice.within_tolerance or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
 
 
 def judged_of(asked: Asked, system: str, engine: str) -> JudgedByRuns:
     """Choose, and run the scene and what is left once more."""
     chooser = ChooserByRuns(asked.scene(), engine, list(asked.quantities), asked.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
-    whole = runs.system.answer(asked.scene(), engine)
-    rest = runs.system.answer(runs.changed(frozenset(choice.left_out), choice.times), engine)
-    again = [change(whole.of(name).cases, rest.of(name).cases) for name in asked.quantities]
+    full_run = runs.system.computed_quantities(asked.scene(), engine)
+    reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
+    again = [change(full_run.of(name).cases, reduced_run.of(name).cases) for name in asked.quantities]
     return JudgedByRuns(system, engine, asked, choice, np.array(again))
 
 
-def change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float:
+def change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:
     """Worst case: rms of the difference where both have a row, by the path's deviation, or a number's by its size."""
     worst = 0.0
-    for full, left in zip(whole, rest, strict=True):
+    for full, left in zip(full_cases, reduced_cases, strict=True):
         rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)
         size = full.std() if len(full) > 1 else abs(full[0])
-        largest = max(case.std() if len(case) > 1 else abs(case[0]) for case in whole)
+        largest = max(case.std() if len(case) > 1 else abs(case[0]) for case in full_cases)
         worst = max(worst, float(np.sqrt(np.mean((left - full[rows]) ** 2)) / max(size, 1e-3 * largest)))
     return worst

@@ -46,13 +46,13 @@ def sizes(folder: Path) -> dict[str, int]:
     return {path.name: path.stat().st_size for path in folder.iterdir()}
 
 
-def _damaged(result: Result, folder: Path, share: float, whole: dict[str, int]) -> bool:
+def _damaged(result: Result, folder: Path, share: float, complete_sizes: dict[str, int]) -> bool:
     folder.mkdir()
     try:
-        with files_of_at_most(int(share * max(whole.values()))):
+        with files_of_at_most(int(share * max(complete_sizes.values()))):
             _save(result, folder)
     except OSError as error:
-        return error.errno not in FULL or not sizes(folder).items() <= whole.items()
+        return error.errno not in FULL or not sizes(folder).items() <= complete_sizes.items()
     return True
 
 

@@ -180,7 +180,12 @@ MARGINS = (1.4, 2.0, 3.0)
 
 def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
     """The exact contact of profiles: each height counts along the track's vertical."""
-    boxes = np.array([np.add(part.box, (0.0, 0.0, part.patch.place, part.patch.place)) for part in pressed.patches]).T
+    boxes = np.array(
+        [
+            np.add(part.box, (0.0, 0.0, part.patch.contour_position, part.patch.contour_position))
+            for part in pressed.patches
+        ]
+    ).T
     (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
     slope = float(np.cos(min(part.patch.lean for part in pressed.patches)))
     for margin in MARGINS:
@@ -200,7 +205,7 @@ FAR = 1e-3
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
-    known, across = patch.distance, y - patch.place
+    known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), FAR)
     inside = np.clip(x, known.x[0], known.x[-1])

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from models.contact.material import Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.undeformed_distance import Distance
-from models.contact.wheel_on_rail import Pose, Side, distance_over, touches_of
+from models.contact.wheel_on_rail import Pose, WheelAndRail, distance_over, touches_of
 from models.rail.contact_table import Contact, Placed
 from models.systems.wheel_rail.scene import build
 
@@ -85,7 +85,7 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
     """
     side = contact.side
     touches = touches_of(side, _lowered(side, placed))[: len(placed.right)]
-    away = abs(touches[0].patch.place - touches[1].patch.place)
+    away = abs(touches[0].patch.contour_position - touches[1].patch.contour_position)
     vertical, cosines = sum(wheel.vertical for wheel in placed.right), [math.cos(touch.angle) for touch in touches]
 
     def pressed(approach: float) -> np.ndarray:
@@ -111,12 +111,12 @@ def _alone(distance: Distance, approach: float, pair: Pair) -> float:
     return solve_normal(heights, 2e-4, 1e-4, pair, approach=approach).load if heights.min() < approach else 0.0
 
 
-def _lowered(side: Side, placed: Placed) -> Pose:
+def _lowered(side: WheelAndRail, placed: Placed) -> Pose:
     pose = Pose(placed.shift, placed.yaw, placed.roll, 0.0)
     return Pose(placed.shift, placed.yaw, placed.roll, side.clearance(pose))
 
 
-def searched(side: Side, placed: Placed, sign: float, near: float) -> tuple[float, float, float]:
+def searched(side: WheelAndRail, placed: Placed, sign: float, near: float) -> tuple[float, float, float]:
     """First touch of a wheel near a place on it (m from the taping line), by search over points of its surface.
 
     sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.

@@ -76,7 +76,7 @@ def _variances() -> float:
 def _kept() -> float:
     """Change by frequency of what is reported as kept, by the tolerance that was asked for."""
     choice, by_frequency, _ = _by_frequency()
-    return choice.kept * float(np.abs(by_frequency).max()) / _linear().tolerance
+    return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear().tolerance
 
 
 def _predicted() -> float:
@@ -102,7 +102,7 @@ def _runs() -> float:
 def _runs_kept() -> float:
     """Change by two runs more of what is reported as kept, by the tolerance that was asked for."""
     by_runs = _by_runs()
-    return by_runs.choice.kept * float(by_runs.again.max()) / _run().tolerance
+    return by_runs.choice.within_tolerance * float(by_runs.again.max()) / _run().tolerance
 
 
 CHECKS = {

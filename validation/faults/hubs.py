@@ -8,7 +8,7 @@ import numpy as np
 
 from models.engines.cut_vehicle import HubModel, build
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import CutVehicle
 from validation.common.checks import off
 from validation.faults.campaign import Campaign, Check, Fault
@@ -18,7 +18,7 @@ from validation.spatial.cars import by_jacobians, r19, static
 
 def _driven(hubs: np.ndarray) -> HubModel:
     """R19-free in MuJoCo with these wrenches (3, 6 h) on its hubs."""
-    return build("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
+    return build("mujoco", r19(), HubInputs(hubs), 1e-3, 1e-3)
 
 
 def _jacobians() -> float:
@@ -47,10 +47,10 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
     """Wrenches (rows, hubs, 6) changed where they are read, or read in another frame."""
 
     def table(real: Any) -> Any:
-        def made(vehicle: CutVehicle, drive: Drive, step: float) -> Any:
-            parts = drive.hubs.reshape(len(drive.hubs), -1, WRENCH)
+        def made(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
+            parts = hub_inputs.hubs.reshape(len(hub_inputs.hubs), -1, WRENCH)
             rows = parts if change is None else change(parts)
-            return real(vehicle, replace(drive, hubs=rows.reshape(drive.hubs.shape), frame=frame), step)
+            return real(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
 
         return made
 

@@ -14,7 +14,7 @@ from models.engines.cut_vehicle import PLAIN
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import cut_kernel as cut_at
 from models.multibody import forces as at
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.multibody.parts import FRAME, PER_PART
 from models.systems.handling.run import REFERENCE, build
 from models.vehicles.spatial import SpatialVehicle
@@ -23,7 +23,7 @@ from validation.common.checks import off
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.faults.tyres import ALL, tyre
-from validation.spatial.written_equations import STEP, cut_cars, cut_state, drives, rolling_cars, rolling_states
+from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_input_sets, rolling_cars, rolling_states
 
 BOUND = 1e-12
 
@@ -35,11 +35,13 @@ def _on_tyres(name: str = "twin") -> float:
     return off(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
 
 
-def _on_hubs(choose: Callable[[list[Drive]], Drive]) -> float:
+def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
     """Accelerations of the cut twin in MuJoCo and by the plain equations."""
     vehicle = cut_cars()["twin"]
-    drive, (q, v) = choose(drives(vehicle)), cut_state(vehicle, 3)
-    return off(*(hub_model(engine, vehicle, drive, STEP, STEP).acceleration(0.0, q, v) for engine in ("mujoco", PLAIN)))
+    hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
+    return off(
+        *(hub_model(engine, vehicle, hub_inputs, STEP, STEP).acceleration(0.0, q, v) for engine in ("mujoco", PLAIN))
+    )
 
 
 CHECKS = {
@@ -85,10 +87,10 @@ def _waves(real: Any) -> Any:
 def _sample(real: Any) -> Any:
     """A road is read 0.1 mm higher under the first hub."""
 
-    def made(vehicle: Any, drive: Drive, step: float) -> np.ndarray:
-        hubs = drive.hubs.copy()
+    def made(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
+        hubs = hub_inputs.hubs.copy()
         hubs[:, 0] += 1e-4
-        return np.asarray(real(vehicle, replace(drive, hubs=hubs), step))
+        return np.asarray(real(vehicle, replace(hub_inputs, hubs=hubs), step))
 
     return made
 

@@ -71,23 +71,23 @@ def static_forces(
     return Sampled(carried + noise * np.random.default_rng(seed).standard_normal((count, 2)), period, held)
 
 
-def settings(engine: str, step: float, duration: float, integrator: str = "", **other: float) -> Settings:
+def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
     """Settings with the recommended integrator unless another is named."""
-    return Settings(integrator or RECOMMENDED[engine], step, duration, **other)
+    return Settings(integrator or RECOMMENDED[engine], step, duration, **options)
 
 
 def run(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
+    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
     """A run as a user gets it: refused where it must be."""
-    return build(engine, assembly, settings(engine, step, duration, integrator, **other)).run()
+    return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
 
 
 def unchecked(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
+    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
     """Run a model without the checks before a run, so that only the guard after it stands."""
-    engine_settings = settings(engine, step, duration, integrator, **other)
+    engine_settings = settings(engine, step, duration, integrator, **options)
     return build_unchecked(engine, assembly, engine_settings).run()
 
 

@@ -138,9 +138,9 @@ def _vehicle(name: str) -> CutVehicle:
     return cut(vehicles[name], "body")
 
 
-def _sprung(whole: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
-    springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in whole.springs)
-    return replace(whole, springs=springs)
+def _sprung(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
+    springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in vehicle.springs)
+    return replace(vehicle, springs=springs)
 
 
 def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:

@@ -33,7 +33,7 @@ from models.multibody.cut_kernel import (
     parts,
     set_joint_forces,
 )
-from models.multibody.cut_table import Drive, table
+from models.multibody.cut_table import HubInputs, table
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as pitch_plane_scene
 from models.vehicles.cut_vehicle import CutVehicle, Element
@@ -124,7 +124,7 @@ def _numbers(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     ]
     tyres = [_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
     whole = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
-    numbers = table(whole, Drive(np.zeros((3, 0))), STEP)
+    numbers = table(whole, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
     for row, tyre in zip(rows[len(springs) :], vehicle.tyres, strict=True):

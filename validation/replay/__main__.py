@@ -52,8 +52,8 @@ def _check(given: argparse.Namespace) -> int:
             print(f"{job.name}: was not recorded")
             continue
         told = difference(before, now, given.bound, renamed)
-        counts["differ" if told.wrong else "other words" if told.other else "same"] += 1
-        for text in (told.wrong or told.other)[:5]:
+        counts["differ" if told.wrong else "other words" if told.tolerated else "same"] += 1
+        for text in (told.wrong or told.tolerated)[:5]:
             print(f"{job.name}: {'DIFFERS: ' if told.wrong else ''}{text}", flush=True)
     print(", ".join(f"{count} {what}" for what, count in counts.items()))
     return 1 if counts["differ"] else 0

@@ -181,11 +181,11 @@ def load(folder: Path, name: str) -> CommandAnswer | None:
 
 @dataclass
 class Difference:
-    """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``other`` (messages, new channels) is
-    told."""
+    """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``tolerated`` (messages, new
+    channels) is told."""
 
     wrong: list[str] = field(default_factory=list)
-    other: list[str] = field(default_factory=list)
+    tolerated: list[str] = field(default_factory=list)
 
 
 def difference(before: CommandAnswer, now: CommandAnswer, bound: float, renamed: Mapping[str, str]) -> Difference:
@@ -198,7 +198,7 @@ def difference(before: CommandAnswer, now: CommandAnswer, bound: float, renamed:
     if before.codes != now.codes:
         told.wrong.append(f"exit codes {before.codes} are {now.codes}: {now.message.strip()[-200:]}")
     if before.message != now.message:
-        told.other.append(f"message {before.message.strip()[:200]!r} is {now.message.strip()[:200]!r}")
+        told.tolerated.append(f"message {before.message.strip()[:200]!r} is {now.message.strip()[:200]!r}")
     matched = set()
     for name, array in before.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED):
@@ -208,8 +208,8 @@ def difference(before: CommandAnswer, now: CommandAnswer, bound: float, renamed:
             continue
         matched.add(later)
         if text := _changed(array, now.arrays[later], bound):
-            (told.other if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
-    told.other += [f"{name} is new" for name in now.arrays if name not in matched]
+            (told.tolerated if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
+    told.tolerated += [f"{name} is new" for name in now.arrays if name not in matched]
     return told
 
 

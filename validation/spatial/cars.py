@@ -11,7 +11,7 @@ from models.engines.cut_vehicle import HubModel
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.multibody import forces as at
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.multibody.numbers import Handling
 from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import CutVehicle, cut
@@ -64,11 +64,11 @@ def rough_car() -> CutVehicle:
     return cut(replace(whole, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
-def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:
+def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
     """Hub forces that carry the vehicle at rest."""
     forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
-    return Drive(forces, frame)
+    return HubInputs(forces, frame)
 
 
 def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -79,12 +79,12 @@ def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
+def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
     """A row of six random components per hub, with a stabiliser or without."""
     rng = np.random.default_rng(SEED)
-    drive = static(vehicle, 3, frame)
-    hubs = drive.hubs + rng.normal(0, 500.0, drive.hubs.shape[1])
-    return replace(drive, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+    hub_inputs = static(vehicle, 3, frame)
+    hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
+    return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
 
 
 def by_jacobians(built: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
@@ -95,7 +95,7 @@ def by_jacobians(built: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: st
     data.qpos[:] = q
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    for tyre, wrench in zip(built.vehicle.whole.tyres, wrenches.reshape(-1, 2, 3), strict=True):
+    for tyre, wrench in zip(built.vehicle.uncut.tyres, wrenches.reshape(-1, 2, 3), strict=True):
         body = int(model.body(str(names.index(tyre.body))).id)
         force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
         mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)

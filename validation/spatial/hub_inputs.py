@@ -10,7 +10,7 @@ import numpy as np
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import ENGINES, FIXED, PLAIN, HubModel
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.multibody.plain.motion import PLACE, Bodies
 from models.systems.hub_forces.measurement import HubForces
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -82,7 +82,7 @@ def samples(vehicle: CutVehicle) -> HubForces:
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
     """Largest distance (m) along any axis of the centre of mass from its closed form, from sample to sample."""
     forces, how = samples(vehicle), settings(integrator)
-    run = HubModel(engine, vehicle, forces.drive(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
+    run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
     moved = centres(vehicle, run.positions[::EVERY])
     return float(np.abs(moved - moved[0] - _fallen(vehicle, forces, interpolation == "held")).max())
 
@@ -95,12 +95,12 @@ def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
     return np.array([np.average(each, axis=0, weights=masses) for each in places])
 
 
-def _fallen(vehicle: CutVehicle, forces: HubForces, held: bool) -> np.ndarray:
+def _fallen(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
     """Path (samples, 3) of a point of the vehicle's mass under its weight and the sum of all forces, from rest."""
     mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
     hubs = forces.samples.reshape(SAMPLES, -1, WRENCH)[:, :, :3].sum(axis=1)
     begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
-    end = begin if held else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
+    end = begin if hold_samples else hubs[1:] / mass - [0.0, 0.0, GRAVITY]
     speeds = np.vstack([np.zeros(3), np.cumsum(period / 2.0 * (begin + end), axis=0)])
     steps = period * speeds[:-1] + period**2 / 6.0 * (2.0 * begin + end)
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
@@ -112,9 +112,9 @@ def instants_gap(vehicle: CutVehicle, count: int) -> float:
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
     for i in range(count):
         hubs = static(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
-        drive = Drive(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
+        hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         how = Settings("DOP853", STEP, (rows // 2) * STEP)
-        compiled, plain = (HubModel(engine, vehicle, drive, how) for engine in ("reference", PLAIN))
+        compiled, plain = (HubModel(engine, vehicle, hub_inputs, how) for engine in ("reference", PLAIN))
         state, time = anywhere(vehicle, i), rng.uniform(0.0, how.duration)
         expected = plain.acceleration(time, *state)
         gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()
@@ -127,6 +127,6 @@ def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
     4 in an eighth of the step, of forces that are linear between their samples."""
     forces, how = samples(vehicle), settings(integrator)
     fine = Settings(FIXED, STEP / 8.0, how.duration)
-    drive, finer = (forces.drive(each.step, each.steps) for each in (how, fine))
-    run, truth = HubModel(engine, vehicle, drive, how).run(), HubModel("reference", vehicle, finer, fine).run()
+    hub_inputs, finer = (forces.hub_inputs(each.step, each.steps) for each in (how, fine))
+    run, truth = HubModel(engine, vehicle, hub_inputs, how).run(), HubModel("reference", vehicle, finer, fine).run()
     return float(np.abs(run.states - truth.states[::8]).max())

@@ -41,7 +41,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
     loaded, container = _Loaded(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
     mbs: Any = container.AddSystem()
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
-    for body in vehicle.whole.bodies:
+    for body in vehicle.uncut.bodies:
         i, (a, b, c) = loaded.ids[body.name], np.array(body.inertia, float) + 1e-6 * np.eye(3)
         place = [*loaded.data.xpos[i], *RotationMatrix2EulerParameters(loaded.data.xmat[i].reshape(3, 3))]
         node = mbs.AddNode(items.NodeRigidBodyEP(referenceCoordinates=place))
@@ -52,9 +52,9 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
         loads = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
         for kind, load in zip((items.LoadForceVector, items.LoadTorqueVector), loads, strict=True):
             mbs.AddLoad(kind(markerNumber=centres[body.name], loadVector=load.tolist()))
-    for body in (vehicle.whole.body(name) for name in guided(vehicle)):
+    for body in (vehicle.uncut.body(name) for name in guided(vehicle)):
         assert body.parent is not None
-        arm = np.subtract(body.position, vehicle.whole.body(body.parent).position)
+        arm = np.subtract(body.position, vehicle.uncut.body(body.parent).position)
         seat = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.parent], localPosition=arm.tolist()))
         joint = mbs.AddObject(
             items.ObjectJointGeneric(
@@ -113,7 +113,7 @@ class _Loaded:
         self.data.xfrc_applied[number, 3:] += moment + np.cross(place - self.data.xpos[number], force)
 
     def _load_hubs(self, wrenches: np.ndarray) -> None:
-        for tyre, wrench in zip(self.vehicle.whole.tyres, wrenches, strict=True):
+        for tyre, wrench in zip(self.vehicle.uncut.tyres, wrenches, strict=True):
             turn = self.data.xmat[self.ids[tyre.body]].reshape(3, 3)
             place, _ = self._point(tyre.body, np.array(tyre.point))
             self._add(tyre.body, place, turn @ wrench[:3], turn @ wrench[3:])

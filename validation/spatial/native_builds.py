@@ -6,7 +6,7 @@ import numpy as np
 
 from models.engines.cut_vehicle import HubModel, Route, build
 from models.engines.spatial_reference import SpatialReference
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from validation.spatial.cars import static
 
@@ -24,7 +24,7 @@ def random_states(vehicle: CutVehicle, count: int) -> list[State]:
     return [(most * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(count)]
 
 
-def shaken_drive(vehicle: CutVehicle, rows: int) -> Drive:
+def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
     """Static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
     rest = static(vehicle, rows)
     return replace(rest, hubs=rest.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, rest.hubs.shape))
@@ -44,7 +44,7 @@ def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) ->
 def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
     """Largest relative difference between accelerations by compiled forces and by ``SpatialReference``, which share no
     code, without hub forces."""
-    still = Drive(0.0 * static(vehicle, 3).hubs)
+    still = HubInputs(0.0 * static(vehicle, 3).hubs)
     compiled, equations = build("reference", vehicle, still, STEP, STEP), written(vehicle)
     paths = [
         [compiled.acceleration(0.0, *state) for state in states],
@@ -55,7 +55,7 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
 
 def written(vehicle: CutVehicle) -> SpatialReference:
     """Equations of a cut vehicle without hub forces: its tree with springs and bars, preloads and weight."""
-    whole = vehicle.whole
+    whole = vehicle.uncut
     equations = SpatialReference(replace(vehicle.tree, springs=whole.springs, bars=whole.bars, gravity=0.0))
     equations.vehicle = replace(equations.vehicle, gravity=GRAVITY)
     equations.held = equations.held._replace(parts={element.name: element.held for element in vehicle.elements})

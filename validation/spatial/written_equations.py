@@ -13,7 +13,7 @@ from models.engines.assembly import Settings
 from models.engines.cut_vehicle import PLAIN
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.multibody.plain.bristles import Patch
 from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
@@ -116,14 +116,14 @@ def cut_cars() -> dict[str, CutVehicle]:
     return {"r19_free": cut(load_vehicle("r19_free"), "body"), "twin": cut(twin().with_tyres(pushes_only=True), "body")}
 
 
-def drives(vehicle: CutVehicle) -> list[Drive]:
+def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
     """Six components at every hub in each frame, with no guide, pulled and enforced; and a road."""
     rng, rows = np.random.default_rng(SEED), static(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
-    wrenches = [Drive(hubs, frame, guide=held) for frame in FRAMES for held in (None, guide)]
-    road = Drive(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
-    return [*wrenches, Drive(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
+    wrenches = [HubInputs(hubs, frame, guide=held) for frame in FRAMES for held in (None, guide)]
+    road = HubInputs(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
+    return [*wrenches, HubInputs(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
 
 
 def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -136,10 +136,10 @@ def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
     """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
-    worst, all_drives = 0.0, drives(vehicle)
-    for i, drive in enumerate(all_drives):
-        models = [hub_model(name, vehicle, drive, STEP, STEP) for name in (engine, PLAIN)]
-        for seed in range(i, count, len(all_drives)):
+    worst, input_sets = 0.0, hub_input_sets(vehicle)
+    for i, hub_inputs in enumerate(input_sets):
+        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in (engine, PLAIN)]
+        for seed in range(i, count, len(input_sets)):
             q, v = cut_state(vehicle, seed)
             time = 0.5 * STEP * (seed % 3)
             worst = max(worst, off(*(model.acceleration(time, q, v) for model in models)))
@@ -149,8 +149,8 @@ def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
 def inside_gap(vehicle: CutVehicle, count: int) -> float:
     """Largest difference of section forces, hub wrenches and holding moments, each by its largest value."""
     worst = 0.0
-    for drive in drives(vehicle):
-        models = [hub_model(name, vehicle, drive, STEP, STEP) for name in ("reference", PLAIN)]
+    for hub_inputs in hub_input_sets(vehicle):
+        models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN)]
         states = np.array([np.concatenate(cut_state(vehicle, seed)) for seed in range(count)])
         ours, theirs = (model.reported(0.5 * STEP * np.arange(count), states) for model in models)
         for name in ("elements", "wrenches", "moments"):
@@ -164,11 +164,13 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool)
     steps = round(duration / STEP)
     if rough:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
-        drive = two_tracks(vehicle, left, right, SPEED, STEP, steps)
+        hub_inputs = two_tracks(vehicle, left, right, SPEED, STEP, steps)
     else:
         deviation = np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs))
-        drive = HubForces(static(vehicle, steps + 1).hubs, STEP, "hub").noisy(deviation, SEED).drive(STEP, steps)
-    paths = [hub_model(name, vehicle, drive, STEP, duration).run().states for name in (engine, PLAIN)]
+        hub_inputs = (
+            HubForces(static(vehicle, steps + 1).hubs, STEP, "hub").noisy(deviation, SEED).hub_inputs(STEP, steps)
+        )
+    paths = [hub_model(name, vehicle, hub_inputs, STEP, duration).run().states for name in (engine, PLAIN)]
     return float(np.abs(paths[0] - paths[1]).max())
 
 

@@ -53,7 +53,7 @@ class Choice:
     """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
 
     predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
-    add so much to that, where quantities are means of samples; kept : each sum of both is within the tolerance. calls
+    add so much to that, where quantities are means of samples; within_tolerance : whether each sum of both is. calls
     and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
     scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
     where chance alone stands in nothing's way. ended : the search was, before all that might go was tried. barred : by
@@ -67,7 +67,7 @@ class Choice:
     remainder: np.ndarray
     confirmed: np.ndarray
     chance: np.ndarray
-    kept: bool
+    within_tolerance: bool
     calls: tuple[int, ...]
     seconds: tuple[float, ...]
     rounds: int
@@ -187,11 +187,11 @@ class Chooser:
         """Whether all changes are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
-    def better(self, further: Set, kept: Set) -> bool:
+    def better(self, further: Set, current: Set) -> bool:
         """Whether it holds to leave these out, and takes less work than what is kept does at the steps that hold."""
         if not self.holds(self.confirm(further)):
             return False
-        work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, kept)]
+        work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, current)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
@@ -287,9 +287,9 @@ class Chooser:
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
+    def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
         """The path that goes on from a kept one, step by step, as far as predictions allow."""
-        path = list(kept)
+        path = list(start)
         while True:
             step = self._next(path[-1], banned, [frozenset([effect]) for effect in self.effects])
             step = step or self._next(path[-1], banned, self._promising())

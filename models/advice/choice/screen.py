@@ -30,7 +30,7 @@ class Screen:
         self.variants, self.quantities = variants, quantities
         full = variants.of()
         if full is None:  # tells why
-            full = variants.system.answer(variants.scene, variants.engine)
+            full = variants.system.computed_quantities(variants.scene, variants.engine)
         quantities_by_name = {name: full.of(name, variants.scene.file) for name in quantities}
         self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
         self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}

@@ -94,7 +94,7 @@ class Variants:
 
     def _run(self, left_out: Set, times: int) -> Answer | None:
         try:
-            answer: Answer = self.system.answer(self.changed(left_out, times), self.engine)
+            answer: Answer = self.system.computed_quantities(self.changed(left_out, times), self.engine)
         except (InputError, RunFailed):
             return None
         return answer
@@ -111,7 +111,7 @@ class Variants:
         estimates."""
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
-            self.system.answer(self.changed(left_out, times), self.engine, error=True)
+            self.system.computed_quantities(self.changed(left_out, times), self.engine, error=True)
         return results
 
     def changed(self, left_out: Set, times: int = 1) -> Any:

@@ -90,14 +90,17 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     variants = all_of_it.window(STEPS)
     short, names = variants.scene, (*variants.effects, *variants.absent)
     with breaches() as broken_alone:
-        base: Answer = system.answer(short, engine)
-    runs: dict[str, Callable[[], Answer]] = {"": partial(system.answer, short, engine)}
+        base: Answer = system.computed_quantities(short, engine)
+    runs: dict[str, Callable[[], Answer]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
             other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
             with breaches() as others:
-                first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
+                first[name], runs[name] = (
+                    system.computed_quantities(other, engine),
+                    partial(system.computed_quantities, other, engine),
+                )
             without, beside = (others, broken_alone) if name in variants.effects else (broken_alone, others)
             keeps[name] = tuple(assumption.says for key, assumption in without.items() if key not in beside)
         except (InputError, RunFailed) as error:

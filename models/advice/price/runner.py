@@ -293,8 +293,8 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measure
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
         attempt(problem, first)  # imports and compiled code are loaded before anything is timed
     once = measured(problem, [attempt(problem, setting) for setting in settings])
-    again = _timed(problem, once.racing(), rounds, least)
-    return replace(once, points=[again.get(p.setting, p) for p in once.points])
+    rerun = _timed(problem, once.racing(), rounds, least)
+    return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
 def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:

@@ -47,6 +47,10 @@ def activity(full_scene: FullScene) -> dict[str, float]:
     for bar in vehicle.bars:
         risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
         elastic(bar.name, bar.stiffness, bar.damping, motion.coordinate(bar.body, "rx") - risen / bar.track)
+    for element in vehicle.joint_elements:
+        places = zip(element.coordinates, element.factors, strict=True)
+        along = sum(factor * motion.coordinate(*place) for place, factor in places)
+        elastic(element.name, element.stiffness, element.damping, np.asarray(along))
     heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *full_scene.excitation.heights])
     for tyre, height in zip(vehicle.tyres, heights, strict=True):
         row = motion.shift(tyre.body, tyre.point)[2]

@@ -52,20 +52,20 @@ class Candidates:
         self.scene, self.tolerance, self.effects = scene, tolerance, effects_of(scene)
         self.answers: dict[tuple[Any, ...], Any] = {}
         self.vehicles, self.solved_equations = Vehicles(scene.vehicle, float(speeds[0])), 0
-        self.wholes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
-        names = self.wholes[0].full.system.names
+        self.full_scenes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
+        names = self.full_scenes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
         few = min(SCREENED, len(speeds))
-        self.screened = [self.wholes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
+        self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
         self._suspects, self.full = list(self.screened), list[np.ndarray]()
-        for whole in self.wholes:
-            variances, silent = whole_variances(whole.full, self.rows)
+        for full_scene in self.full_scenes:
+            variances, silent = whole_variances(full_scene.full, self.rows)
             self.full.append(variances)
             for name, variance, least in zip(quantities, variances, silent, strict=True):
                 if not least < variance < inf:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
-        Screen(self.wholes[0].full, self.rows)  # refuses a vehicle that cannot be screened
+        Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
         plain = [self._plain(name) for name in quantities]
         self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
@@ -92,22 +92,22 @@ class Candidates:
         return without(self.scene, sorted(chosen, key=lambda effect: effect.name))
 
     @remembered
-    def system(self, whole: FullScene, chosen: Set) -> Reduced | None:
+    def system(self, full_scene: FullScene, chosen: Set) -> Reduced | None:
         """The scene less these effects at a speed; None where nothing sensible is left."""
         try:
-            return whole.reduced(self.rest(chosen))
+            return full_scene.reduced(self.rest(chosen))
         except InputError:
             return None
 
-    def screen(self, whole: FullScene, chosen: Set) -> Screen | None:
+    def screen(self, full_scene: FullScene, chosen: Set) -> Screen | None:
         """Covariance and adjoints of the scene less the singular ones of these effects."""
         base = frozenset(effect for effect in chosen if effect.singular)
         needs = {name for effect in base for name in effect.needs}
-        return self._screen(whole, base | {effect for effect in chosen if effect.name in needs})
+        return self._screen(full_scene, base | {effect for effect in chosen if effect.name in needs})
 
     @remembered
-    def _screen(self, whole: FullScene, base: Set) -> Screen | None:
-        reduced = self.system(whole, base)
+    def _screen(self, full_scene: FullScene, base: Set) -> Screen | None:
+        reduced = self.system(full_scene, base)
         self.solved_equations += 1 + len(self.rows)
         try:
             return None if reduced is None else Screen(reduced, self.rows)
@@ -117,17 +117,17 @@ class Candidates:
     @remembered
     def predicted(self, chosen: Set) -> np.ndarray:
         """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
-        return largest(np.array([self._predicted_at(whole, chosen) for whole in self.screened]))
+        return largest(np.array([self._predicted_at(full_scene, chosen) for full_scene in self.screened]))
 
     @remembered
-    def _predicted_at(self, whole: FullScene, chosen: Set) -> np.ndarray:
-        return self._change(whole, chosen, self._predict)
+    def _predicted_at(self, full_scene: FullScene, chosen: Set) -> np.ndarray:
+        return self._change(full_scene, chosen, self._predict)
 
     def share(self, chosen: Set) -> float:
         """Largest predicted change by the tolerance; inf beyond it, by whichever speed shows so first."""
         worst = 0.0
-        for i, whole in enumerate(self._suspects):
-            share = float(abs(self._predicted_at(whole, chosen)).max()) / self.tolerance
+        for i, full_scene in enumerate(self._suspects):
+            share = float(abs(self._predicted_at(full_scene, chosen)).max()) / self.tolerance
             if not share <= 1.0:
                 self._suspects.insert(0, self._suspects.pop(i))  # what breaks it here is likely to break the next one
                 return inf
@@ -137,20 +137,20 @@ class Candidates:
     @remembered
     def confirm(self, chosen: Set) -> np.ndarray:
         """The same by the exact solve, of all listed speeds."""
-        return largest(np.array([self._change(whole, chosen, self._confirm) for whole in self.wholes]))
+        return largest(np.array([self._change(full_scene, chosen, self._confirm) for full_scene in self.full_scenes]))
 
     @remembered
     def solved(self, chosen: Set) -> np.ndarray:
         """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
-        return largest(np.array([self._change(whole, chosen, self._solve) for whole in self.wholes]))
+        return largest(np.array([self._change(full_scene, chosen, self._solve) for full_scene in self.full_scenes]))
 
     def certified(self, chosen: Set) -> bool:
         """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
         what the motions said of them."""
-        return all(self._exact(whole, chosen) for whole in self.screened)
+        return all(self._exact(full_scene, chosen) for full_scene in self.screened)
 
-    def _exact(self, whole: FullScene, chosen: Set) -> bool:
-        screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
+    def _exact(self, full_scene: FullScene, chosen: Set) -> bool:
+        screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, chosen)
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
@@ -159,33 +159,33 @@ class Candidates:
         same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= SAME).all())
         return same and bool((abs(two / variance - 1.0) <= CERTAIN).all())
 
-    def _predict(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
-        screen = self.screen(whole, chosen)
+    def _predict(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+        screen = self.screen(full_scene, chosen)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
-    def _confirm(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+    def _confirm(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         return confirmed(reduced, self.rows)
 
-    def _solve(self, whole: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+    def _solve(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         variances = solved_in_motions(reduced, self.rows)
         return confirmed(reduced, self.rows) if variances is None else variances
 
     def _change(
-        self, whole: FullScene, chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
+        self, full_scene: FullScene, chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
     ) -> np.ndarray:
         """Changes (quantities,) at a speed; inf where there is no system, or an unstable one."""
-        reduced, full = self.system(whole, chosen), self.full[self.wholes.index(whole)]
+        reduced, full = self.system(full_scene, chosen), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
         with suppress(InputError):  # unstable
-            left = left if reduced is None else variances(whole, chosen, reduced)
+            left = left if reduced is None else variances(full_scene, chosen, reduced)
         return np.asarray(np.sqrt(left / full) - 1.0)
 
     @remembered
     def between(self, chosen: Set) -> np.ndarray:
         """Changes (quantities,) of the worst speed of the range; inf where there is no system."""
-        reduced = self.system(self.wholes[0], chosen)
+        reduced = self.system(self.full_scenes[0], chosen)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
         return largest(self.near.changes(self.rest(chosen)))
@@ -210,12 +210,12 @@ class Candidates:
         """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
         rest = self.rest(chosen)
         alike = of_speed(rest.vehicle, 0.0) is None
-        costs = [self._cost(whole, rest) for whole in (self.screened[:1] if alike else self.screened)]
+        costs = [self._cost(full_scene, rest) for full_scene in (self.screened[:1] if alike else self.screened)]
         return max(costs, key=lambda c: c.calls)
 
-    def _cost(self, whole: FullScene, rest: ReducedScene) -> Cost:
+    def _cost(self, full_scene: FullScene, rest: ReducedScene) -> Cost:
         try:
-            return cost(whole.vehicles.of(rest, whole.speed), whole.road(rest))
+            return cost(full_scene.vehicles.of(rest, full_scene.speed), full_scene.road(rest))
         except InputError:
             return Cost(0, 0.0, inf)
 
@@ -226,13 +226,16 @@ class Candidates:
 
     def exact(self) -> list[np.ndarray]:
         """Standard deviations (quantities,) of the whole scene at the screened speeds."""
-        return [np.sqrt(self.full[self.wholes.index(whole)]) for whole in self.screened]
+        return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 
     def marches(self, chosen: Set) -> list[March]:
         """Runs at the screened speeds."""
         weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
         rest = self.rest(chosen)
-        return [March(whole.reduced(rest), whole.speed, tuple(self.rows), weightings) for whole in self.screened]
+        return [
+            March(full_scene.reduced(rest), full_scene.speed, tuple(self.rows), weightings)
+            for full_scene in self.screened
+        ]
 
     def at_step(self, chosen: Set, step: float) -> Cost:
         """Cost of runs in steps (s)."""

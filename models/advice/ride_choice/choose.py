@@ -46,7 +46,7 @@ class RideChoice:
     """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
 
     predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
-    off : there with parameters that are off, where that is worst; kept : all of them within the tolerance.
+    off : there with parameters that are off, where that is worst; within_tolerance : whether all of them are.
     before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, which no accuracy bounds.
     rounds : choices that were confirmed. said : why promising effects were not left out.
     """
@@ -57,7 +57,7 @@ class RideChoice:
     confirmed: np.ndarray
     between: np.ndarray
     off: np.ndarray
-    kept: bool
+    within_tolerance: bool
     before: Cost
     after: Cost
     stable: tuple[float, float]
@@ -79,7 +79,7 @@ class Chooser(Candidates):
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
-    def kept(self, chosen: Set) -> bool:
+    def within_tolerance(self, chosen: Set) -> bool:
         """Whether the tolerance holds without these effects, wherever and whatever of them is left out."""
         if not chosen:
             return True
@@ -155,14 +155,14 @@ class Chooser(Candidates):
             if path == kept:
                 break
             rounds += 1
-            if self.kept(path[-1]):
+            if self.within_tolerance(path[-1]):
                 kept = path
                 continue
             low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
                 rounds += 1
-                low, high = (middle, high) if self.kept(path[middle]) else (low, middle)
+                low, high = (middle, high) if self.within_tolerance(path[middle]) else (low, middle)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
         return kept[-1], rounds
@@ -177,7 +177,7 @@ class Chooser(Candidates):
                 continue  # it alone bounds the step
             same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)
             same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH)
-            if same and self.kept(less):
+            if same and self.within_tolerance(less):
                 return self._worthwhile(less)
         return chosen
 
@@ -191,12 +191,12 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
+    def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
         """The path that goes on from a kept one, step by step, as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
-        path = list(kept)
+        path = list(start)
         while step := self._best(path[-1], banned, self._calls_saved) or self._best(path[-1], banned, self._work_saved):
             path.append(path[-1] | step)
         return path

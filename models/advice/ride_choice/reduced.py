@@ -81,10 +81,10 @@ class Reduced:
 class Vehicles:
     """What is left of a vehicle, made once: every choice keeps those that it has asked for."""
 
-    def __init__(self, whole: SpatialVehicle, speed: float) -> None:
+    def __init__(self, full_vehicle: SpatialVehicle, speed: float) -> None:
         self._made: dict[Hashable, ReducedVehicle] = {}
         self._linear: dict[Hashable, LinearVehicle] = {}
-        self.mass = self.linear(whole, speed).mass
+        self.mass = self.linear(full_vehicle, speed).mass
 
     def __len__(self) -> int:
         return len(self._made)
@@ -178,17 +178,17 @@ def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
 
 
 def _of_road(
-    scene: ReducedScene, whole: Excitation, less: ReducedScene, rest: Excitation
+    scene: ReducedScene, full: Excitation, less: ReducedScene, rest: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
-    count, cutoff = whole.G.shape[1], scene.ride.road.cutoff
+    count, cutoff = full.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
     if cutoff is not None and less.ride.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
-    added = np.eye(len(whole.F) - len(onto), len(rest.F) - len(back))
+    added = np.eye(len(full.F) - len(onto), len(rest.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)
-    axles = len(whole.heights)
+    axles = len(full.heights)
     if len(rest.heights) == axles:
         return np.kron(np.eye(axles), onto), np.kron(np.eye(axles), back)
     return np.kron(np.ones((axles, 1)), onto), np.kron(np.eye(axles)[:1], back)

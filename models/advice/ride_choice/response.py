@@ -26,7 +26,10 @@ class Read(NamedTuple):
     def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "Read":
         """Outputs of these rows."""
         read, at = vehicle.read, list(rows)
-        return cls((read.displacement[at], read.rate[at], read.acceleration[at]), (read.road[at], read.road_rate[at]))
+        return cls(
+            (read.displacement_factors[at], read.rate_factors[at], read.acceleration_factors[at]),
+            (read.road_factors[at], read.road_rate_factors[at]),
+        )
 
 
 class Response:

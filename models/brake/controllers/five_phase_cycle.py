@@ -39,10 +39,10 @@ class WheelState(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """A wheel by its radius (m) and inertia (kg m^2), its brake (of one wheel) and the tyre's grip, at a speed (m/s)
-    that stays: for compiled functions."""
+    """A wheel of a vehicle at a constant speed (m/s): its radius (m) and inertia (kg m^2), the brake (of one wheel) and
+    the grip of its tyre, as compiled functions take them."""
 
-    speed: float
+    vehicle_speed: float
     radius: float
     inertia: float
     brakes: Brakes
@@ -94,7 +94,7 @@ class Frozen:
 def rim(state, driven):
     """Acceleration (m/s^2) of the wheel's rim."""
     radius, inertia = driven.radius, driven.inertia
-    slip = min(max(1.0 - radius * state.turning / driven.speed, 0.0), 1.0)
+    slip = min(max(1.0 - radius * state.turning / driven.vehicle_speed, 0.0), 1.0)
     k, share = place(driven.grip.slips, slip)
     low, high = node_force(k, driven.grip), node_force(k + 1, driven.grip)
     return radius * (radius * (low + share * (high - low)) - state.torque) / inertia
@@ -105,7 +105,7 @@ def go_on(state, rate, time, driven):
     """The state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
     pressure = max(state.pressure + rate * time, 0.0)
     after = torque(0, pressure, state.torque, driven.brakes)
-    drive = StepInput(driven.speed, driven.speed, state.torque, after, time)
+    drive = StepInput(driven.vehicle_speed, driven.vehicle_speed, state.torque, after, time)
     rolled = wheel_step(drive, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
     return WheelState(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 

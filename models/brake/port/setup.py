@@ -36,7 +36,9 @@ class PortTable(Strict):
     of what computes it."""
 
     callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
-    parameters: dict[str, Any] = Field(default_factory=dict, description="of the callable")
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="keyword arguments with which the callable is made"
+    )
     command: list[str] | None = Field(default=None, min_length=1, description="starts a process that connects")
     port: int | None = Field(default=None, ge=1, le=65535, description="of this machine, at which a process connects")
     fmu: str | None = Field(default=None, description="an FMU file, FMI 2 co-simulation")

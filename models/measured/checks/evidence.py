@@ -56,8 +56,8 @@ class Evidence:
         """Where a signal is measured; None where neither the scene nor the vehicle says."""
         if signal.at in self.places or self.vehicle is None:
             return self.places.get(signal.at)
-        bodies = {body.name: body for body in self.vehicle.whole.bodies}
-        bodies |= {tyre.name: bodies[tyre.body] for tyre in self.vehicle.whole.tyres}
+        bodies = {body.name: body for body in self.vehicle.uncut.bodies}
+        bodies |= {tyre.name: bodies[tyre.body] for tyre in self.vehicle.uncut.tyres}
         body = bodies.get(signal.at)
         return TransducerPlace(body.name, body.position) if body else None
 

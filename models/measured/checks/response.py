@@ -11,7 +11,7 @@ import numpy as np
 from models.engines.cut_vehicle import HubModel, build
 from models.measured.signal import Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial_linear import Kinematics
 
@@ -69,4 +69,4 @@ def _built(vehicle: CutVehicle, frame: str) -> HubModel:
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads
     rows[1:] += PUSH * np.eye(hubs)
-    return build("reference", vehicle, Drive(rows, frame), STEP, STEP * (hubs // 2))
+    return build("reference", vehicle, HubInputs(rows, frame), STEP, STEP * (hubs // 2))

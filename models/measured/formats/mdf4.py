@@ -106,12 +106,12 @@ def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> 
     return times[:count], np.column_stack(values)[:count]
 
 
-def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
+def _values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
     """Physical values (n,) of one channel in some records, NaN where they are marked as invalid.
 
     What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
     """
-    samples, invalid = mdf.get(group=group, index=index, data=part, samples_only=True, ignore_invalidation_bits=True)
+    samples, invalid = mdf.get(group=group, index=index, data=records, samples_only=True, ignore_invalidation_bits=True)
     values = np.asarray(samples, float)
     return values if invalid is None else np.where(np.asarray(invalid, bool), np.nan, values)
 

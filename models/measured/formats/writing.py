@@ -146,9 +146,12 @@ def _csv_header(group: ChannelGroup, start: datetime | None, comment: str) -> st
     lines += [f"samples: {group.count}"]
     for name, text in zip(group.names, group.comments, strict=True):
         lines += [f"channel {json.dumps(name, ensure_ascii=False)}: {line}" for line in text.splitlines()]
-    headings, names = io.StringIO(), [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)]
-    quoting: Literal[0, 1] = 1 if ";" in "".join(names) else 0  # of all: it would look like a separator
-    csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *names])
+    headings, channel_headings = (
+        io.StringIO(),
+        [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)],
+    )
+    quoting: Literal[0, 1] = 1 if ";" in "".join(channel_headings) else 0  # of all: it would look like a separator
+    csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *channel_headings])
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()
 
 

@@ -14,7 +14,7 @@ from models.multibody.plain.statics import held_at_rest
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL, CutVehicle
 
 if TYPE_CHECKING:
-    from models.multibody.cut_table import Drive
+    from models.multibody.cut_table import HubInputs
 
 LEANS = [ROLL, PITCH]
 WRENCH = 6
@@ -22,8 +22,8 @@ REPORTED = ("inside", "wrenches", "moments")
 
 
 class HubState(NamedTuple):
-    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the drive's frame, moments (2,) that
-    hold roll and pitch, at one state."""
+    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the frame of the hub inputs, moments (2,)
+    that hold roll and pitch, at one state."""
 
     acceleration: np.ndarray
     inside: np.ndarray
@@ -32,26 +32,26 @@ class HubState(NamedTuple):
 
 
 class PlainHubs:
-    """A driven cut vehicle; ``step`` (s) is that of the rows of its drive, two to a step.
+    """A driven cut vehicle; ``step`` (s) is that of the rows of its hub inputs, two to a step.
 
-    any_time : whether the drive is read between its rows, too, for methods that pick their own steps.
+    any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
 
-    def __init__(self, vehicle: CutVehicle, drive: "Drive", step: float, any_time: bool = False) -> None:
-        self.vehicle, self.drive, self.step, self.any_time = vehicle, drive, step, any_time
+    def __init__(self, vehicle: CutVehicle, hub_inputs: "HubInputs", step: float, any_time: bool = False) -> None:
+        self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, step, any_time
         self.bodies = Bodies(vehicle.tree)
-        self.parts = Parts(self.bodies, vehicle.whole, vehicle.chassis)
-        self.held, self.loads = held_at_rest(vehicle.whole, vehicle.chassis)
+        self.parts = Parts(self.bodies, vehicle.uncut, vehicle.chassis)
+        self.held, self.loads = held_at_rest(vehicle.uncut, vehicle.chassis)
         self._weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        tyres = vehicle.whole.tyres
+        tyres = vehicle.uncut.tyres
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
         self._chassis = self.bodies.row[vehicle.chassis]
-        sides = {force.name: force for force in vehicle.whole.side_forces}
+        sides = {force.name: force for force in vehicle.uncut.side_forces}
         self._sides = [
             (sides[t.name].stiffness, sides[t.name].roll_steer) if t.name in sides else (0.0, 0.0) for t in tyres
         ]
         frames = {"hub": self._hubs.rows, "body": np.full(len(tyres), self._chassis)}
-        self._frames = frames.get(drive.frame, np.full(len(tyres), GROUND))
+        self._frames = frames.get(hub_inputs.frame, np.full(len(tyres), GROUND))
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> HubState:
         """State, forces and accelerations at a time (s), coordinates and rates (n,)."""
@@ -68,10 +68,12 @@ class PlainHubs:
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Rows of the hubs and of the guide at a time (s): the nearest ones, or by differences of a step's three."""
-        last, place = len(self.drive.hubs) - 1, 2.0 * t / self.step
+        last, place = len(self.hub_inputs.hubs) - 1, 2.0 * t / self.step
         if not self.any_time:
             nearest = min(max(round(place), 0), last)
-            return self.drive.hubs[nearest], None if self.drive.guide is None else self.drive.guide[nearest]
+            return self.hub_inputs.hubs[nearest], None if self.hub_inputs.guide is None else self.hub_inputs.guide[
+                nearest
+            ]
         first = min(2 * int(max(place, 0.0) // 2), last - 2)
         part = min(max(place - first, 0.0), 2.0)
 
@@ -80,7 +82,7 @@ class PlainHubs:
             value: np.ndarray = rows[first] + part * slope + 0.5 * part * (part - 1.0) * bend
             return value
 
-        return between(self.drive.hubs), None if self.drive.guide is None else between(self.drive.guide)
+        return between(self.hub_inputs.hubs), None if self.hub_inputs.guide is None else between(self.hub_inputs.guide)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -92,11 +94,11 @@ class PlainHubs:
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
     def _act(self, motion: Motion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs by a row of the drive, and their wrenches (h, 6)."""
+        """Generalised forces (n,) of all hubs by a row of the hub inputs, and their wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
-            if self.drive.road:
+            if self.hub_inputs.road:
                 force, moment = self._tyre(i, point, motion, (hubs[i], hubs[len(points) + i]), q)
                 wrenches[i] = np.concatenate((force @ axes, moment @ axes))
             else:
@@ -109,7 +111,7 @@ class PlainHubs:
         self, i: int, hub: np.ndarray, motion: Motion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment (N m) in space at a hub by its tyre on a road of a height (m) and rate (m/s)."""
-        tyre, (cornering, roll_steer), speed = self.vehicle.whole.tyres[i], self._sides[i], self.drive.speed
+        tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
         height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
         spin = motion.axes(int(self._hubs.rows[i]))
@@ -126,16 +128,16 @@ class PlainHubs:
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""
-        drive, moments = self.drive, np.zeros(2)
+        hub_inputs, moments = self.hub_inputs, np.zeros(2)
         if guide is None:
             return np.linalg.solve(mass, force), moments
         wanted, rates, accelerations = guide.reshape(3, 2)
         off, late = wanted - q[LEANS], rates - v[LEANS]
-        if drive.pull:
-            moments = np.array(drive.pull[0::2]) * off + np.array(drive.pull[1::2]) * late
+        if hub_inputs.pull:
+            moments = np.array(hub_inputs.pull[0::2]) * off + np.array(hub_inputs.pull[1::2]) * late
             force[LEANS] += moments
             return np.linalg.solve(mass, force), moments
-        wanted = accelerations + 2.0 * drive.holding * late + drive.holding**2 * off
+        wanted = accelerations + 2.0 * hub_inputs.holding * late + hub_inputs.holding**2 * off
         picks = np.eye(len(force))[LEANS]
         system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
         both = np.linalg.solve(system, np.concatenate((force, wanted)))

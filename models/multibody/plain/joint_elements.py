@@ -14,20 +14,31 @@ Load = tuple[str, Vector, np.ndarray]
 """A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
 
 
+def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
+    """(e, n): what every joint element's d is made of, by the coordinates."""
+    rows = np.zeros((len(vehicle.joint_elements), bodies.size))
+    for row, element in zip(rows, vehicle.joint_elements, strict=True):
+        for place, factor in zip(element.coordinates, element.factors, strict=True):
+            row[bodies.index(*place)] += factor
+    return rows
+
+
+def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
+    """(4, e): stiffness, damping, preload and inertia of every joint element."""
+    numbers = [(e.stiffness, e.damping, e.held, e.inertia) for e in vehicle.joint_elements]
+    return np.array(numbers).reshape(-1, 4).T
+
+
 class PlainTree:
     """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
     def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, loads: Sequence[Load] = ()) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
-        self.size, elements = self.bodies.size, vehicle.joint_elements
+        self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])
-        self._rows = np.zeros((len(elements), self.size))
-        for row, element in zip(self._rows, elements, strict=True):
-            for place, factor in zip(element.coordinates, element.factors, strict=True):
-                row[self.bodies.index(*place)] += factor
-        numbers = [(e.stiffness, e.damping, e.held, e.inertia) for e in elements]
-        self._stiffness, self._damping, self._held, self._inertia = np.array(numbers).reshape(-1, 4).T
+        self._rows = joint_rows(self.bodies, vehicle)
+        self._stiffness, self._damping, self._held, self._inertia = joint_numbers(vehicle)
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n) and forces (n,), less what inertia asks without q'', at coordinates and rates (n,)."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
+from models.multibody.plain.joint_elements import joint_numbers, joint_rows
 from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
 from models.multibody.plain.parts import Parts
 from models.multibody.plain.road import driven, surface
@@ -86,7 +87,10 @@ class PlainRolling:
         self.handling, vehicle = handling, handling.vehicle
         self.bodies = Bodies(vehicle)
         self.parts = Parts(self.bodies, vehicle, CARRIER)
-        self.held, self.loads = held_at_rest(vehicle, CARRIER)
+        held, self.loads = held_at_rest(vehicle, CARRIER)
+        self.held, self._joint_held = np.split(held, [len(self.parts.names)])
+        self._joints = joint_rows(self.bodies, vehicle)
+        self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(vehicle)
         chassis = chassis_of(handling.given)
         self._carrier = self.bodies.row[CARRIER]
         self._middle = self.bodies.points([(chassis.name, chassis.position)])
@@ -130,11 +134,14 @@ class PlainRolling:
         spring, other = self.parts.forces(travels, self.held)
         by_tyres, report, ledger = self._roll(t, motion, v)
         outside, power = self._outside(t, motion)
-        force += by_tyres + outside - (spring + other) @ travels.gradient
-        energy = 0.5 * (self.held + spring) @ travels.travel
+        travel, rate = self._joints @ q, self._joints @ v
+        along, damped = self._joint_held + self._joint_stiffness * travel, self._joint_damping * rate
+        mass += self._joints.T * self._joint_inertia @ self._joints
+        force += by_tyres + outside - (spring + other) @ travels.gradient - (along + damped) @ self._joints
+        energy = 0.5 * ((self.held + spring) @ travels.travel + (self._joint_held + along) @ travel)
         whole = ledger._replace(
             potential=float(ledger.potential + energy),
-            dissipated=float(ledger.dissipated + power - other @ travels.rate),
+            dissipated=float(ledger.dissipated + power - other @ travels.rate - damped @ rate),
         )
         return State(np.linalg.solve(mass, force), report, whole)
 

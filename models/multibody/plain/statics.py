@@ -7,24 +7,28 @@ another way to the derivatives).
 
 import numpy as np
 
+from models.multibody.plain.joint_elements import joint_rows
 from models.multibody.plain.motion import FIRST, Bodies
 from models.multibody.plain.parts import Parts
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 
 
 def held_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Preloads (p,) of springs, then bars (N, N m; positive in compression), and loads (w,) of tyres (N)."""
+    """Preloads (p,) of springs, then bars, then joint elements (N, N m; positive in compression), and loads (w,) of
+    tyres (N)."""
     bodies = Bodies(vehicle)
     still = np.zeros(bodies.size)
     motion, parts = bodies.move(still, still), Parts(bodies, vehicle, frame)
     risen = motion.at(bodies.points([(tyre.body, tyre.point) for tyre in vehicle.tyres]))[:, FIRST:, 2]
-    rows = np.vstack([parts.travels(motion, still, still).gradient, risen])
+    rows = np.vstack([parts.travels(motion, still, still).gradient, joint_rows(bodies, vehicle), risen])
     springs = [_stiffness_at_rest(spring) for spring in vehicle.springs]
-    stiffness = np.array([*springs, *(bar.stiffness for bar in vehicle.bars), *(t.stiffness for t in vehicle.tyres)])
+    bars, joints = ([each.stiffness for each in kind] for kind in (vehicle.bars, vehicle.joint_elements))
+    stiffness = np.array([*springs, *bars, *joints, *(tyre.stiffness for tyre in vehicle.tyres)])
     _, weights = bodies.inertia(motion, np.array([0.0, 0.0, -vehicle.gravity]))
     sunk = np.linalg.lstsq(rows.T @ (stiffness[:, None] * rows), weights, rcond=1e-12)[0]
     borne = stiffness * (rows @ sunk)
-    return borne[: len(parts.names)], -borne[len(parts.names) :]
+    count = len(rows) - len(vehicle.tyres)
+    return borne[:count], -borne[count:]
 
 
 def _stiffness_at_rest(spring: SpringDamper) -> float:

@@ -157,11 +157,11 @@ def _told(run: Result, scene: BicycleScene) -> Result:
         columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in SHOWN}
         return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
-    def again(factor: float, share: float) -> Series:
+    def rerun(factor: float, share: float) -> Series:
         step = factor * scene.run.step
         return series(ridden(scene, engine, step, step * max(2, round(share * scene.run.duration / step))))
 
-    told, how = by_steps(series(ride), again, 4.0, scene.run.step)
+    told, how = by_steps(series(ride), rerun, 4.0, scene.run.step)
     return stated(run, told, how)
 
 

@@ -47,11 +47,11 @@ switching otherwise; among them 11 of the 12 whose true pressures, in 25 times a
 
 
 class OtherRuns(NamedTuple):
-    """again : the same stop with so many steps to a sample, up to a time (s), which raises InputError or RunFailed;
+    """rerun : the same stop with so many steps to a sample, up to a time (s), which raises InputError or RunFailed;
     answered : what the controller says to speeds of turning (n - 1, W) in rad/s and of the vehicle (n - 1,) in m/s at
     the samples of a run."""
 
-    again: Callable[[int, float], BrakingPath]
+    rerun: Callable[[int, float], BrakingPath]
     answered: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -70,7 +70,7 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
     if not repeatable(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
     try:
-        paths = _others(path, steps, repeats.again)
+        paths = _others(path, steps, repeats.rerun)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
@@ -137,13 +137,13 @@ def whole(path: BrakingPath, times: np.ndarray) -> Channels:
     return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
 
 
-def _others(path: BrakingPath, steps: int, again: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
+def _others(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
     """Runs with half of the steps, and over a part with a quarter of them; of a single one, with two over a part."""
     last = float(path.times[-1])
     if steps == 1:
-        return [again(2, FINE_WINDOW * last)]
-    first = again(steps // 2, LATER * last if path.stands else last)
-    return [first, again(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
+        return [rerun(2, FINE_WINDOW * last)]
+    first = rerun(steps // 2, LATER * last if path.stands else last)
+    return [first, rerun(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
 
 
 def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:

@@ -85,11 +85,11 @@ def plane_of(scene: BrakingScene) -> Plane:
 def sprung_of(scene: BrakingScene) -> Any:
     """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
     from models.brake.sprung import sprung
-    from models.vehicles.vehicle_file import load_vehicle
+    from models.own_model.scene_vehicle import scene_vehicle
 
     vehicle = scene.vehicle
     return sprung(
-        load_vehicle(str(vehicle.file), scene.folder, scene.file, "vehicle.file"), float(vehicle.spin_inertia or 0.0)
+        scene_vehicle(str(vehicle.file), scene.folder, scene.file, "vehicle.file"), float(vehicle.spin_inertia or 0.0)
     )
 
 

@@ -60,14 +60,14 @@ def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, e
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
-    def again(steps: int, until: float) -> BrakingPath:
+    def rerun(steps: int, until: float) -> BrakingPath:
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": until})})
         return looped(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
     def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
         return answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
 
-    return OtherRuns(again, answered)
+    return OtherRuns(rerun, answered)
 
 
 def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:

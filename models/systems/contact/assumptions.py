@@ -169,13 +169,13 @@ def _alike(body: Contact) -> Assumption:
 
 def _on_profiles(body: OnPatches) -> list[Assumption]:
     """Assumptions that patches lie within the given profiles, and beside one another."""
-    parts = sorted(body.pressed.patches, key=lambda part: part.patch.place)
+    parts = sorted(body.pressed.patches, key=lambda part: part.patch.contour_position)
     inside = {}
     for k, part in enumerate(parts, 1):
         known, (_, _, low, high) = part.patch.distance, part.box
         free = [known.y[-1] - high] * (not part.patch.cut[3]) + [low - known.y[0]] * (not part.patch.cut[2])
         inside[f"patch {k}"] = 1e3 * np.array(free)
-    gaps = [(b.patch.place + b.box[2]) - (a.patch.place + a.box[3]) for a, b in pairwise(parts)]
+    gaps = [(b.patch.contour_position + b.box[2]) - (a.patch.contour_position + a.box[3]) for a, b in pairwise(parts)]
     return [
         Assumption(
             "within the profiles",

@@ -7,6 +7,7 @@ order: forces, moment, errors and a status, which is ``ok`` or what is wrong wit
 
 import csv
 from collections.abc import Callable
+from concurrent.futures import Executor
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -21,6 +22,8 @@ from models.contact.inputs import Array
 from models.core.errors import InputError
 from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, Block, blocks
 from models.core.whole_files import whole_file
+from models.ensemble.runner import in_order
+from models.ensemble.store import Arrays, Store
 from models.systems.contact.scene import Method
 
 MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
@@ -45,6 +48,8 @@ ERRORS = slice(6, 10)
 """Columns of errors."""
 BLOCK = 10_000
 """Rows of an answer that are read at once, and those that a result keeps."""
+AHEAD = 8
+"""Blocks under way at once."""
 Build = Callable[[Array, Array], Any]
 """Makes ``Built`` of the friction and the load (N) of some rows."""
 
@@ -57,23 +62,25 @@ def answer(
     progress: Callable[[int], None] = lambda rows: None,
     *,
     errors: bool = True,
+    executor: Executor | None = None,
+    store: Store | None = None,
 ) -> dict[str, int]:
     """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
 
-    errors : whether the answer has columns of errors, which take the forces again on half the cells. Raises
+    errors : whether the answer has columns of errors, which take the forces again on half the cells. executor :
+    computes the blocks of rows; store : keeps those that are finished (see ``models.ensemble.runner``). Raises
     InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
     built(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
-    reading = blocks(path, (BY_AXES, BY_CURVATURES))
+    reading, solve = blocks(path, (BY_AXES, BY_CURVATURES)), partial(_solved, built=built, method=method, errors=errors)
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(out) as part, part.open("w") as file:
         heads = HEADER if errors else tuple(head for head in HEADER if head not in HEADER[ERRORS])
         file.write(",".join(heads) + "\n")
-        for block in chain(first, reading):
-            solve = partial(_forces, built=built, method=method, errors=errors)
-            answers, wrong = _answered(block, solve, len(heads) - 2)
-            rows = enumerate(zip(block.lines, answers.tolist(), strict=True))
+        for block, answers in in_order(solve, chain(first, reading), executor, store, AHEAD):
+            wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
+            rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
             file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)
             counts["rows"] += len(block.lines)
             counts["wrong"] += len(wrong)
@@ -85,6 +92,13 @@ def compile_first(built: Build, method: Method) -> None:
     """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
     unit = np.ones(1)
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, built, method)
+
+
+def _solved(block: Block, built: Build, method: Method, errors: bool) -> Arrays:
+    """``forces`` (rows, columns) of a block, the rows (m,) that are ``wrong``, and ``why`` (m,)."""
+    columns = len(HEADER) - 2 - (0 if errors else ERRORS.stop - ERRORS.start)
+    forces, wrong = _answered(block, partial(_forces, built=built, method=method, errors=errors), columns)
+    return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
 def _answered(block: Block, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:

@@ -35,6 +35,9 @@ from models.core.assumptions import judged
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended
+from models.core.tables import BLOCK as TABLE_BLOCK
+from models.ensemble.store import Store, named_files
+from models.ensemble.workers import Crew, places_of
 from models.systems.contact.assumptions import assumptions, of_rows
 from models.systems.contact.cases_table import answer, compile_first, kept_rows, sizes
 from models.systems.contact.scene import ContactScene
@@ -61,6 +64,10 @@ CHANNELS = {
 FIELDS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 POWERS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
+BLOCKS = "blocks"
+"""Folder of the finished blocks of a long table, beside its answers."""
+LARGE = 8_000_000
+"""Bytes of a table from which on its blocks are kept, and computed by several: four blocks or so."""
 Progress = Callable[[str, float], None]
 
 
@@ -179,8 +186,7 @@ def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: boo
     built = partial(_of_rows, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
-    count = partial(_count, progress)
-    counts = answer(scene.cases_file(), answers, built, scene.method, count, errors=error)
+    counts = _answered(scene, answers, built, progress, error)
     seconds = time.perf_counter() - start
     rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
     table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
@@ -188,8 +194,27 @@ def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: boo
     return with_error_of_rows(table, scene) if error else table
 
 
-def _count(progress: Progress, rows: int) -> None:
-    progress(f"{rows:,} rows", 0.0)
+def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress, error: bool) -> dict[str, int]:
+    """Numbers of rows; a table of many blocks is answered by the scene's crew, and what is finished is kept."""
+    file = scene.cases_file()
+    rows, several = _rows_of(file), file.stat().st_size > LARGE
+    count = partial(_count, progress, rows)
+    if not several:
+        return answer(file, answers, built, scene.method, count, errors=error)
+    store = Store(answers.parent / BLOCKS)
+    facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
+    with store.claimed(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
+        return answer(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
+
+
+def _rows_of(file: Path) -> int:
+    """Lines of a file, about."""
+    with file.open("rb") as lines:
+        return sum(part.count(b"\n") for part in iter(partial(lines.read, 1 << 20), b""))
+
+
+def _count(progress: Progress, most: int, rows: int) -> None:
+    progress(f"{rows:,} of {most:,} rows", min(rows / max(most, 1), 1.0))
 
 
 def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:

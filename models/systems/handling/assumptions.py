@@ -82,6 +82,24 @@ def assumptions(handling: Handling) -> list[Assumption]:
             LARGEST_STEER,
         ),
         *_travels(handling),
+        *_stops(handling),
+    ]
+
+
+def _stops(handling: Handling) -> list[Assumption]:
+    """Assumptions on coordinates whose stops are not built."""
+    places = handling.vehicle.coordinates()
+    return [
+        Assumption(
+            f"stops {body} {freedom}",
+            f"{body!r} stays between the stops of its freedom {freedom}, which are not built",
+            "drive more slowly or steer less, or stiffen the spring",
+            partial(_coordinate, places.index((body, freedom)), f"{body} {freedom}"),
+            "rad" if freedom.startswith("r") else "m",
+            low,
+            high,
+        )
+        for (body, freedom), low, high in handling.given.ranges
     ]
 
 

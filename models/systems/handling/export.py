@@ -10,7 +10,7 @@ AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
     """The vehicle of the first manoeuvre in "mujoco" or "exudyn" without springs, tyres and driver."""
-    handling = scene.handling(next(iter(scene.manoeuvres)))
+    handling = scene.car(next(iter(scene.manoeuvres)))
     return of_handling(engine, handling, Subject(scene.title, scene.file, AXES), ["the driver's steer and torques"])
 
 

@@ -17,17 +17,17 @@ from models.vehicles.towing import hitch_load
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     for name in scene.manoeuvres:
-        scene.handling(name)
+        scene.car(name)
 
 
 def findings(scene: HandlingScene) -> tuple[Finding, ...]:
     """Queries about the vehicle."""
-    return plausible(scene.handling(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
+    return plausible(scene.car(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
 def describe(scene: HandlingScene) -> str:
     """The scene's plan as text."""
-    first = scene.handling(next(iter(scene.manoeuvres)))
+    first = scene.car(next(iter(scene.manoeuvres)))
     tyres, free = scene.tyres, first.vehicle
     loads = ", ".join(f"{name} {load:.0f} N" for name, load in first.held.tyres.items())
     mass = sum(body.mass for body in free.bodies)
@@ -45,6 +45,7 @@ def describe(scene: HandlingScene) -> str:
             f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
             "rough, else flat",
         ),
+        *(_line("read", note) for note in first.given.notes),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
         *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
@@ -78,6 +79,8 @@ def _trailer(handling: Handling, name: str) -> str:
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:
     manoeuvre = scene.manoeuvres[name]
+    if manoeuvre.measured:
+        return f"{manoeuvre.duration:g} s along the measured steer angle and speed of {manoeuvre.measured}"
     acts = [control for control in LIMITS if any(value for _, value in getattr(manoeuvre, control))]
     return f"{manoeuvre.speed:g} m/s, {manoeuvre.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
 

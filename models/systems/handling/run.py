@@ -18,6 +18,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
+from models.engines.native_parts import joint_parts
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
@@ -25,8 +26,8 @@ from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.systems.handling.towed_springs import divided, numbers_beside
 from models.tyre.bristles import SLOW
-from models.vehicles.free_vehicle import SWAY, chassis_of
-from models.vehicles.spatial import Freedom, hitch_of
+from models.vehicles.free_vehicle import SWAY, chassis_of, spinning
+from models.vehicles.spatial import Freedom, JointElement, hitch_of
 from models.vehicles.spatial_linear import mass
 
 if TYPE_CHECKING:
@@ -64,6 +65,15 @@ REPORTS = {
 }
 """Channels of every tyre: column of its report, unit, meaning."""
 
+BELOW = "of the place below the chassis' centre, left positive"
+MOTION = {
+    "forward speed": ("m/s", "of the place below the chassis' centre"),
+    "yaw rate": ("rad/s", "left positive"),
+    "lateral acceleration": ("m/s^2", BELOW),
+    "side slip": ("rad", BELOW),
+}
+"""Channels of the car, by the names of what is measured of one: unit, meaning."""
+
 
 @dataclass(frozen=True, eq=False)
 class Drive:
@@ -97,6 +107,11 @@ class Drive:
         """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
         ahead, aside, turning = self.velocity().T
         return np.gradient(aside, self.run.times) + ahead * turning
+
+    def motion(self) -> dict[str, np.ndarray]:
+        """(m,) of each channel of MOTION."""
+        ahead, aside, turning = self.velocity().T
+        return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
 
     def slip_angles(self) -> np.ndarray:
         """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
@@ -140,8 +155,9 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
     channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
+    channels |= {name: Channel("time", values, *MOTION[name]) for name, values in drive.motion().items()}
     axes = {
-        "time": Channel("time", drive.run.times, "s"),
+        "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
         "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
@@ -154,21 +170,21 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
-    again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
+    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
         name: values
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
     }
-    by_step, how = by_steps(Series(fine.times, moving), again, ORDER, again.step)
-    by_net = again.by_cells(list(moving))
+    by_step, how = by_steps(Series(fine.times, moving), rerun, ORDER, rerun.step)
+    by_net = rerun.by_cells(list(moving))
     told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
     return stated(run, told, f"{how}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
-class Again:
+class ManoeuvreRerun:
     """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
 
     engine: str
@@ -193,7 +209,7 @@ class Again:
 
     def __call__(self, factor: float, share: float) -> Series:
         """Run the manoeuvre again in twice the step, or its second half in half the step (see
-        ``models.core.discretisation.Again``)."""
+        ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:
@@ -267,9 +283,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    division = divided(handling, engine)
-    driven = replace(driven_by(handling), numbers=numbers_beside(handling, division), parts=division.native)
-    return free_model(engine, driven, settings)
+    division, whole = divided(handling, engine), driven_by(handling)
+    parts = (*whole.parts, *division.native)
+    return free_model(engine, replace(whole, numbers=numbers_beside(handling, division), parts=parts), settings)
 
 
 def _plain(handling: Handling) -> "PlainRolling":
@@ -279,8 +295,10 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: the bodies, and the compiled forces with their whole table."""
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
+    """The car as engines build it: the bodies, what acts along their coordinates, and the compiled forces with their
+    whole table."""
+    parts = joint_parts(handling.vehicle)
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -339,7 +357,18 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
     at.reports(handling.numbers, run.times, *states, report, ledger)
+    for element in handling.vehicle.joint_elements:
+        travel, rate = (_along(handling, element, values) for values in states)
+        ledger[:, at.POTENTIAL] += (element.held + 0.5 * element.stiffness * travel) * travel
+        ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
+
+
+def _along(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
+    """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
+    places = handling.vehicle.coordinates()
+    columns = [places.index(place) for place in element.coordinates]
+    return np.asarray(values[..., columns] @ np.array(element.factors))
 
 
 def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
@@ -371,7 +400,7 @@ def _check_step(drive: Drive, engine: str) -> None:
         stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
         lightness = 1.0 / h.vehicle.body(tyre.body).mass
         if n[at.ROTOR] >= 0.0:
-            lightness += tyre.point[2] ** 2 / h.tyres.spin_inertia
+            lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
         holds = force[:, i] < 0.95 * n[at.GRIP] * load
         damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
         if step * damped.max() > LIMIT:
@@ -410,6 +439,8 @@ def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
         speed, spin = motion.shift @ v, motion.rotation.T @ (motion.turn @ v)
         total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
         total -= body.mass * handling.gravity @ motion.centre
+    for element in handling.vehicle.joint_elements:
+        total += 0.5 * element.inertia * float(_along(handling, element, v)) ** 2
     return float(total)
 
 

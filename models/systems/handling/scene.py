@@ -1,11 +1,12 @@
 """Scenes of handling: a vehicle, its tyres, the road, and manoeuvres that are driven one by one."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from models.core.errors import InputError
 from models.core.scene_effects import extended, with_own
@@ -15,10 +16,13 @@ from models.core.strict import Query, Strict, accepted, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
+from models.own_model.scene_vehicle import scene_vehicle
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.vehicle_file import load_vehicle
+
+if TYPE_CHECKING:
+    from models.measured.drive import Measured
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
@@ -30,7 +34,9 @@ LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0
 class HandlingVehicle(Strict):
     """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre; it may tow."""
 
-    file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str = Field(
+        default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
+    )
     accept: list[Query] = accepted()
 
 
@@ -48,6 +54,9 @@ class TyreTable(Strict):
     cells: int = Field(default=21, ge=3, le=200, description="of the patch's net, per strip")
     spin_inertia: float = quantity("kg m^2", "of a wheel about its axle, chosen", default=1.7)
     brake_rate: float = quantity("rad/s", "spin from which a brake's torque is whole", default=1.0)
+    cornering: list[Annotated[float, Field(gt=0.0, le=10.0)]] = Field(
+        default=[], description="ratio of each axle's cornering stiffness to the vehicle file's, front first; empty: 1"
+    )
 
 
 class RoadTable(Strict):
@@ -71,10 +80,17 @@ class RunTable(Strict):
 
 
 class Manoeuvre(Strict):
-    """[manoeuvres.NAME]: begins with rolling straight ahead; controls go smoothly from knot to knot [time, value]."""
+    """[manoeuvres.NAME]: begins with rolling straight ahead; controls go smoothly from knot to knot [time, value].
 
-    speed: float = quantity("m/s", "at the start")
-    duration: float = quantity("s", "of the manoeuvre", default=4.0)
+    A measured drive has no controls of its own: the car steers as measured, and its torques give the measured speed.
+    """
+
+    measured: str = Field(default="", description="CSV with time, steer (front wheels, left positive) and speed")
+    stretch: list[float] = Field(
+        default=[], max_length=2, description="[s, s] of the measured file's time that is driven; all of it where empty"
+    )
+    speed: float = quantity("m/s", "at the start; a measured drive has its own", default=0.0, zero=True)
+    duration: float = quantity("s", "of the manoeuvre; of a measured drive all, or at most that", default=4.0)
     steer: Knots = Field(default=AT_REST, description="angle of the front wheels, left positive: [[s, rad], ...]")
     brake: Knots = Field(default=AT_REST, description="torque of all brakes together: [[s, N m], ...]")
     drive: Knots = Field(default=AT_REST, description="torque of all driven wheels together: [[s, N m], ...]")
@@ -102,6 +118,8 @@ class HandlingScene(SceneFile):
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
     engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+    _along: dict[str, Controls] = PrivateAttr(default_factory=dict)
+    """Controls of the measured drives that were driven."""
 
     def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
         """How an engine that picks its own steps marches a manoeuvre; None for Runge-Kutta 4."""
@@ -109,25 +127,59 @@ class HandlingScene(SceneFile):
         duration = self.manoeuvres[manoeuvre].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
-    def given(self) -> SpatialVehicle:
-        """The vehicle of the file, with what it tows."""
-        return load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
-
     def handling(self, name: str) -> Handling:
-        """Vehicle, tyres, road and controls of one manoeuvre."""
+        """Vehicle, tyres, road and controls of one manoeuvre; a measured drive is marched for its torques, once."""
+        car = self.car(name)
+        if not self.manoeuvres[name].measured:
+            return car
+        if name not in self._along:
+            from models.systems.handling.following import controls_along
+
+            self._along[name] = controls_along(car, self.drive(name), self.run.step, self.file)
+        return car.changed(controls=self._along[name])
+
+    def car(self, name: str) -> Handling:
+        """Vehicle, tyres and road of one manoeuvre, and its controls as far as the scene says them."""
         manoeuvre, road = self.manoeuvres[name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        built = Handling(
-            self.given(), Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves, forces=self.run.forces
-        )
-        return extended(built, self)
+        tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
+        return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
+
+    def drive(self, name: str) -> "Measured":
+        """The measured drive of a manoeuvre, as long as the manoeuvre; InputError for a file that holds none."""
+        from models.measured.drive import read_drive
+
+        manoeuvre = self.manoeuvres[name]
+        path = self.path(manoeuvre.measured, f"manoeuvres.{name}.measured")
+        read, table = read_drive(path, tuple(manoeuvre.stretch)), manoeuvre.model_fields_set
+        if "duration" not in table:
+            return read
+        count = round(manoeuvre.duration / float(read.times[1] - read.times[0])) + 1
+        return replace(read, **{key: getattr(read, key)[:count] for key in ("times", "steer", "speed")})
+
+    def begins(self, name: str) -> float:
+        """Time (s) at which results of a manoeuvre begin: that of the measured file, or else 0."""
+        return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
+
+    def given(self) -> SpatialVehicle:
+        """The vehicle of the file with what it tows, its cornering stiffness as [tyres] says."""
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
+        if not (ratios := self.tyres.cornering):
+            return vehicle
+        axles = len({tyre.axle for tyre in vehicle.tyres})
+        if len(ratios) != axles:
+            raise InputError(self.file, "tyres.cornering", ratios, f"needs a ratio for each of the {axles} axles")
+        ratio = {tyre.name: ratios[tyre.axle] for tyre in vehicle.tyres}
+        forces = (replace(each, stiffness=ratio[each.name] * each.stiffness) for each in vehicle.side_forces)
+        return replace(vehicle, side_forces=tuple(forces))
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(HandlingScene, table, file, folder)
+    scene = _with_measured(scene)
     for name, manoeuvre in scene.manoeuvres.items():
         place = f"manoeuvres.{name}"
         _check_times(scene, place, manoeuvre)
@@ -135,6 +187,36 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
     check_engines(scene.file, scene.engines)
     return with_own(scene)
+
+
+def _with_measured(scene: HandlingScene) -> HandlingScene:
+    """The scene with speed and duration of its measured drives; refuses a manoeuvre that has no speed."""
+    filled = dict[str, Manoeuvre]()
+    for name, manoeuvre in scene.manoeuvres.items():
+        if manoeuvre.measured:
+            filled[name] = _measured(scene, name, manoeuvre)
+        elif manoeuvre.speed > 0.0:
+            filled[name] = manoeuvre
+        else:
+            raise InputError(scene.file, f"manoeuvres.{name}.speed", None, "is missing, or not above 0 (m/s)")
+    return scene.model_copy(update={"manoeuvres": filled})
+
+
+def _measured(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
+    """A measured drive with its speed and duration; refuses what contradicts the file."""
+    file, place, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
+    for control in LIMITS:
+        if getattr(manoeuvre, control) != AT_REST:
+            raise InputError(file, f"{place}.{control}", None, "cannot go with a measured drive, which has its own")
+    period = float(drive.times[1] - drive.times[0])
+    if not divides(scene.run.step, period):
+        raise InputError(file, "run.step", scene.run.step, f"must divide {period:g} s, the clock of {place}.measured")
+    first, lasts = float(drive.speed[0]), round(period * (len(drive.times) - 1), 9)
+    if manoeuvre.speed not in (0.0, first):
+        raise InputError(file, f"{place}.speed", manoeuvre.speed, f"the measured drive begins with {first:g} m/s")
+    if "duration" in manoeuvre.model_fields_set and manoeuvre.duration > lasts * (1.0 + 1e-9):
+        raise InputError(file, f"{place}.duration", manoeuvre.duration, f"the measured drive lasts {lasts:g} s")
+    return manoeuvre.model_copy(update={"speed": first, "duration": lasts})
 
 
 def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:

@@ -95,7 +95,7 @@ def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
         "N",
         least=-pull,
     )
-    return [] if vehicle.whole.lifts else [lifting]
+    return [] if vehicle.uncut.lifts else [lifting]
 
 
 def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:

@@ -8,7 +8,7 @@ from models.core.noise import FORCES, PITCH_SENSOR, normal
 from models.core.signals import Interpolation, sampled
 from models.engines.cut_vehicle import HubModel, HubRun, build, reported
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import Drive, table
+from models.multibody.cut_table import HubInputs, table
 from models.road.profile import Profile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
@@ -25,10 +25,10 @@ class HubForces:
     period: float
     frame: str
 
-    def drive(self, step: float, steps: int, interpolation: Interpolation = "linear") -> Drive:
-        """The arrays that drive the cut vehicle at half steps."""
+    def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
+        """Hub inputs at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
-        return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
+        return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
@@ -49,19 +49,19 @@ class Angles:
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
 
-def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> Drive:
+def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> HubInputs:
     """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
-    times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.whole.axles)
+    times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
-    for tyre in vehicle.whole.tyres:
+    for tyre in vehicle.uncut.tyres:
         road = left if tyre.point[1] > 0 else right
         height, slope = road.height_and_slope(speed * times - (front - tyre.point[0]))
         heights.append(-height)  # roads count downwards
         rates.append(-speed * slope)
-    return Drive(np.column_stack([*heights, *rates]), speed=speed)
+    return HubInputs(np.column_stack([*heights, *rates]), speed=speed)
 
 
-def truth(engine: str, vehicle: CutVehicle, road: Drive, frame: str, step: float, duration: float) -> HubRun:
+def truth(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
     """The vehicle on its tyres, its hub forces in a frame."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
@@ -70,7 +70,7 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     """Travel (m,) of every spring, mount and bar from the design position by name, m (rad of a bar), positive in
     compression, along a run."""
     gauges = tuple(element.gauge() for element in vehicle.elements)
-    still = Drive(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
+    still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
     values = reported(gauged, table(gauged, still, float(run.times[1])), run.times, run.states).elements
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
@@ -93,4 +93,4 @@ def model(
     interpolation: Interpolation = "linear",
 ) -> HubModel:
     """The cut vehicle on measured hub forces, free."""
-    return build(engine, vehicle, forces.drive(step, round(duration / step), interpolation), step, duration)
+    return build(engine, vehicle, forces.hub_inputs(step, round(duration / step), interpolation), step, duration)

@@ -54,7 +54,7 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
     """Queries about the vehicle, and doubts about measured forces."""
     vehicle = scene.cut_vehicle()
     doubts = judged(scene, vehicle) if scene.forces.file is not None else ()
-    return (*plausible(vehicle.whole, scene.vehicle.accept), *doubts)
+    return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
 
 
 def describe(scene: HubScene) -> str:
@@ -69,6 +69,7 @@ def describe(scene: HubScene) -> str:
             "vehicle",
             f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
+        *(_line("read", note) for note in vehicle.uncut.notes),
         _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames(vehicle)}"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
         _line("noise", _noise(scene)),

@@ -22,7 +22,7 @@ from models.core.steps import divides
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import HubModel, HubRun, Route, build
 from models.engines.error_control import NO_ESTIMATE
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, two_tracks
@@ -69,9 +69,9 @@ class Measurement:
         deviations = Deviations(scene.deviations(self.vehicle), scene.angles.deviations, scene.stabilise.model)
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
-    def drive(self, method: Method, step: float, steps: int) -> Drive:
+    def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
         """Inputs of so many steps (s), roll and pitch held by a method; raises InputError."""
-        scene, free = self.scene, self.forces.drive(step, steps, self.scene.forces.interpolation)
+        scene, free = self.scene, self.forces.hub_inputs(step, steps, self.scene.forces.interpolation)
         if method == "kalman":
             from models.systems.hub_forces.tilt_filter import pulled
 
@@ -80,25 +80,25 @@ class Measurement:
             return enforced(free, self.angles, step, scene.stabilise.smoothing, scene.file)
         return free
 
-    def start(self, drive: Drive) -> np.ndarray:
+    def start(self, hub_inputs: HubInputs) -> np.ndarray:
         """Initial state (2 n,): at rest in the design position; an enforced tilt begins where its file does."""
         n = self.vehicle.size
         start = np.zeros(2 * n)
-        if drive.guide is not None and drive.pull is None:
-            start[[ROLL, PITCH, n + ROLL, n + PITCH]] = drive.guide[0, :4]
+        if hub_inputs.guide is not None and hub_inputs.pull is None:
+            start[[ROLL, PITCH, n + ROLL, n + PITCH]] = hub_inputs.guide[0, :4]
         return start
 
 
-def enforced(drive: Drive, angles: Angles, step: float, smoothing: float, file: str = "") -> Drive:
-    """The drive with measured angles enforced, once through a low-pass of ``smoothing`` (Hz); raises InputError."""
+def enforced(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
+    """Hub inputs with measured angles enforced, once through a low-pass of ``smoothing`` (Hz); raises InputError."""
     quiet = smoothed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
-    return with_angles(drive, quiet, angles.period, step)
+    return with_angles(hub_inputs, quiet, angles.period, step)
 
 
-def with_angles(drive: Drive, angles: np.ndarray, period: float, step: float) -> Drive:
-    """The drive with roll and pitch (m, 2), rad, enforced: a quintic spline through the samples."""
+def with_angles(hub_inputs: HubInputs, angles: np.ndarray, period: float, step: float) -> HubInputs:
+    """The hub inputs with roll and pitch (m, 2), rad, enforced: a quintic spline through the samples."""
     motion = Smooth(angles, period, derivatives=2, degree=5)
-    return replace(drive, guide=motion.sample(0.0, step / 2, len(drive.hubs)))
+    return replace(hub_inputs, guide=motion.sample(0.0, step / 2, len(hub_inputs.hubs)))
 
 
 def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
@@ -129,29 +129,29 @@ def on_road(
     engine, settings, kind = march
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
-    def drive(step: float, steps: int) -> Drive:
+    def hub_inputs(step: float, steps: int) -> HubInputs:
         return replace(two_tracks(vehicle, left, right, road.speed, step, steps), frame=frame)
 
-    true = HubModel(engine, vehicle, drive(settings.step, settings.steps), settings, kind).run()
-    return true, errors_of_steps(engine, vehicle, true, drive, forces=kind)[0] if error else {}
+    true = HubModel(engine, vehicle, hub_inputs(settings.step, settings.steps), settings, kind).run()
+    return true, errors_of_steps(engine, vehicle, true, hub_inputs, forces=kind)[0] if error else {}
 
 
 def errors_of_steps(
     engine: str,
     vehicle: CutVehicle,
     run: HubRun,
-    drive: Callable[[float, int], Drive],
+    hub_inputs: Callable[[float, int], HubInputs],
     period: float = 0.0,
     forces: Route = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
     """Errors of what ``principal`` lists of a run in an engine, by name, and how they were told.
 
-    drive : what drives it, for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
+    hub_inputs : inputs for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
     divide it, or they would take the samples' noise for motion; forces : whose those of springs are.
     """
     step, steps = float(run.times[1]), len(run.times) - 1
 
-    def again(factor: float, share: float) -> Series:
+    def rerun(factor: float, share: float) -> Series:
         tried_step, count = factor * step, max(1, int(share * steps / factor + 1e-9))
         if factor > 2.0 or (factor > 1.0 and period and not divides(tried_step, period)):
             raise InputError(
@@ -159,7 +159,7 @@ def errors_of_steps(
             )
         row = 0 if factor > 1.0 else round(MIDDLE * steps)  # a road begins gently
         first = round(row / factor)
-        inputs = drive(tried_step, first + count)
+        inputs = hub_inputs(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
         part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
         path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(
@@ -169,8 +169,8 @@ def errors_of_steps(
 
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
-    order = LIFTING_ORDER if vehicle.whole.lifts else ORDER
-    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), again, order, step)
+    order = LIFTING_ORDER if vehicle.uncut.lifts else ORDER
+    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), rerun, order, step)
     return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
 
 
@@ -207,11 +207,11 @@ def run(
     estimated, by further runs, on top of that of the measurement.
     """
     measurement, method = measurement or measure(scene, engine, error), method or scene.stabilise.method
-    drive = measurement.drive(method, scene.run.step, scene.steps)
+    hub_inputs = measurement.hub_inputs(method, scene.run.step, scene.steps)
     kind = scene.forces_with(method)
-    model = HubModel(engine, measurement.vehicle, drive, scene.settings(engine), kind)
+    model = HubModel(engine, measurement.vehicle, hub_inputs, scene.settings(engine), kind)
     begun = time.process_time()
-    path = model.run(*np.split(measurement.start(drive), 2))
+    path = model.run(*np.split(measurement.start(hub_inputs), 2))
     seconds = time.process_time() - begun
     result = labelled(measurement, path, engine, method, seconds)
     if not error:
@@ -219,7 +219,7 @@ def run(
     if engine in scene.engines:
         return not_estimated(result, NO_ESTIMATE)
     vehicle, period = measurement.vehicle, measurement.forces.period
-    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period, kind)
+    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.hub_inputs, method), period, kind)
     if (
         before := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much

@@ -18,9 +18,9 @@ from models.core.time_series import CHASSIS, other_unit, read_time_series
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED, Route
 from models.engines.error_control import Adaptive, check_engines
+from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.vehicles.cut_vehicle import CutVehicle, cut
-from models.vehicles.vehicle_file import load_vehicle
 
 Frame = Literal["hub", "body", "inertial"]
 Noise = Literal["white", "none"]
@@ -35,7 +35,7 @@ ANGLES = {"roll": RADIANS, "pitch": RADIANS, "roll_rate": RADIANS_PER_SECOND, "p
 class Vehicle(Strict):
     """[vehicle]: a vehicle file, and the body that the others ride on."""
 
-    file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     chassis: str = Field(default="body", description="the body with all six freedoms")
     accept: list[Query] = accepted()
 
@@ -129,7 +129,7 @@ class HubScene(SceneFile):
 
     def cut_vehicle(self) -> CutVehicle:
         """The vehicle without its tyres; raises InputError."""
-        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
         return cut(extended(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:

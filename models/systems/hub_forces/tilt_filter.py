@@ -14,7 +14,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.signals import Sampled
 from models.drift.score import SURPRISED
-from models.multibody.cut_table import Drive
+from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
 from models.systems.hub_forces.tilt_march import Noise, march
@@ -214,10 +214,12 @@ def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
     return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), turned).reshape(wrenches.shape)
 
 
-def pulled(drive: Drive, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7) -> Drive:
-    """The drive with moments towards the estimate: wc = 2 pi ``bandwidth`` (Hz), damping ``ratio``, rigid inertia."""
-    rows, corner = len(drive.hubs), 2 * math.pi * bandwidth
+def pulled(
+    hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
+) -> HubInputs:
+    """Hub inputs with moments towards the estimate: wc = 2 pi ``bandwidth`` (Hz), damping ``ratio``, rigid inertia."""
+    rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
     wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)
     roll, pitch, _ = np.diag(rigid(vehicle).inertia)
     pull = (roll * corner**2, 2 * ratio * roll * corner, pitch * corner**2, 2 * ratio * pitch * corner)
-    return replace(drive, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)
+    return replace(hub_inputs, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)

@@ -77,7 +77,7 @@ def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
     if plane is not None:
         return plausible_plane(plane, accept)
     vehicle = scene.rig().vehicle
-    return () if vehicle is None else plausible(vehicle.whole, accept)
+    return () if vehicle is None else plausible(vehicle.uncut, accept)
 
 
 def describe(scene: MeasuredScene) -> str:

@@ -142,7 +142,7 @@ class Examination:
             self.trust = (("pitch", run.trust),)
         return run.outcome
 
-    def again(self, name: str, recording: Recording, folder: Path) -> Outcome:
+    def rerun(self, name: str, recording: Recording, folder: Path) -> Outcome:
         """A run of another recording, held as the one of this name."""
         job = self.job(name, recording)
         return march(job, folder / "run") if isinstance(job, SectionRun) else run_plane(job, folder / "run").outcome
@@ -257,9 +257,9 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     return deviations
 
 
-def _lap(exam: Examination, part: str, begun: float) -> None:
-    """Seconds of a part that has ended, since ``begun`` and without the parts before it."""
-    exam.seconds[part] = time.perf_counter() - begun - sum(exam.seconds.values())
+def _lap(exam: Examination, stage: str, begun: float) -> None:
+    """Seconds of a stage that has ended, since ``begun`` and without the stages before it."""
+    exam.seconds[stage] = time.perf_counter() - begun - sum(exam.seconds.values())
 
 
 def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) -> None:
@@ -375,8 +375,8 @@ def _weighed(exam: Examination, work: Path) -> None:
     with the stabiliser, or by the free one where that failed."""
     name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
     if name in exam.runs:
-        again, answers = partial(exam.again, name), exam.forces(exam.runs[name])
-        exam.consequences = consequences(exam.findings, exam.recording, again, answers, work / "findings")
+        rerun, answers = partial(exam.rerun, name), exam.forces(exam.runs[name])
+        exam.consequences = consequences(exam.findings, exam.recording, rerun, answers, work / "findings")
         exam.verdicts = {
             name: judged_by_consequences(verdict, exam.consequences) for name, verdict in exam.verdicts.items()
         }

@@ -14,6 +14,7 @@ from models.core.strict import Query, Strict, accepted, quantity
 from models.drift.score import Limits
 from models.measured.axle_balance import AXLES
 from models.measured.signal import Frame, Places, Quantity, TransducerPlace
+from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.measured.pitch_plane import CHASSIS, SPRINGS
 from models.systems.measured.sections import names
 from models.systems.measured.verdict import LIMITS
@@ -21,7 +22,6 @@ from models.systems.measured.virtual import VirtualTable
 from models.systems.pitch_plane.scene import parameter_set
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.pitch_plane import Parameters
-from models.vehicles.vehicle_file import load_vehicle
 
 Engine = Literal["reference", "exudyn", "mujoco"]
 
@@ -50,7 +50,9 @@ class Rig:
 class Vehicle(Strict):
     """[vehicle]: a vehicle file and the body that the others ride on, or a parameter set of the pitch plane."""
 
-    file: str | None = Field(default=None, description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str | None = Field(
+        default=None, description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
+    )
     chassis: str = Field(default="body", description="the body with all six freedoms")
     parameters: str | None = Field(default=None, description="of the pitch-plane vehicle: a set, or a TOML file")
     accept: list[Query] = accepted()
@@ -157,8 +159,8 @@ class MeasuredScene(SceneFile):
             hubs, springs = tuple(hub for axle in AXLES.values() for hub in axle), tuple(SPRINGS.values())
             places = Places(hubs, (CHASSIS,), springs)
             return Rig(str(given_vehicle.parameters), CHASSIS, places, springs, ("pitch",), None)
-        vehicle = cut(load_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
-        bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.whole.bodies, vehicle.elements))
+        vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
+        bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
         places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
         return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
 

@@ -24,7 +24,7 @@ from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, silent
-from models.multibody.cut_table import Drive, table
+from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
 from models.systems.measured.sections import Answer, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
@@ -214,8 +214,8 @@ class _March:
         """March a block and save it; RunFailed with the outcome until then."""
         grid, last = self.grid, self.job.count - 1
         answers = min(self.length, max(last - self.done, 1))
-        drive = self._drive(self.done * grid.skip, answers * grid.every)
-        model = build(self.job.engine, self.job.vehicle, drive, grid.step, answers * grid.every * grid.step)
+        hub_inputs = self._hub_inputs(self.done * grid.skip, answers * grid.every)
+        model = build(self.job.engine, self.job.vehicle, hub_inputs, grid.step, answers * grid.every * grid.step)
         states, failure = self._marched(model)
         ends = self.done + answers >= last
         kept = states[:: grid.every] if failure or ends else states[: -1 : grid.every]
@@ -259,12 +259,12 @@ class _March:
                 bad = model.steps
         return states
 
-    def _drive(self, first: int, steps: int) -> Drive:
-        """The arrays that drive the vehicle from a sample on."""
+    def _hub_inputs(self, first: int, steps: int) -> HubInputs:
+        """Hub inputs at half steps from a sample on."""
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
         wrenches = self.inputs.around(first, used + 1)
-        free = Drive(grid.cubic(wrenches, rows), self.inputs.frame)
+        free = HubInputs(grid.cubic(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
             return replace(free, guide=self.prescribed.rows(first, rows))
         if self.filter is None:
@@ -303,7 +303,7 @@ def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     """Checksums of all inputs that decide a run's values, by names that a user understands."""
     library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
-    idle = Drive(np.zeros((1, 6 * len(inputs.hubs))))
+    idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))
     samples = digest(job.recording.period, job.recording.count)
     for signal in inputs.used:
         samples = digest(samples, signal, job.recording.samples(signal))

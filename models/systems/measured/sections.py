@@ -56,11 +56,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class AccelerometerPoint:
-    """Where an accelerometer sits: name, body, place (m) in the design position; whether it feels gravity."""
+    """Where an accelerometer sits: name, body, position (m) in the design state; whether it feels gravity."""
 
     name: str
     body: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     gravity: bool = True
 
 
@@ -94,7 +94,8 @@ class Sections:
         object.__setattr__(self, "answers", tuple(answer for _, answer in kept))
         object.__setattr__(self, "columns", np.array([column for column, _ in kept]))
         rows = [
-            [joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in self.points
+            [joined.last[p.body], *np.subtract(p.position, joined.origin[p.body]), float(p.gravity)]
+            for p in self.points
         ]
         points = np.array(rows, float).reshape(len(rows), 5)
         object.__setattr__(self, "_places", FeltPlaces(*_guides(self.vehicle, joined), points))
@@ -116,7 +117,7 @@ def names(vehicle: CutVehicle) -> tuple[str, ...]:
 
 def guided(vehicle: CutVehicle) -> tuple[str, ...]:
     """Bodies that ride on the chassis or on one another."""
-    return tuple(body.name for body in vehicle.whole.bodies if body.name != vehicle.chassis)
+    return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 
 def _answers(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]) -> Iterator[Answer]:
@@ -142,7 +143,7 @@ def _answers(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, 
         for axis, _, _, unit in HUB:
             text = f"on {name} from what carries it, axes of {about or name}"
             yield Answer(f"{name} guide {axis}", unit, text, f"{name} guide")
-    for hub, tyre in zip(vehicle.hubs, vehicle.whole.tyres, strict=True):
+    for hub, tyre in zip(vehicle.hubs, vehicle.uncut.tyres, strict=True):
         for axis, quantity, component, unit in HUB:
             text = f"on the hub from outside, axes of {about or tyre.body}"
             yield Answer(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
@@ -155,7 +156,7 @@ def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
     """Components of guides along which a body slides freely, so that they are nought."""
     sliding = set[str]()
     for name in guided(vehicle):
-        body = vehicle.whole.body(name)
+        body = vehicle.uncut.body(name)
         turns = any(freedom.startswith("r") for freedom in body.freedoms)
         if body.parent == vehicle.chassis and (frame == "body" or not turns):
             sliding |= {f"{name} guide F{axis}" for axis in body.freedoms}
@@ -166,8 +167,8 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
     """Last joint (g,) of every guided body and what acts behind it (g, b + h + 3 e), as the kernel reads it."""
     heavy = [body.name for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
     ends = [end for element in vehicle.elements for end in (element.first_body, element.second_body, element.frame)]
-    owners = [*heavy, *(tyre.body for tyre in vehicle.whole.tyres), *ends]
-    parents = {body.name: body.parent for body in vehicle.whole.bodies}
+    owners = [*heavy, *(tyre.body for tyre in vehicle.uncut.tyres), *ends]
+    parents = {body.name: body.parent for body in vehicle.uncut.bodies}
 
     def behind(name: str | None, guide: str) -> bool:
         return name is not None and (name == guide or behind(parents[name], guide))
@@ -187,8 +188,8 @@ def points(
             section_points[signal.at] = AccelerometerPoint(
                 signal.at, places[signal.at].body, places[signal.at].position, signal.gravity
             )
-        elif signal.at in {body.name for body in vehicle.whole.bodies}:
+        elif signal.at in {body.name for body in vehicle.uncut.bodies}:
             section_points[signal.at] = AccelerometerPoint(
-                signal.at, signal.at, vehicle.whole.body(signal.at).position, signal.gravity
+                signal.at, signal.at, vehicle.uncut.body(signal.at).position, signal.gravity
             )
     return tuple(section_points.values())

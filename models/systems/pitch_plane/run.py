@@ -85,27 +85,27 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     fine, sizes = _series(run.detail.times, channels, names), _sizes(assembly, channels)
     method = CATALOGUE[engine][settings.integrator]
 
-    def again(changed: Settings) -> Series:
+    def rerun(changed: Settings) -> Series:
         trajectory = build(engine, assembly, changed).run()
         return _series(trajectory.times, outputs(replace(assembly, sensors=()), trajectory), names)
 
     if method.adaptive:
-        looser = _looser(again, replace(settings, tolerance=LOOSER * settings.tolerance))
+        looser = _looser(rerun, replace(settings, tolerance=LOOSER * settings.tolerance))
         return of_tolerance(run, fine, looser, LOOSER, settings.tolerance, sizes)
 
     def longer(times: float, share: float) -> Series:
-        return again(_other(settings, times, share))
+        return rerun(_other(settings, times, share))
 
     return estimated(run, fine, longer, method.order, settings.step, growth=_growth(assembly), sizes=sizes)
 
 
-def _looser(again: Callable[[Settings], Series], settings: Settings) -> Series:
+def _looser(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
     """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
     the error."""
     try:
-        return again(replace(settings, step=2.0 * settings.step))
+        return rerun(replace(settings, step=2.0 * settings.step))
     except InputError:
-        return again(settings)
+        return rerun(settings)
 
 
 def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
@@ -132,7 +132,7 @@ def _growth(assembly: Assembly) -> dict[str, float]:
     from models.systems.pitch_plane.trust import growth
 
     forces = growth(assembly)
-    grown = np.asarray(pitch_variance(forces.times, forces.until, 1.0))
+    grown = np.asarray(pitch_variance(forces.times, forces.sinh_rate, 1.0))
     part = max(2, round(FINE_WINDOW * len(grown)))
     return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:part])))}
 

@@ -16,7 +16,7 @@ import numpy as np
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.core.signals import Sampled, Smooth
-from models.drift.growth import MEDIAN, growth_rate, growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
+from models.drift.growth import MEDIAN, growth_rate, pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import STEP, TangentPath, path_of
 from models.vehicles.pitch_plane import Parameters
@@ -48,13 +48,13 @@ def _allowed(angle: float, run: Result) -> Watched:
 class Growth:
     """Growth of a pitch error by the wheel forces alone, before any run.
 
-    times (n,) in s, those of the samples; rate : mean growth rate, 1/s; until (n,) : the rate in the sinh law at each
-    time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
+    times (n,) in s, those of the samples; rate : mean growth rate, 1/s; sinh_rate (n,) : the rate in the sinh law at
+    each time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
     """
 
     times: np.ndarray
     rate: float
-    until: np.ndarray
+    sinh_rate: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def growth(assembly: Assembly) -> Growth:
     values, p = _covering(path), assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
     arguments = (rate, path.forces.period, p)
-    return Growth(times, growth_rate(*arguments), growth_until(*arguments))
+    return Growth(times, growth_rate(*arguments), sinh_law_rate(*arguments))
 
 
 def _covering(path: TangentPath) -> np.ndarray:
@@ -92,7 +92,7 @@ def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
     """Median size over paths, for white samples of ``deviation`` (N) each."""
     growing, period = growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
-    return GrowthCurve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, intensity)))
+    return GrowthCurve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity)))
 
 
 def interpolation_error(path: TangentPath) -> np.ndarray:
@@ -143,7 +143,7 @@ def rounding(assembly: Assembly) -> GrowthCurve:
     rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
     return GrowthCurve(
-        growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, each**2 / path.step))
+        growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, each**2 / path.step))
     )
 
 

@@ -53,16 +53,16 @@ def with_error_of_sweep(
 ) -> Result:
     """The result with what rounding makes of its deviations, at some speeds on all roads."""
     at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED).round().astype(int))
-    again = np.array(
+    recomputed = np.array(
         [[_direct(linear, road, filters, float(swept.speeds[i]), digit) for i in at] for road in roads.values()]
     )
     deviation = swept.deviation[:, at]
     told = {}
     for i, (name, unit) in enumerate(zip(swept.outputs, swept.units, strict=True)):
-        known = np.isfinite(deviation[..., i]) & np.isfinite(again[..., i])
+        known = np.isfinite(deviation[..., i]) & np.isfinite(recomputed[..., i])
         size = rms(deviation[..., i][known])
         if size > 0.0:
-            error = max(SAFETY * rms(again[..., i][known] - deviation[..., i][known]), DIGIT / 4.0 * size)
+            error = max(SAFETY * rms(recomputed[..., i][known] - deviation[..., i][known]), DIGIT / 4.0 * size)
             told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return stated(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")

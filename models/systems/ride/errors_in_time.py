@@ -40,7 +40,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
         apart = {f"{name}{APART}": each[:, i] for i, name in enumerate(drive.names) if np.isfinite(each[:, i]).all()}
         return Series(time, channels | apart)
 
-    def again(times: float, share: float) -> Series:
+    def rerun(times: float, share: float) -> Series:
         every = round(times)
         end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
         wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
@@ -54,7 +54,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{APART}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    return estimated(run, fine, again, ORDER, step)
+    return estimated(run, fine, rerun, ORDER, step)
 
 
 def _until(profile: SpeedProfile, end: float) -> SpeedProfile:

@@ -7,6 +7,7 @@ copies and the engines: what stands for the vehicle over speed keeps them on the
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +19,10 @@ from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
+from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.runner import Progress as Done
+from models.ensemble.store import Arrays
+from models.ensemble.workers import Crew
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.nonlinear_copies import Copies, copies_in_time, followed
@@ -90,17 +95,14 @@ def linearised(
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
     linear, on_road, begun = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
-    small, replaced, copies = [], [], {}
+    small, replaced = [], []
     for i, speed in enumerate(speeds):
         progress("statistical linearisation", 0.3 * i / len(speeds))
         small.append(stationary(excited(linear(speed), road, speed)).deviation)
         replaced.append(statistically_linear(on_road, road, speed))
     shown = sampling.shown(speeds)
     beside = sampling.beside or [shown]
-    for i, speed in enumerate(beside):
-        progress(f"Monte Carlo at {speed:g} m/s", 0.3 + 0.4 * i / len(beside))
-        lasting, count, seed = sampling.lasting, sampling.copies, sampling.seed
-        copies[speed] = copies_in_time(vehicle, road, speed, lasting, copies=count, seed=seed)
+    copies = _copies(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
     by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small}
@@ -132,6 +134,45 @@ def linearised(
         return labelled
     known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
     return with_error_of_copies(labelled, vehicle, road, known, copies, sampling.seed)
+
+
+@dataclass(frozen=True)
+class CopiesBySpeed:
+    """Job (see ``models.ensemble.runner``): path i is all copies at the i-th speed (m/s)."""
+
+    vehicle: SpatialVehicle
+    road: Excitation
+    speeds: tuple[float, ...]
+    sampling: Sampling
+
+    def __call__(self, paths: range) -> Arrays:
+        """Arrays of ``Copies``, their first axis the speeds."""
+        made = [self._at(self.speeds[i]) for i in paths]
+        return {name: np.array([getattr(each, name) for each in made]) for name in Copies.__dataclass_fields__}
+
+    def _at(self, speed: float) -> Copies:
+        s = self.sampling
+        return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
+
+    def facts(self) -> dict[str, Any]:
+        """Nothing, as the blocks are not kept."""
+        return {}
+
+
+def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
+    """Copies by their speeds (m/s)."""
+
+    def tell(state: Done) -> None:
+        progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
+
+    with Crew.of(scene, usual=1).at_work(len(job.speeds)) as pool:
+        made = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
+    return {
+        speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
+        for speed, names, moments, step, duration, settling in zip(
+            job.speeds, *(made[name] for name in Copies.__dataclass_fields__), strict=True
+        )
+    }
 
 
 def _replaced_at(
@@ -214,7 +255,7 @@ def _with_error_of_steps(
         known = ~np.isnan(ride.outputs).any(axis=0)
         return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
-    def again(times: float, share: float) -> Series:
+    def rerun(times: float, share: float) -> Series:
         longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
         count = int(REPEATED * share * steps / times)
         read = table[:: round(times)] if times >= 1.0 else _halved(table)
@@ -224,7 +265,7 @@ def _with_error_of_steps(
 
     outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
-    return estimated(run, fine, again, ORDER, path.step)
+    return estimated(run, fine, rerun, ORDER, path.step)
 
 
 def _halved(table: np.ndarray) -> np.ndarray:
@@ -328,7 +369,11 @@ def _read(
         if spec.kind == "force" and spec.part in bent:
             values[:] = np.nan
         elif spec.kind == "tyre force" and spec.tyre in pushing:
-            elastic = rows @ row_of(replace(output, rate=0.0 * output.rate, road_rate=0.0 * output.road_rate))
+            elastic = rows @ row_of(
+                replace(
+                    output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
+                )
+            )
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
     return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs, at)
@@ -336,4 +381,12 @@ def _read(
 
 def row_of(output: Output) -> np.ndarray:
     """Factors (3 n + 2 w,) of accelerations, rates, positions, road heights and their rates."""
-    return np.concatenate([output.acceleration, output.rate, output.displacement, output.road, output.road_rate])
+    return np.concatenate(
+        [
+            output.acceleration_factors,
+            output.rate_factors,
+            output.displacement_factors,
+            output.road_factors,
+            output.road_rate_factors,
+        ]
+    )

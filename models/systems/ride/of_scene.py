@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from models.core.errors import InputError
 from models.core.scene_effects import extended
+from models.own_model.scene_vehicle import scene_vehicle
 from models.road.excitation import Excitation
 from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
@@ -16,7 +17,6 @@ from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle, Wheel
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
-from models.vehicles.vehicle_file import load_vehicle
 
 if TYPE_CHECKING:
     from models.road.fitted import FittedRoad
@@ -61,7 +61,7 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 
 def _built(scene: RideScene) -> Built:
     file, reduced = scene.vehicle.file, scene.study == CLOSED
-    return extended(Built(load_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene)
+    return extended(Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene)
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:

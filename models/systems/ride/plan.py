@@ -45,6 +45,7 @@ def describe(scene: RideScene) -> str:
     lines = [
         ("scene", f"{scene.file}, study {scene.study}"),
         ("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}"),
+        *(("read", note) for note in vehicle.notes),
         *_bodies(vehicle),
         ("road", road_of(scene, there).label(half_track_of(scene, there))),
         *(("", text) for text in met(scene, there)),
@@ -86,7 +87,7 @@ def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
     for body in vehicle.bodies:
         on = f" on {body.parent}" if body.parent else ""
         yield "  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"
-    parts = (len(vehicle.springs), len(vehicle.bars), len(vehicle.tyres))
+    parts = (len(vehicle.springs) + len(vehicle.joint_elements), len(vehicle.bars), len(vehicle.tyres))
     yield "  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)
     frequencies = "frequencies depend on the speed"
     if not (vehicle.side_forces or vehicle.drags):

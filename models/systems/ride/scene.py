@@ -23,7 +23,7 @@ Places = Literal["own", "tracks"]
 class RideVehicle(Strict):
     """[vehicle]: a vehicle file, and the point about which it is linear."""
 
-    file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
     operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
     accept: list[Query] = accepted()

@@ -57,8 +57,10 @@ def _slips(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> I
     named = {row.name: row for row in rows}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{part} {force.name}"] for part in ("side velocity", "roll", "yaw"))
-        displacement = force.roll_steer * roll.displacement + yaw.displacement
-        yield replace(yaw, name=f"slip {force.name}", rate=-side.rate / speed, displacement=displacement)
+        displacement = force.roll_steer * roll.displacement_factors + yaw.displacement_factors
+        yield replace(
+            yaw, name=f"slip {force.name}", rate_factors=-side.rate_factors / speed, displacement_factors=displacement
+        )
 
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
@@ -139,5 +141,5 @@ class InTime:
     def of(self, name: str) -> np.ndarray:
         """Values at every row."""
         row = {output.name: output for output in self.seen.outputs}[name]
-        road = np.concatenate([row.road, row.road_rate])
-        return self.positions @ row.displacement + self.rates @ row.rate + self.heights @ road
+        road = np.concatenate([row.road_factors, row.road_rate_factors])
+        return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

@@ -1,8 +1,8 @@
 """What a scene of a measured drive will compute: printed by ``twinrig show``, checked before any run."""
 
 from models.core.assumptions import assumption_lines
+from models.measured.drive import read_drive
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.drive import read_drive
 from models.systems.single_track.run import inputs
 from models.systems.single_track.scene import SingleTrackScene
 

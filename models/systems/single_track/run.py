@@ -9,8 +9,8 @@ from models.core.discretisation import not_estimated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.core.smoothing import smoothed
+from models.measured.drive import Measured, read_drive
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.drive import Measured, read_drive
 from models.systems.single_track.equations import march, reports
 from models.systems.single_track.scene import SensorTable, SingleTrackScene
 

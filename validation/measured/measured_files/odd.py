@@ -137,10 +137,12 @@ def difference(source: Source, truth: Truth, says: str) -> float:
     return max(_apart(channels[name], truth[name], bool(says)) for name in truth)
 
 
-def _apart(read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], part: bool) -> float:
+def _apart(
+    read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], partial_allowed: bool
+) -> float:
     """Largest difference of times and values; a part of the samples will do where that was said."""
     count = len(read_channel[0])
-    if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not part):
+    if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not partial_allowed):
         return np.inf
     times, values = truth[0][:count], truth[1][:count]
     if not np.array_equal(np.isnan(read_channel[1]), np.isnan(values)):

@@ -95,7 +95,7 @@ def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
     A[2 * n :, 2 * n :] = np.kron(np.eye(len(road.heights)), speed * road.F.astype(np.longdouble)).reshape(
         len(road.heights) * m, -1
     )
-    C += linear.read.acceleration @ (A - system.A)[n : 2 * n]
+    C += linear.read.acceleration_factors @ (A - system.A)[n : 2 * n]
     met = hits(system)
     before, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
     for j, b in enumerate(met.B):

@@ -16,7 +16,7 @@ from models.systems.braking.stop_report import Stop
 ENGINE, WINDOWED = "reference", False
 
 
-def answer(scene: BrakingScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> Answer:
     """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)

@@ -11,7 +11,7 @@ ENGINE, WINDOWED = "reference", False
 QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
-def answer(scene: ContactScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -> Answer:
     """Press the bodies and roll them at every creepage."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")

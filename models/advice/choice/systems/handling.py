@@ -14,7 +14,7 @@ TYRES = ("load", "fx", "fy", "mz")
 """Of every tyre, a case each."""
 
 
-def answer(scene: HandlingScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> Answer:
     """Drive every manoeuvre."""
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [each.detail for each in runs]

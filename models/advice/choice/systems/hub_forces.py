@@ -9,7 +9,7 @@ from models.systems.hub_forces.scene import HubScene
 ENGINE, WINDOWED = "mujoco", True
 
 
-def answer(scene: HubScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> Answer:
     """Measure, and run as the scene holds roll and pitch."""
     path = run(scene, engine, error=error)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION.items()}

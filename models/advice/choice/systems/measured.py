@@ -16,7 +16,7 @@ FINE = 60
 """Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
 
 
-def answer(scene: MeasuredScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> Answer:
     """Record, and march; the seconds are those of the march."""
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"

@@ -12,7 +12,7 @@ CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Calls of a step of methods that do not count them."""
 
 
-def answer(scene: Scene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: Scene, engine: str, error: bool = False) -> Answer:
     """Run the scene."""
     assembly = assemble(scene)
     begun = time.process_time()

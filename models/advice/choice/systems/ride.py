@@ -24,7 +24,7 @@ def opened(scene: RideScene | InTime) -> InTime:
         return in_time(ReducedScene.complete(scene))
 
 
-def answer(scene: InTime, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: InTime, engine: str, error: bool = False) -> Answer:
     """March the copies at every speed, by their own equations; InputError for another engine."""
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")

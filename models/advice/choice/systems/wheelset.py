@@ -13,7 +13,7 @@ from models.systems.wheelset.scene import WheelsetScene
 ENGINE, WINDOWED = "reference", True
 
 
-def answer(scene: WheelsetScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> Answer:
     """Run every path. Of quantities of patches a path begins with the first one, all its times one after the other."""
     paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
     quantities = {

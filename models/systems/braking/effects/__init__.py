@@ -13,9 +13,9 @@ NOISE, BITS, SCALE = ("noise",), ("bits", "range"), ("gain", "offset")
 """Keys of white noise, of the steps of a converter, and of a sensor that is not set right."""
 
 
-def _differs(part: Any, keys: tuple[str, ...]) -> bool:
+def _differs(table: Any, keys: tuple[str, ...]) -> bool:
     """Whether any of these keys of a table of the scene is other than by default."""
-    return any(getattr(part, key) != type(part).model_fields[key].default for key in keys)
+    return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
 
 
 def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: str, usual: dict[str, float]) -> Entry:

@@ -15,9 +15,12 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
 
     def there(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
-        return any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
+        acts = any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
+        return acts or (key in MEASURED and _measured(scene))
 
     def leave_out(table: dict[str, Any], scene: Any) -> None:
+        if key in MEASURED and _measured(scene):
+            raise InputError(scene.file, key, None, "belongs to the measured drive: leave out manoeuvres.NAME.measured")
         for manoeuvre in table["manoeuvres"].values():
             manoeuvre.pop(key, None)
 
@@ -49,6 +52,22 @@ def _with_trailer(table: Table, scene: Any) -> None:
     table.setdefault("vehicle", {})["file"] = TOWING
 
 
+MEASURED = ("steer", "brake", "drive")
+"""Controls that a measured drive has."""
+
+
+def _measured(scene: Any) -> bool:
+    """Whether a manoeuvre is a measured drive."""
+    return any(manoeuvre.measured for manoeuvre in scene.manoeuvres.values())
+
+
+def _without_measured(table: dict[str, Any], scene: Any) -> None:
+    """Roll straight ahead for as long, and from the same speed, as the drives that were measured."""
+    for manoeuvre in table["manoeuvres"].values():
+        manoeuvre.pop("measured", None)
+        manoeuvre.pop("stretch", None)
+
+
 LOOK = "a look into a table of times per call"
 TABLE = {
     "braking": _of_manoeuvres("brake", "Torque of the brakes", LOOK, {"controls": 1}, [[1.0, 0.0], [1.2, 1000.0]]),
@@ -60,6 +79,14 @@ TABLE = {
     ),
     "rough_road": _of_manoeuvres(
         "rough", "A rough road under all tyres, of plane waves", "a cosine per wave, tyre and call", {"waves": 48}, True
+    ),
+    "measured_drive": Entry(
+        "The steer angle and the speed of a measured drive, with the torques that this speed takes",
+        "manoeuvres.NAME.measured",
+        "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
+        there=_measured,
+        leave_out=_without_measured,
+        modules=("models.measured.drive", "models.systems.handling.following"),
     ),
     "inclined_wheels": Entry(
         "Wheels that lean, left and right ones mirrored",

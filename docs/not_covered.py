@@ -1,0 +1,57 @@
+"""The lists of docs/not_covered.md: functions that nothing independent notices, by the kept audit.
+
+``python -m docs.not_covered`` writes them; what stands before the mark is written by hand.
+"""
+
+from collections import Counter
+from itertools import groupby
+from textwrap import fill
+
+from docs.pages import ROOT
+from validation.blind_spots.table import WHY_HARMLESS, Line, read, uncovered
+
+PAGE = ROOT / "docs" / "not_covered.md"
+START = "<!-- functions: written by `python -m docs.not_covered`; do not edit below -->\n"
+HEADINGS = {
+    "noticed by nothing": "No row or test that has an independent second side and runs them noticed these:",
+    "noticed by nothing independent": "Rows noticed these, but none with an independent second side:",
+    "run by nothing": "Nothing with an independent second side runs these in the quick cases:",
+    "not audited": "The audit's rewriting sees nothing that these give back or write:",
+    WHY_HARMLESS[
+        0
+    ]: "A fault in these moves where a search begins, or its steps, and no value beyond the stated error, "
+    "as a test of each proves:",
+    WHY_HARMLESS[1]: "These hand on views of what they are given, arrays that are written over, zeros, or nothing:",
+}
+"""What stands before the list of each kind of ``uncovered``."""
+
+
+def counts(lines: list[Line]) -> str:
+    """Sentence on how many lines there are, and which commits they belong to."""
+    noticed, empty = sum(line.is_covered for line in lines), sum(line.ended == "no numbers" for line in lines)
+    commits = [f"{count} to `{commit}`" for commit, count in Counter(line.commit for line in lines).most_common()]
+    belong = ", ".join(commits[:-1]) + " and " + commits[-1] if len(commits) > 1 else commits[0]
+    text = (
+        f"The table has {len(lines)} lines; by commit, {belong}. {noticed} functions were noticed by something "
+        f"independent, and {empty} give no number."
+    )
+    return fill(text, 120) + "\n"
+
+
+def listed(names: list[str]) -> str:
+    """A list in Markdown with an item for each module."""
+    shown = [name.replace(".<locals>", "") for name in names]
+    modules = groupby(shown, lambda name: name.partition(":")[0])
+    return "".join("- " + ",\n  ".join(f"`{name}`" for name in same) + "\n" for _, same in modules)
+
+
+def page(text: str) -> str:
+    """The page with counts and lists as the kept table has them now."""
+    lines = read()
+    kinds = uncovered(lines, [line.function for line in lines])
+    parts = [f"{fill(HEADINGS[kind], 120)}\n\n{listed(names)}" for kind, names in kinds.items()]
+    return text.partition(START)[0] + START + "\n" + "\n".join([counts(lines), *parts])
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

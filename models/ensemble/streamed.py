@@ -1,0 +1,129 @@
+"""Statistics of values that come block by block, in memory that does not grow with their number.
+
+Means and central moments are merged as in P. Pebay, Formulas for robust, one-pass parallel computation of covariances
+and arbitrary-order statistical moments, SAND2008-6212 (2008), eqs. 1.1, 3.1 to 3.3. Quantiles of values on a grid are
+exact; those of other values are known to a stated share, by bins of a geometric width: C. Masson, J. E. Rim, H. K. Lee,
+DDSketch, PVLDB 12 (2019), section 2.1. Blocks that come in the same order give the same bits.
+"""
+
+from collections import Counter
+
+import numpy as np
+
+from models.ensemble.statistics import deviation_of, ranks
+
+ACCURACY = 0.005
+"""Largest relative error of a quantile by ``Spread``."""
+SMALLEST, LARGEST = 1e-15, 1e9
+"""Magnitudes between which ``Spread`` tells values apart; smaller ones count as 0."""
+
+
+class Moments:
+    """Count, mean (k,) and sums of the second to fourth powers of deviations from it, of values (n, k)."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.mean = self.second = self.third = self.fourth = np.zeros(())
+
+    def add(self, values: np.ndarray) -> None:
+        """Add values (n, ...)."""
+        n, m, total = self.count, len(values), self.count + len(values)
+        mean = values.mean(axis=0)
+        second, third, fourth = (((values - mean) ** power).sum(axis=0) for power in (2, 3, 4))
+        d = mean - self.mean
+        self.fourth = (
+            self.fourth
+            + fourth
+            + d**4 * n * m * (n * n - n * m + m * m) / total**3
+            + 6.0 * d**2 * (n * n * second + m * m * self.second) / total**2
+            + 4.0 * d * (n * third - m * self.third) / total
+        )
+        self.third = (
+            self.third + third + d**3 * n * m * (n - m) / total**2 + 3.0 * d * (n * second - m * self.second) / total
+        )
+        self.second = self.second + second + d**2 * n * m / total
+        self.mean, self.count = self.mean + d * m / total, total
+
+    def deviation(self, *place: int) -> tuple[float, float]:
+        """Standard deviation of the values at a place and its standard error, as ``statistics.deviation``."""
+        return deviation_of(self.count, float(self.second[place]) / self.count, float(self.fourth[place]) / self.count)
+
+
+class Covariance:
+    """Mean (..., p) and covariance (..., p, p) of values (n, ..., p)."""
+
+    def __init__(self) -> None:
+        self.count, self.mean, self._sums = 0, np.zeros(()), np.zeros(())
+
+    def add(self, values: np.ndarray) -> None:
+        """Add values (n, ..., p)."""
+        n, m, total = self.count, len(values), self.count + len(values)
+        mean = values.mean(axis=0)
+        apart, d = values - mean, mean - self.mean
+        moved = d[..., :, None] * d[..., None, :] * (n * m / total)
+        self._sums = self._sums + np.einsum("n...i,n...j->...ij", apart, apart) + moved
+        self.mean, self.count = self.mean + d * m / total, total
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Sums of products of deviations by one less than the count."""
+        return self._sums / max(self.count - 1, 1)
+
+
+class Tally:
+    """How often each value came, of values that lie on a grid: as many numbers as it has places. No value is nan."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[float] = Counter()
+
+    def add(self, values: np.ndarray) -> None:
+        """Add values (n,), some of which may be infinite."""
+        places, counts = np.unique(values, return_counts=True)
+        self._counts.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
+
+    @property
+    def values(self) -> np.ndarray:
+        """The values (m,) that came, rising."""
+        return np.array(sorted(self._counts))
+
+    @property
+    def counts(self) -> np.ndarray:
+        """How often each of ``values`` came (m,)."""
+        return np.array([self._counts[value] for value in sorted(self._counts)])
+
+    def quantile(self, level: float) -> tuple[float, float, float]:
+        """Quantile and the ends of its 95 % interval, exactly as ``statistics.quantile`` of all values."""
+        upto = np.cumsum(self.counts)
+        places = np.searchsorted(upto, np.array(ranks(int(upto[-1]), level)), side="right")
+        low, high, most = (float(self.values[place]) for place in places)
+        return low, high, most
+
+
+class Spread:
+    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the value of its rank; nan is left out."""
+
+    def __init__(self) -> None:
+        self._width = np.log1p(2.0 * ACCURACY / (1.0 - ACCURACY))
+        self._bins = int(np.ceil(np.log(LARGEST / SMALLEST) / self._width)) + 2
+        self._counts = np.zeros((0, self._bins), dtype=np.int64)
+
+    def add(self, values: np.ndarray) -> None:
+        """Add values (n, k)."""
+        columns = values.shape[1]
+        if not len(self._counts):
+            self._counts = np.zeros((columns, self._bins), dtype=np.int64)
+        sizes = np.clip(np.abs(values), 0.0, LARGEST)
+        with np.errstate(divide="ignore"):
+            place = np.ceil(np.log(sizes / SMALLEST) / self._width)
+        place = np.clip(np.nan_to_num(place, nan=0.0, neginf=0.0), 0, self._bins - 1).astype(np.int64)
+        known = ~np.isnan(values)
+        cells = (np.arange(columns) * self._bins + place)[known]
+        self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
+
+    def percentiles(self, levels: tuple[float, ...]) -> np.ndarray:
+        """Percentiles (levels, k); nan where no value was known."""
+        upto = self._counts.cumsum(axis=1)
+        wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
+        place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
+        middle = SMALLEST * np.exp(self._width * place) * (1.0 - ACCURACY)
+        return np.where(upto[:, -1] > 0, np.where(place == 0, 0.0, middle), np.nan)

@@ -1,0 +1,197 @@
+"""An MJCF file as the vehicle of a scene: the description that vehicle files in TOML make, by another reading.
+
+The chassis is the body with a free joint, or with three slides and three hinges. What rides on it keeps its hinges,
+slides, springs, dampers and fixed tendons. Tyres, road, steering, brakes and drive are twinrig's: joints that spin or
+steer a wheel, what acts on them, and contacts are left out, and the vehicle's notes say so.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NoReturn
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.own_model.car_bodies import CarBodies, car_bodies
+from models.own_model.car_joints import Roles, forget, roles_of
+from models.own_model.content import KINDS, contents, ranges
+from models.own_model.file import check_sane, compiled
+from models.own_model.reading import joint_elements, label, moving, place_of
+from models.own_model.wheel_sites import WheelSite, wheel_sites
+from models.own_model.xml_guard import Document, guarded
+from models.vehicles.free_vehicle import CARRIER, SWAY, rotor
+from models.vehicles.spatial import (
+    JointElement,
+    PartOutput,
+    PointOutput,
+    SideForce,
+    SpatialOutput,
+    SpatialVehicle,
+    TurnOutput,
+    Tyre,
+    TyreOutput,
+    Vector,
+)
+from models.vehicles.spatial_linear import preloads
+from models.vehicles.vehicle_checks import check
+
+CONTACT = "contact"
+"""The content that a car may have beside twinrig's tyres: it is left out."""
+GRAVITY = 9.81
+DIFFERS = 0.01
+"""Relative difference from which a preload is told that the file has otherwise."""
+
+
+def car(path: Path) -> SpatialVehicle:
+    """The vehicle of an MJCF file, unloaded; InputError for what no vehicle of a scene can have."""
+    document = guarded(path)
+    if document.kind != "MJCF":
+        raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
+    model, _ = compiled(document)
+    check_sane(model, path.name)
+    return _Reader(model, document).vehicle()
+
+
+@dataclass
+class _Reader:
+    """The parts of one file."""
+
+    model: mujoco.MjModel
+    document: Document
+    notes: list[str] = field(default_factory=list)
+
+    def vehicle(self) -> SpatialVehicle:
+        """All parts, checked as a whole."""
+        model, file = self.model, self.document.path.name
+        design = mujoco.MjData(model)
+        design.qpos[:] = model.qpos0
+        mujoco.mj_kinematics(model, design)
+        wheels = wheel_sites(model, design, self.document)
+        roles = roles_of(model, design, wheels, self.document)
+        self._leave_out(roles)
+        self._check_gravity()
+        parts = car_bodies(model, design, roles, self.document, _reserved(wheels))
+        elements = tuple(self._elements(parts))
+        tyres = tuple(_tyre(wheel, parts) for wheel in wheels)
+        axles = tuple(float(next(w.point[0] for w in wheels if w.axle == i)) for i in range(wheels[-1].axle + 1))
+        outputs = (*_outputs(parts, elements, tyres), *self._points(design, parts, wheels))
+        vehicle = SpatialVehicle(
+            name=file,
+            bodies=parts.bodies,
+            springs=(),
+            tyres=tyres,
+            axles=axles,
+            side_forces=tuple(_side_force(wheel, parts) for wheel in wheels if wheel.cornering),
+            outputs=outputs,
+            joint_elements=elements,
+            ranges=tuple(self._ranges(parts)),
+        )
+        check(vehicle, file)
+        return self._at_rest(vehicle)
+
+    def _refuse(self, place: str, value: object, said: str) -> NoReturn:
+        raise InputError(self.document.path.name, place, value, said)
+
+    def _leave_out(self, roles: Roles) -> None:
+        """Forget what twinrig has in another way; refuse what else has no equal."""
+        acted = forget(self.model, roles)
+        joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
+        for row in contents(self.model, self.document):
+            if row.kind != CONTACT:
+                said = f"{row.line()}: a vehicle of a scene cannot have it"
+                self._refuse("", None, said)
+            KINDS[CONTACT][2](self.model)
+            joints.append("contacts")
+        if joints or acted:
+            listed = ", ".join((*joints, *acted))
+            self.notes.append(f"tyres, steering, brakes and drive are twinrig's; not built: {listed}")
+        if limited := ranges(self.model):
+            self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
+
+    def _check_gravity(self) -> None:
+        """Refuse gravity along another direction than down; tell another one than that of scenes."""
+        gravity, name = np.array(self.model.opt.gravity), "option gravity"
+        if np.any(gravity[:2]) or gravity[2] > 0.0:
+            self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")
+        if gravity[2] != -GRAVITY:
+            self.notes.append(f"gravity is {GRAVITY:g} m/s^2, and not the file's {-gravity[2]:g}")
+        for b in moving(self.model):
+            if self.model.body_gravcomp[b]:
+                self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
+
+    def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
+        """What acts along coordinates of the suspension, with the signs of their axes."""
+        joints = {place_of(self.model, j)[0]: j for j in range(self.model.njnt)}
+        for element in joint_elements(self.model):
+            numbers = [joints[body] for body, _ in element.coordinates]
+            for j in numbers:
+                if j not in parts.coordinates:
+                    said = f"acts along {label(self.model, 'joint', j)}, which twinrig moves, and along others"
+                    self._refuse(element.name, None, said)
+            moved = [parts.coordinates[j] for j in numbers]
+            factors = tuple(factor * sign for factor, (_, sign) in zip(element.factors, moved, strict=True))
+            yield replace(element, coordinates=tuple(at for at, _ in moved), factors=factors)
+
+    def _ranges(self, parts: CarBodies) -> Iterator[tuple]:
+        """Stops of the suspension in its coordinates."""
+        model = self.model
+        for j, (at, sign) in parts.coordinates.items():
+            if model.jnt_limited[j]:
+                low, high = sorted(sign * (model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]))
+                yield at, float(low), float(high)
+
+    def _points(self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]) -> Iterator[PointOutput]:
+        """Vertical acceleration of every other site that has a name."""
+        taken = {wheel.site for wheel in wheels}
+        for s in range(self.model.nsite):
+            name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
+            if name and s not in taken and body in parts.of:
+                yield PointOutput(name, "acceleration", parts.of[body], _vector(design.site_xpos[s]), (0.0, 0.0, 1.0))
+
+    def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
+        """The vehicle, whose springs bear what holds it at rest; the file's own preloads are told where they differ."""
+        held = preloads(replace(vehicle, gravity=GRAVITY)).parts
+        changed = [
+            f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"
+            for e in vehicle.joint_elements
+            if abs(e.held - held[e.name]) > DIFFERS * abs(held[e.name])
+        ]
+        if changed:
+            said = "preloads (N, N m) hold the design position at rest and stand for the file's"
+            self.notes.append(f"{said}: {', '.join(changed)}")
+        bare = tuple(replace(element, held=0.0) for element in vehicle.joint_elements)
+        return replace(vehicle, joint_elements=bare, notes=tuple(self.notes))
+
+
+def _reserved(wheels: tuple[WheelSite, ...]) -> set[str]:
+    """Names of the bodies that a system adds to a car."""
+    return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
+
+
+def _tyre(wheel: WheelSite, parts: CarBodies) -> Tyre:
+    at, spin = _vector(wheel.point), parts.spin.get(wheel.name)
+    return Tyre(wheel.name, parts.of[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin)
+
+
+def _side_force(wheel: WheelSite, parts: CarBodies) -> SideForce:
+    x, y, _ = _vector(wheel.point)
+    return SideForce(wheel.name, parts.chassis, (x, y, 0.0), parts.chassis, wheel.cornering)
+
+
+def _outputs(parts: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[Tyre, ...]) -> Iterator[SpatialOutput]:
+    """Motion of the chassis, travels of springs and dampers, forces of tyres."""
+    chassis = next(body for body in parts.bodies if body.name == parts.chassis)
+    yield PointOutput(chassis.name, "acceleration", chassis.name, chassis.position, (0.0, 0.0, 1.0))
+    for turn, axis in (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0))):
+        yield TurnOutput(f"{turn} acceleration", "angular acceleration", chassis.name, axis)
+    for element in elements:
+        yield PartOutput(f"travel {element.name}", "travel", element.name)
+    for tyre in tyres:
+        yield TyreOutput(f"tyre force {tyre.name}", "tyre force", tyre.name)
+
+
+def _vector(numbers: np.ndarray) -> Vector:
+    x, y, z = np.asarray(numbers, float).tolist()
+    return x, y, z

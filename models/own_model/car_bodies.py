@@ -1,0 +1,219 @@
+"""Bodies of an MJCF car in the description of a vehicle: what does not move against another body is one with it.
+
+A body with slides alone, or with hinges through its centre of mass, has them itself; hinges elsewhere are a body
+without mass at their place, and so are joints in another order than that of the freedoms.
+"""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.own_model.car_joints import Roles, freedom_of, joints_of, told
+from models.own_model.reading import moving
+from models.own_model.wheel_sites import SAME, WheelSite
+from models.own_model.xml_guard import Document
+from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
+
+ROUND = 1e-9
+"""Share of a wheel's inertia by which it may differ from that of a body of revolution about its axle."""
+ROUNDING = 1e-12
+"""m: a hinge so near to a centre of mass is in it."""
+
+
+class Mass(NamedTuple):
+    """mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in the vehicle's axes (kg m^2)."""
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+
+
+@dataclass(frozen=True)
+class CarBodies:
+    """bodies : parents before their riders; chassis : its name; of : name of the body that a body of the file is one
+    with; coordinates : of the suspension's joints, with the sign of their axes; spin : of every wheel that spins, by
+    the name of its tyre, kg m^2 about its axle."""
+
+    bodies: tuple[Body, ...]
+    chassis: str
+    of: dict[int, str]
+    coordinates: dict[int, tuple[tuple[str, Freedom], float]]
+    spin: dict[str, float]
+
+
+@dataclass
+class _Segment:
+    """Freedoms that a body has in their order; anchor : of the hinges among them."""
+
+    freedoms: list[Freedom] = field(default_factory=list)
+    joints: list[tuple[int, Freedom, float]] = field(default_factory=list)
+    anchor: np.ndarray | None = None
+
+    def takes(self, freedom: Freedom, anchor: np.ndarray) -> bool:
+        """Whether the next joint of a body can be one of it."""
+        order = FREEDOMS.index
+        if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
+            return False
+        return freedom[0] != "r" or self.anchor is None or bool(np.abs(anchor - self.anchor).max() <= ROUNDING)
+
+    def add(self, joint: int, freedom: Freedom, sign: float, anchor: np.ndarray) -> None:
+        """Take a joint."""
+        self.freedoms.append(freedom)
+        self.joints.append((joint, freedom, sign))
+        if freedom[0] == "r":
+            self.anchor = anchor
+
+
+def car_bodies(
+    model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
+) -> CarBodies:
+    """The bodies; InputError for joints that are oblique, and for wheels that are out of balance.
+
+    design : data of the model in the design position, with kinematics computed; reserved : names for other bodies.
+    """
+    return _Builder(model, design, roles, document, reserved).built()
+
+
+class _Builder:
+    """Joins the bodies of one file to those of the description."""
+
+    def __init__(
+        self, model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
+    ) -> None:
+        self.model, self.design, self.roles, self.document, self.reserved = model, design, roles, document, reserved
+        self.leaders = dict[int, int]()
+        for b in moving(model):
+            above = self.leaders.get(int(model.body_parentid[b]))
+            joined = b in roles.chassis[1:] or (above is not None and not self._kept(b))
+            self.leaders[b] = above if joined and above is not None else b
+        self.spin = dict[str, float]()
+        self.masses: dict[int, list[Mass]] = {leader: [] for leader in self.leaders.values()}
+        spinning = self._spinning()
+        for b, leader in self.leaders.items():
+            if b not in spinning:
+                self.masses[leader].append(self._mass(b))
+
+    def built(self) -> CarBodies:
+        """All bodies."""
+        bodies, coordinates, names = list[Body](), dict[int, tuple[tuple[str, Freedom], float]](), dict[int, str]()
+        for leader, masses in self.masses.items():
+            names[leader] = self._name(leader)
+            whole, above = combined(masses), self.leaders.get(int(self.model.body_parentid[leader]))
+            if leader in self.roles.chassis:
+                bodies.append(_body(names[leader], whole, FREEDOMS, None))
+                continue
+            assert above is not None
+            segments = self._segments(leader)
+            bodies += _links(names[leader], names[above], segments, whole, coordinates)
+        named = {b: names[leader] for b, leader in self.leaders.items()}
+        return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin)
+
+    def _kept(self, body: int) -> list[int]:
+        """Joints of the suspension that a body has."""
+        left_out = {*self.roles.spin, *self.roles.steer}
+        return [j for j in joints_of(self.model, body) if j not in left_out] if body not in self.roles.chassis else []
+
+    def _name(self, leader: int) -> str:
+        """That of its body; of the chassis, that of the heaviest of its bodies."""
+        body = max(self.roles.chassis if leader in self.roles.chassis else (leader,), key=self.model.body_mass.item)
+        name: str = self.model.body(body).name or f"body {body}"
+        return f"{name} of the file" if name in self.reserved else name
+
+    def _mass(self, body: int) -> Mass:
+        axes = self.design.ximat[body].reshape(3, 3)
+        inertia = axes * self.model.body_inertia[body] @ axes.T
+        return Mass(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
+
+    def _spinning(self) -> set[int]:
+        """Bodies that spin with wheels; their masses without the inertia about the axle, which goes to the spin."""
+        spinning = set[int]()
+        for joint, wheel in self.roles.spin.items():
+            body = int(self.model.jnt_bodyid[joint])
+            turned = [b for b in self.leaders if self._rides(b, body)]
+            behind = [j for b in turned for j in joints_of(self.model, b) if j > joint]
+            if behind:
+                said = f"lies behind {told(self.model, self.document, joint)}, which spins a wheel: nothing may"
+                raise InputError(self.document.path.name, told(self.model, self.document, behind[0]), None, said)
+            whole = combined([self._mass(b) for b in turned])
+            self._check_round(whole, wheel, joint)
+            self.spin[wheel.name] = float(whole.inertia[1, 1])
+            inertia = whole.inertia.copy()
+            inertia[1] = inertia[:, 1] = 0.0
+            self.masses[self.leaders[body]].append(whole._replace(inertia=inertia))
+            spinning.update(turned)
+        return spinning
+
+    def _rides(self, body: int, on: int) -> bool:
+        while body and body != on:
+            body = int(self.model.body_parentid[body])
+        return body == on
+
+    def _check_round(self, whole: Mass, wheel: WheelSite, joint: int) -> None:
+        """Refuse a wheel that shakes as it spins."""
+        inertia, beside = whole.inertia, np.abs((whole.centre - wheel.point)[[0, 2]]).max()
+        uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
+        if (whole.mass and (beside > SAME or uneven > ROUND * np.trace(inertia))) or not inertia[1, 1] > 0.0:
+            said = (
+                f"spins {wheel.name!r}, whose mass must be one of revolution about the axle: its centre is "
+                f"{beside:.3g} m off, its inertia {np.round(inertia, 9).tolist()} kg m^2"
+            )
+            raise InputError(self.document.path.name, told(self.model, self.document, joint), None, said)
+
+    def _segments(self, leader: int) -> list[_Segment]:
+        segments = [_Segment()]
+        for joint in self._kept(leader):
+            known, anchor = freedom_of(self.model, self.design, joint), self.design.xanchor[joint].copy()
+            if known is None:
+                axis = np.round(self.design.xaxis[joint], 9).tolist()
+                said = "is no hinge or slide along x, y or z of the vehicle: the suspension of a car has no others"
+                raise InputError(self.document.path.name, told(self.model, self.document, joint), axis, said)
+            if not segments[-1].takes(known[0], anchor):
+                segments.append(_Segment())
+            segments[-1].add(joint, *known, anchor)
+        return segments
+
+
+def combined(masses: list[Mass]) -> Mass:
+    """All of them as one rigid body."""
+    if len(masses) == 1:
+        return masses[0]
+    total = sum(each.mass for each in masses)
+    shares = [each.mass / total if total else 1.0 / len(masses) for each in masses]
+    centre = np.sum([share * each.centre for share, each in zip(shares, masses, strict=True)], axis=0)
+    inertia = np.sum([each.inertia + steiner(each.mass, each.centre - centre) for each in masses], axis=0)
+    return Mass(total, centre, inertia)
+
+
+def _links(
+    name: str,
+    above: str,
+    segments: list[_Segment],
+    whole: Mass,
+    coordinates: dict[int, tuple[tuple[str, Freedom], float]],
+) -> Iterator[Body]:
+    """A body on its joints; where they are goes into ``coordinates``."""
+    for number, segment in enumerate(segments):
+        last, at = number == len(segments) - 1, segment.anchor
+        itself = last and (at is None or np.abs(at - whole.centre).max() <= ROUNDING)
+        link = name if itself else f"{name} joint {number + 1}"
+        coordinates |= {joint: ((link, freedom), sign) for joint, freedom, sign in segment.joints}
+        if itself:
+            yield _body(name, whole, tuple(segment.freedoms), above)
+            return
+        yield Body(link, 0.0, _vector(whole.centre if at is None else at), tuple(segment.freedoms), parent=above)
+        above = link
+    yield _body(name, whole, (), above)
+
+
+def _body(name: str, whole: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
+    x, y, z = map(_vector, whole.inertia)
+    return Body(name, whole.mass, _vector(whole.centre), freedoms, (x, y, z), parent)
+
+
+def _vector(numbers: np.ndarray) -> Vector:
+    x, y, z = np.asarray(numbers, float).tolist()
+    return x, y, z

@@ -1,0 +1,132 @@
+"""Sites of an MJCF file that are named as tyres or hubs: where the wheels of a car are, and what their tyres are like.
+
+A site at the centre of a wheel whose name begins with "tyre" or "hub" makes a tyre of the rest of its name. What MJCF
+has no word for stands in the site's ``user``: vertical stiffness (N/m), damping (N s/m), cornering stiffness (N/rad).
+"""
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NoReturn
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.own_model.xml_guard import Document
+
+NAMED = re.compile(r"(?:tyre|hub)[ _.:-]*(.*)", re.IGNORECASE)
+EXAMPLE = '<site name="tyre front_left" pos="X Y Z" user="STIFFNESS DAMPING CORNERING"/>'
+SAME, APART = 1e-6, 0.2
+"""m: wheels of one axle lie so close along x, and those of two axles at least so far apart."""
+ABREAST = 2
+"""Wheels of an axle at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class WheelSite:
+    """name : of the tyre; site, body : their numbers in the model; point (3,) in the design position, m.
+
+    axle : from the front, 0 first; stiffness (N/m), damping (N s/m), cornering (N/rad)."""
+
+    name: str
+    site: int
+    body: int
+    point: np.ndarray
+    axle: int
+    stiffness: float
+    damping: float
+    cornering: float
+
+
+def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[WheelSite, ...]:
+    """Wheels from the front, left before right; InputError where the sites make no axles of a car.
+
+    design : data of the model in the design position, with kinematics computed.
+    """
+    sites = {s: match[1] for s in range(model.nsite) if (match := NAMED.fullmatch(model.site(s).name))}
+    if not sites:
+        said = f"no site is named as a tyre or a hub: a vehicle needs one at the centre of every wheel, as {EXAMPLE}"
+        raise InputError(document.path.name, "worldbody", None, said)
+    for s, name in sites.items():
+        _check_site(model, design, document, s, name, list(sites.values()).count(name) > 1)
+    axles = _axles(design, document, model, sorted(sites, key=lambda s: -design.site_xpos[s, 0]))
+    return tuple(
+        WheelSite(
+            sites[s], s, int(model.site_bodyid[s]), design.site_xpos[s].copy(), axle, *_tyre_numbers(model, document, s)
+        )
+        for axle, abreast in enumerate(axles)
+        for s in abreast
+    )
+
+
+def place(model: mujoco.MjModel, document: Document, site: int) -> str:
+    """How messages call a site."""
+    name = model.site(site).name
+    line = document.line(("site",), name)
+    return f"site {name!r}" + (f" ({line})" if line else "")
+
+
+def _refuse(model: mujoco.MjModel, document: Document, site: int, value: object, said: str) -> NoReturn:
+    raise InputError(document.path.name, place(model, document, site), value, said)
+
+
+def _check_site(
+    model: mujoco.MjModel, design: mujoco.MjData, document: Document, site: int, name: str, twice: bool
+) -> None:
+    if not name:
+        _refuse(model, document, site, None, 'needs the name of its tyre behind "tyre" or "hub", as "tyre front_left"')
+    if twice:
+        _refuse(model, document, site, name, "two sites have this name behind their first word")
+    if not model.site_bodyid[site]:
+        _refuse(model, document, site, None, "lies in the world: it must be in the body of its wheel")
+    height = float(design.site_xpos[site, 2])
+    if not height > 0.0:
+        _refuse(model, document, site, height, "m is its height: a wheel's centre must lie above the road, z = 0")
+
+
+def _axles(
+    design: mujoco.MjData, document: Document, model: mujoco.MjModel, ordered: list[int]
+) -> list[tuple[int, ...]]:
+    """Sites of every axle, from the front; InputError where they are no axles."""
+    axles, x = [ordered[:1]], design.site_xpos[:, 0]
+    for before, site in pairwise(ordered):
+        apart = round(float(x[before] - x[site]), 9)
+        if SAME < apart < APART:
+            other = model.site(before).name
+            _refuse(
+                model, document, site, apart, f"m behind {other!r}: one axle within {SAME:g} m, or {APART:g} m apart"
+            )
+        if apart > SAME:
+            axles.append([])
+        axles[-1].append(site)
+    for sites in axles:
+        sites.sort(key=lambda site: -design.site_xpos[site, 1])
+        _check_axle(design, document, model, sites)
+    return [tuple(sites) for sites in axles]
+
+
+def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel, sites: list[int]) -> None:
+    """A left wheel and a right one, or one in the middle."""
+    y, at = design.site_xpos[sites, 1], f"the axle at x = {design.site_xpos[sites[0], 0]:.6g} m"
+    if len(sites) > ABREAST:
+        names = ", ".join(repr(model.site(s).name) for s in sites)
+        _refuse(model, document, sites[-1], None, f"{at} has {len(sites)} wheels, {names}: {ABREAST} at the most")
+    if len(sites) == ABREAST and not y[0] > 0.0 > y[1]:
+        _refuse(
+            model, document, sites[-1], y.tolist(), f"{at} must have a left wheel, y above 0, and a right one, below"
+        )
+    if len(sites) == 1 and abs(y[0]) > SAME:
+        _refuse(model, document, sites[0], float(y[0]), f"m is y of the only wheel of {at}: its partner is missing")
+
+
+def _tyre_numbers(model: mujoco.MjModel, document: Document, site: int) -> tuple[float, float, float]:
+    """Stiffness, damping and cornering stiffness from a site's ``user``."""
+    numbers = np.zeros(3)
+    given = model.site_user[site][:3] if model.nuser_site else numbers[:0]
+    numbers[: len(given)] = given
+    if not np.isfinite(numbers).all() or (numbers < 0.0).any() or not numbers[0] > 0.0:
+        allowed = "user must hold the tyre's stiffness in N/m above 0, then damping in N s/m and cornering in N/rad: "
+        _refuse(model, document, site, numbers.tolist(), f"{allowed}{EXAMPLE}")
+    stiffness, damping, cornering = numbers.tolist()
+    return stiffness, damping, cornering

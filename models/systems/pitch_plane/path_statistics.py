@@ -1,0 +1,50 @@
+"""Statistics of noise paths as they come, block by block: errors over time, drift-off, and the first paths themselves.
+
+Memory is that of the rows in time, however many paths there are.
+"""
+
+import numpy as np
+
+from models.ensemble.statistics import FAN
+from models.ensemble.store import Arrays
+from models.ensemble.streamed import Covariance, Moments, Spread, Tally
+
+PITCH = 3
+"""Place of the pitch among the states."""
+
+
+class PathStatistics:
+    """Of the blocks of ``noise_paths`` beside the true states (rows, 8).
+
+    moments, covariance : of the errors of all states at each row; fan : of the size of the pitch error; drift_off :
+    times (s), infinite for a path that never did; lost : paths that left all bounds; steepest (rows,) : largest pitch
+    (rad) of the others; first : arrays of the first ``saved`` paths.
+    """
+
+    def __init__(self, true: np.ndarray, saved: int) -> None:
+        self._true, self._saved, self._blocks = true, saved, list[Arrays]()
+        self.moments, self.covariance, self._spread, self.drift_off = Moments(), Covariance(), Spread(), Tally()
+        self.lost, self.steepest = 0, np.full(len(true), np.nan)
+
+    def add(self, block: Arrays) -> None:
+        """Add a block of paths."""
+        errors = block["states"] - self._true
+        self.moments.add(errors)
+        self.covariance.add(errors)
+        self._spread.add(errors[:, :, PITCH])
+        self.drift_off.add(block["drift_off"])
+        self.lost += int(np.isfinite(block["failed"]).sum())
+        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(block["states"][:, :, PITCH]), axis=0))
+        kept = sum(len(each["drift_off"]) for each in self._blocks)
+        if kept < self._saved:
+            self._blocks.append({name: values[: self._saved - kept] for name, values in block.items()})
+
+    @property
+    def first(self) -> Arrays:
+        """Arrays of the first paths."""
+        return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
+
+    @property
+    def fan(self) -> np.ndarray:
+        """Percentiles FAN of the magnitude of the pitch error (5, rows), each within ``streamed.ACCURACY``."""
+        return self._spread.percentiles(FAN)

@@ -1,0 +1,70 @@
+"""A car in MJCF as the vehicle of handling: energies beside those of MuJoCo's model of its file, a lane change."""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.multibody.numbers import Controls, Handling
+from models.own_model.car import car
+from models.systems.handling.run import REFERENCE, build, driven
+from validation.common.rows import CaseAnswer, Observed, Row, System
+from validation.own_model.car_energy import energies_apart
+from validation.own_model.cars import SALOON
+
+TITLE = "A user's own car: MJCF as the vehicle of a scene"
+SYSTEM: System = "rolling-vehicle"
+CONTROLS = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0)))
+SPEED = 22.0
+"""m/s."""
+ALIKE = 1e-10
+"""Of the largest."""
+STATES = {True: 10, False: 100}
+"""By whether the case is quick."""
+
+
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """Quick: 0.5 s of the lane change; in full 1.5 s."""
+    path = folder / "saloon.xml"
+    path.write_text(SALOON, encoding="utf-8")
+    handling = Handling(car(path), controls=CONTROLS)
+    return [_energy(handling, quick), *_lane_change(handling, 0.5 if quick else 1.5)], {}
+
+
+def _energy(handling: Handling, quick: bool) -> Row:
+    return Observed(
+        "own_car.energy",
+        SYSTEM,
+        "largest difference of kinetic and potential energy from MuJoCo's own model of the file, at random states",
+        energies_apart(handling, STATES[quick]),
+        "of the largest",
+    ).at_most(1e-11, "rounding, and rotors that weigh 1e-9 kg more; equal energies make equal equations", "native")
+
+
+def _lane_change(handling: Handling, duration: float) -> list[Row]:
+    """Both engines beside one another, and beside the plain equations at the state in which the drive ends."""
+    drives = {engine: driven(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
+    states = [drive.run.states for drive in drives.values()]
+    rows = [
+        Observed(
+            "own_car.lane_change",
+            SYSTEM,
+            f"largest difference of the states of Exudyn and MuJoCo over {duration:g} s of a lane change",
+            float(np.abs(states[0] - states[1]).max() / np.abs(states[1]).max()),
+            "of the largest",
+        ).at_most(ALIKE, "rounding: same tableau, same step", "shared kernel")
+    ]
+    run = drives["mujoco"].run
+    last = run.times[-1], run.positions[-1], run.rates[-1]
+    plain = build(REFERENCE, handling).acceleration(*last)
+    for engine in drives:
+        apart = np.abs(build(engine, handling).acceleration(*last) - plain).max() / np.abs(plain).max()
+        rows.append(
+            Observed(
+                f"own_car.plain_{engine}",
+                SYSTEM,
+                f"largest difference of accelerations in {engine} from the plain equations, at the end of it",
+                float(apart),
+                "of the largest",
+            ).at_most(ALIKE, "rounding", "native")
+        )
+    return rows

@@ -1,0 +1,210 @@
+"""FASTSIM, Hertz' ellipse and Kalker's coefficients in plain Python: the other side of the compiled contact.
+
+One cell after the other, tractions as complex numbers (real part along x), the slipping traction turned by its angle.
+Of ``models.contact`` it takes tables and calibrated constants, and no function. Units, axes and signs are those of
+``models.contact``.
+"""
+
+import cmath
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, barycentric_interpolate, make_interp_spline
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from models.contact.fastsim_grid import MOST_STRIPS, POWERS, Bound
+from models.contact.fastsim_many import AGAINST, GROWTH, OF_SPIN, OF_X, REACH, REACH_BY_RATIO, SLIDING, SPIN_BY_RATIO
+from models.contact.inputs import Array
+from models.contact.linear_theory import LONG_C33, LONG_FADING, LONG_RATIOS, NARROW_FADING, RATIOS, STIFFER_SPIN, TABLE
+from models.contact.linear_theory import POWERS as OF_NU
+
+PLACES = np.log(RATIOS)
+LOGARITHMS = np.log(TABLE)
+NODES = CubicHermiteSpline(PLACES, LOGARITHMS, np.gradient(LOGARITHMS, PLACES, axis=0, edge_order=2))
+LONG_NODES = make_interp_spline(np.log(LONG_RATIOS), np.log(LONG_C33), k=1)
+Left = Callable[[float], float]
+"""Share of the friction that is left at a slip, by the rolling speed."""
+
+
+def constant(slip: float) -> float:
+    """Coulomb's friction: all of it is left at any slip."""
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """One ellipse that rolls: a, b (m), load (N), mu, xi_x, xi_y, spin (1/m), flexibilities along x, y and in spin
+    (m^3/N)."""
+
+    a: float
+    b: float
+    load: float
+    mu: float
+    xi_x: float
+    xi_y: float
+    spin: float
+    l: tuple[float, float, float]  # noqa: E741  the letter of the papers
+
+    @property
+    def c(self) -> float:
+        """Mean semi-axis sqrt(a b) (m)."""
+        return math.sqrt(self.a * self.b)
+
+
+@dataclass(frozen=True)
+class Program:
+    """How FASTSIM is run: cells per strip, bound, flexibilities "one", "three" or "blended", half a first step and
+    turning ("second-order") or neither ("plain")."""
+
+    cells: int
+    bound: Bound = "intermediate"
+    flexibilities: str = "blended"
+    march: str = "second-order"
+
+
+def hertz(small: float, large: float, elastic: float, load: float) -> tuple[float, float, float]:
+    """Long and short semi-axis and approach (m) by curvatures (1/m), E* (Pa) and load (N); Johnson, section 4.2."""
+
+    def ratio_of(log_short: float) -> float:
+        g2 = math.exp(2.0 * log_short)
+        k, e = ellipk(1.0 - g2), ellipe(1.0 - g2)
+        return math.log((k - e) / (e / g2 - k) * large / small)
+
+    g = math.exp(brentq(ratio_of, math.log(1e-6), math.log(0.9999), xtol=1e-15))
+    k, e = ellipk(1.0 - g * g), ellipe(1.0 - g * g)
+    # curvature along the long axis: p0 short (K - E) / (E* e^2 long^2), p0 = 3 N / (2 pi long short)
+    long = (1.5 * load * (k - e) / (math.pi * elastic * (1.0 - g * g) * small)) ** (1.0 / 3.0)
+    return long, g * long, 1.5 * load * k / (math.pi * long * elastic)
+
+
+def coefficients(ratio: float, nu: float) -> Array:
+    """Kalker's C11, C22, C23, C33 (4,) at a/b and Poisson's ratio, as ``linear_theory.coefficients`` says."""
+    inner = min(max(ratio, 0.1), 10.0)
+    nodes = np.exp(NODES(math.log(inner)))
+    answer = np.array([_by_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
+    if inner == ratio:
+        return answer
+    asymptote, fading = (narrow, NARROW_FADING) if ratio < 1.0 else (long, LONG_FADING)
+    slenderness = min(ratio / inner, inner / ratio)
+    return asymptote(ratio, nu) * (1.0 + (answer / asymptote(inner, nu) - 1.0) * slenderness**fading)
+
+
+def _by_nu(values: Array, power: float, nu: float) -> float:
+    """Parabola of a power of the values at nu = 0, 1/4, 1/2."""
+    return float(barycentric_interpolate([0.0, 0.25, 0.5], values**power, nu)) ** (1.0 / power)
+
+
+def narrow(g: float, nu: float) -> Array:
+    """First row of Kalker's table E.3 (1990): a/b = g to 0."""
+    across, log_16 = math.pi**2 / (4.0 * (1.0 - nu)), math.log(16.0 / g**2)
+    spun = math.pi * math.sqrt(g) / (3.0 * (1.0 - nu)) * (1.0 + nu * (0.5 * log_16 + math.log(4.0) - 5.0))
+    return np.array([across, math.pi**2 / 4.0, spun, across / (4.0 * g)])
+
+
+def long(ratio: float, nu: float) -> Array:
+    """Last row of the same table, b/a = g to 0; C33 linear in logarithms through its nodes, and on beyond."""
+    g, log_16 = 1.0 / ratio, math.log(16.0 * ratio**2)
+    rest = 3.0 - math.log(4.0)
+    c11 = 2.0 * math.pi / ((log_16 - 2.0 * nu) * g) * (1.0 + rest / (log_16 - 2.0 * nu))
+    part = (1.0 - nu) * log_16 + 2.0 * nu
+    c22 = 2.0 * math.pi / g * (1.0 + (1.0 - nu) * rest / part) / part
+    c23 = 2.0 * math.pi / (3.0 * g * math.sqrt(g)) / ((1.0 - nu) * log_16 - 2.0 + 4.0 * nu)
+    return np.array([c11, c22, c23, _by_nu(np.exp(LONG_NODES(math.log(ratio))), OF_NU[3], nu)])
+
+
+def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, float, float]:
+    """L1, L2, L3 (m^3/N) of Kalker (1982), L3 with the least that passive tractions ask for."""
+    c11, c22, c23, _ = coefficients(a / b, nu)
+    along, across = 8.0 * a / (3.0 * shear * c11), 8.0 * a / (3.0 * shear * c22)
+    least = across / (1.0 + STIFFER_SPIN * (b / a) ** 2)
+    return along, across, max(math.pi * a * math.sqrt(a / b) / (4.0 * shear * c23), least)
+
+
+def stiffnesses(ellipse: Ellipse, peak: float, kind: str) -> Array:
+    """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
+    three, creep = 1.0 / np.array(ellipse.l), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
+    if kind == "three" or not creep.any():
+        return three
+    if kind == "one":
+        return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.l))
+    square = creep**2
+    mean = square.sum() / (square @ ellipse.l)
+    return three + _part(ellipse, creep * ellipse.a * three / peak) * (mean - three)
+
+
+def _part(ellipse: Ellipse, reach: Array) -> float:
+    """Part of the one flexibility by the reach of the three creepages (3,)."""
+    x, y, z = reach
+    shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
+    turns = OF_SPIN * shape**SPIN_BY_RATIO * z
+    rolling = (OF_X * x) ** 2 + y**2 + turns**2 + 2.0 * AGAINST * y * turns
+    begun = (math.sqrt(rolling) / (REACH * shape**REACH_BY_RATIO)) ** GROWTH
+    slides = (x**2 + y**2) / (1.0 + z**2) / SLIDING
+    return 1.0 - math.exp(-begun - slides**3)
+
+
+def fastsim(ellipse: Ellipse, program: Program, left: Left = constant) -> tuple[Array, Array]:
+    """fx, fy (N), mz (N m), share of the area that sticks (4,), and the tractions of all cells (strips, cells), complex
+    (Pa)."""
+    a, b, n, power = ellipse.a, ellipse.b, program.cells, POWERS[program.bound]
+    strips = 2 * math.ceil(n * min(max((b / (2.0 * a)) ** 0.6, 1.0), MOST_STRIPS) / 2.0 - 1e-9)
+    y = b * (strips - 1.0 - 2.0 * np.arange(strips)) / strips
+    half = a * np.sqrt(1.0 - (y / b) ** 2)
+    x = half[:, None] * (1.0 - (2.0 * np.arange(n) + 1.0) / n)
+    area = (2.0 * half / n * 2.0 * b / strips)[:, None] * np.ones(n)
+    shape = (1.0 - (x / a) ** 2 - (y[:, None] / b) ** 2) ** power
+    peak = ellipse.mu * ellipse.load / np.sum(shape * area)
+    k = stiffnesses(ellipse, peak, program.flexibilities)
+    rows = [_strip(ellipse, program, (yy, hh), k, peak, left) for yy, hh in zip(y, half, strict=True)]
+    p, slips = (np.array([row[i] for row in rows]) for i in range(2))
+    force, turn = np.sum(p * area), np.sum((x * p.imag - y[:, None] * p.real) * area)
+    return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), p
+
+
+def _strip(
+    ellipse: Ellipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
+) -> tuple[list[complex], list[bool]]:
+    """Tractions of one strip at y with a half length (m) from the leading edge back, and whether each cell slips."""
+    (y, half), n, power = place, program.cells, POWERS[program.bound]
+    dx, turns = 2.0 * half / n, program.march == "second-order"
+
+    def bound(x: float) -> float:
+        slip = complex(ellipse.xi_x - ellipse.spin * y, ellipse.xi_y + ellipse.spin * x)
+        return peak * left(abs(slip)) * (1.0 - (x / ellipse.a) ** 2 - (y / ellipse.b) ** 2) ** power
+
+    p, slipping, tractions, slips = 0j, False, list[complex](), list[bool]()
+    for i in range(n):
+        x = half - (i + 0.5) * dx
+        go = 0.5 * dx if turns and i == 0 else dx
+        middle = x + 0.5 * go if turns else x
+        rigid = complex(
+            k[0] * ellipse.xi_x - k[2] * ellipse.spin * y, k[1] * ellipse.xi_y + k[2] * ellipse.spin * middle
+        )
+        trial = p - rigid * go
+        if abs(trial) <= bound(x):
+            p, slipping = trial, False
+        elif turns and slipping and i > 0:
+            p = bound(x) * _turned(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
+        else:
+            p, slipping = bound(x) * trial / abs(trial), True
+        tractions.append(p)
+        slips.append(slipping)
+    return tractions, slips
+
+
+def _turned(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
+    """Direction of a slipping traction after a step dx; rigid : slip by flexibility in the step's middle, ``turning``
+    its lateral part's change per m of x, bound : Pa there.
+
+    tan(psi/2), psi between traction and -rigid, shrinks by exp(|rigid| dx / bound), the exponential an eighth power of
+    its series and the slip taken a little after the middle, both as ``fastsim_kernels`` says.
+    """
+    eighth = (abs(rigid.real) + abs(rigid.imag)) * dx / bound / 8.0
+    against = -(rigid - 1j * turning * dx * min(0.5 * eighth, 0.12 + 0.2 * eighth, 0.47))
+    h = min(abs(against) * dx / bound / 8.0, 50.0)
+    grown = (1.0 + h + h**2 / 2.0 + h**3 / 6.0) ** 8
+    psi = 2.0 * math.atan(math.tan(cmath.phase(p / against) / 2.0) / grown)
+    return against / abs(against) * cmath.exp(1j * psi)

@@ -1,0 +1,92 @@
+"""A wheel's profile on a rail's in plain numpy: the other side of ``models.rail.profile_contact``.
+
+Both wheels are described as they lie, no mirror: every circle of the wheel in space, the point at which its surface's
+normal is square to the rail, how deep that point lies; then means over the circles in contact. Patches that press each
+other down are settled by a solver. The nodes of wheel and rail are the package's. Axes, signs and units are those of
+``models.rail``.
+"""
+
+import numpy as np
+from scipy.interpolate import PPoly
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
+
+from models.contact.inputs import Array
+from models.rail.profile_contact import SHARPEST, TOUCH, LaidProfile, Pose
+from validation.contact.plain_fastsim import hertz
+
+
+def rail_of(profile: LaidProfile) -> PPoly:
+    """Depth of the right rail's surface below its top (m) over y (m) from the middle of the track."""
+    knots = profile.knots
+    return PPoly(np.array([knots[name][:-1] for name in ("c3", "c2", "c1", "c0")]), knots["y"], extrapolate=False)
+
+
+def circles(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
+    """Of each circle depth (n,), and place of the nearest point from the centre and the rail's normal there (n, 3)."""
+    head, nodes, rail = profile.head[0], profile.nodes, rail_of(profile)
+    turn = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()
+    # A point (r sin phi, side (arm + y), r cos phi) has the normal (sin phi, -side slope, cos phi) in the wheelset.
+    along, across, down = turn[0]
+    phase = np.arcsin(across * side * nodes["slope"] / np.hypot(along, down)) - np.arctan2(down, along)
+    radius = nodes["radius"]
+    points = np.column_stack([radius * np.sin(phase), side * (head.arm + nodes["y"]), radius * np.cos(phase)]) @ turn.T
+    y = pose.y + points[:, 1]
+    slope = side * rail(side * y, 1)
+    normals = np.column_stack([np.zeros(y.size), -slope, np.ones(y.size)]) / np.hypot(1.0, slope)[:, None]
+    depth = (pose.z + head.level + points[:, 2] - rail(side * y)) * normals[:, 2]
+    return np.where(np.isfinite(depth), depth, -1.0), points, normals
+
+
+def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
+    """TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
+    depth, points, normals = circles(side, pose, profile)
+    zone, length = profile.nodes["zone"], np.arange(depth.size) * profile.head[0].spacing
+    radial = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()[:, 2]
+    touches = np.zeros(int(profile.head[0].zones), TOUCH)
+    for k, touch in enumerate(touches):
+        weight = np.maximum(1.0 - np.abs(zone - k), 0.0) * np.maximum(depth, 0.0) ** 2
+        if not weight.any():
+            continue
+        normal = weight @ np.nan_to_num(normals)
+        normal /= np.linalg.norm(normal)
+        touch.depth = 7.0 / 6.0 * np.average(depth, weights=weight)
+        touch.n_y, touch.n_z = normal[1:]
+        touch.x, touch.y, touch.z = np.average(points, axis=0, weights=weight)
+        touch.along = 0.5 * normal @ radial / np.average(profile.nodes["radius"], weights=weight)
+        width = 7.0 * np.cov(length, aweights=weight, ddof=0)
+        touch.across = touch.depth / (width + touch.depth / SHARPEST)
+    if np.count_nonzero(touches["depth"] > 0.0) > 1:
+        touches["depth"] = settled(touches, modulus)
+    return touches
+
+
+def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
+    """Normal force (N) and semi-axes along and across (m) by Hertz at a penetration (m); zeros for a gap."""
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    long, short, approach = hertz(min(along, across), max(along, across), modulus, 1.0)
+    grown = (depth / approach) ** 0.5
+    axes = (long, short) if along <= across else (short, long)
+    return grown**3, grown * axes[0], grown * axes[1]
+
+
+def settled(touches: Array, modulus: float) -> Array:
+    """Depths (n,) of patches that press the surface down under each other."""
+    alone = touches["depth"].copy()
+    loads, axes = np.array([pressed(t.depth, t.along, t.across, modulus)[:2] for t in touches]).T
+    places = np.column_stack([touches[name] for name in ("x", "y", "z")])
+    normals = np.column_stack([touches["n_y"], touches["n_z"]])
+    apart = np.sum((places[:, None] - places) ** 2, axis=2) + (axes[:, None] ** 2 + axes**2) / 5.0
+    pushes = (normals @ normals.T) / np.sqrt(apart) / (np.pi * modulus)
+    np.fill_diagonal(pushes, 0.0)
+    loaded = alone > 0.0
+
+    def depths(load: Array) -> Array:
+        return alone - pushes @ load
+
+    def off(share: Array) -> Array:
+        left = np.where(loaded, np.maximum(depths(share * loads), 0.0) / np.where(loaded, alone, 1.0), 0.0)
+        return share - left**1.5
+
+    return depths(fsolve(off, np.ones(alone.size), xtol=1e-14) * loads)

@@ -1,0 +1,264 @@
+"""Kalker's theory of 1983 for one patch in plain Python: the other side of ``models.contact.simplified_kernels``.
+
+Cubic convolution is a Hermite spline whose slopes are central differences (scipy has such splines, and their roots);
+sums over the half-space are convolutions with ``half_space.influence``; fits are numpy's weighted covariances; the
+march runs on complex numbers. Units, axes and signs are those of ``models.contact``.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+from scipy.signal import convolve2d
+
+from models.contact.half_space import Z, influence, offsets
+from models.contact.inputs import Array
+from models.contact.material import Pair
+from models.contact.simplified_kernels import FINER, LEAST
+from models.contact.simplified_theory import Options
+
+Box = tuple[float, float, float, float]
+
+
+def hermite(nodes: Array, padded: Array) -> CubicHermiteSpline:
+    """Spline along the first axis through values on even nodes, given with one more at both ends."""
+    return CubicHermiteSpline(nodes, padded[1:-1], (padded[2:] - padded[:-2]) / (nodes[2] - nodes[0]))
+
+
+def continued(rows: Array) -> Array:
+    """Rows with one more before and after, on the parabola through the three nearest."""
+    return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Undeformed distance: nodes x (nx,) and y (ny,), heights (ny, nx) and its lowest point (m)."""
+
+    x: Array
+    y: Array
+    height: Array
+    bottom: tuple[float, float]
+
+    @cached_property
+    def padded(self) -> Array:
+        """Heights with one more node on every side."""
+        return continued(continued(self.height).T).T
+
+    def line(self, y: float, order: int = 0) -> CubicHermiteSpline:
+        """Distance, or its derivative to y of an order, as a function of x."""
+        return hermite(self.x, hermite(self.y, self.padded)(y, order))
+
+    def at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """Distance and its slopes to x and y on the net of x (nx,) and y (ny,)."""
+        lines, steep = [self.line(each) for each in y], [self.line(each, 1) for each in y]
+        return np.array([f(x) for f in lines]), np.array([f(x, 1) for f in lines]), np.array([f(x) for f in steep])
+
+    @cached_property
+    def low(self) -> float:
+        """Distance (m) at the bottom."""
+        return float(self.line(self.bottom[1])(self.bottom[0]))
+
+    @cached_property
+    def valleys(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Along x and along y: lines, two for each spacing and one through the bottom, and the root of the least
+        distance on each over the bottom."""
+        swapped = Bodies(self.y, self.x, self.height.T, self.bottom[::-1])
+        return swapped._valley(), self._valley()
+
+    def _valley(self) -> tuple[Array, Array]:
+        lines = np.linspace(self.y[0], self.y[-1], 2 * self.y.size - 1)
+        least = np.array([_least(self.line(y)) for y in lines])
+        order = np.argsort(np.append(lines, self.bottom[1]), kind="stable")
+        roots = np.append(np.sqrt(np.maximum(least - self.low, 0.0)), 0.0)
+        return np.append(lines, self.bottom[1])[order], roots[order]
+
+    def box(self, depth: float) -> Box:
+        """Rectangle x0, x1, y0, y1 (m) about the area below a depth (m) of a valley that rises to all sides."""
+        root, ends = math.sqrt(depth - self.low), list[float]()
+        for (lines, roots), bottom in zip(self.valleys, self.bottom, strict=True):
+            before, after = lines <= bottom, lines >= bottom
+            ends += [np.interp(root, roots[before][::-1], lines[before][::-1])]
+            ends += [np.interp(root, roots[after], lines[after])]
+        return ends[0], ends[1], ends[2], ends[3]
+
+
+def _least(line: CubicHermiteSpline) -> float:
+    """Least value of a spline within its nodes."""
+    turning = line.derivative().roots(extrapolate=False)
+    return float(min(line(line.x).min(), line(turning[np.isfinite(turning)]).min(initial=np.inf)))
+
+
+def middles(low: float, high: float, count: int) -> Array:
+    """Middles of equal parts."""
+    return low + (np.arange(count) + 0.5) * (high - low) / count
+
+
+def overlap(depth: float, low: float, height: Array, options: Options) -> Array:
+    """W times the pressure (m) at heights (m)."""
+    over = np.maximum(depth - height, 0.0)
+    return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
+
+
+def spread(values: Array, step: tuple[float, float], pair: Pair, parts: Array) -> Array:
+    """Displacement (m) on a square net by one component of traction (Pa) on it; parts : the influence's component."""
+    n = len(values)
+    kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, pair)[(..., *parts)]
+    return convolve2d(kernel, values, mode="valid")
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """One patch at a depth: W times the load (m^3), stiffness 1/W (Pa/m), approach and box (m), covered shares."""
+
+    depth: float
+    volume: float
+    stiffness: float
+    approach: float
+    box: Box
+    cover: Array
+
+    @property
+    def load(self) -> float:
+        """Load (N)."""
+        return self.stiffness * self.volume
+
+
+def at_depth(bodies: Bodies, depth: float, pair: Pair, options: Options) -> Pressed:
+    """The fit on the crude net."""
+    box, n = bodies.box(depth), options.net
+    step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
+    height, slope_x, slope_y = bodies.at(middles(*box[:2], n), middles(*box[2:], n))
+    cover = np.clip(0.5 + (depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
+    pressure = overlap(depth, bodies.low, height, options)
+    u = spread(pressure, step, pair, np.array([Z, Z]))
+    least = LEAST * (depth - bodies.low) / np.average(u, weights=cover)
+    stiffness = max(-1.0 / fitted(height[None], u[None], cover, step, options, True), least)
+    approach = float(np.average(stiffness * u + height, weights=pressure))
+    m = FINER * n
+    fine = overlap(depth, bodies.low, bodies.at(middles(*box[:2], m), middles(*box[2:], m))[0], options)
+    return Pressed(depth, float(fine.sum() * step[0] * step[1] / FINER**2), stiffness, approach, box, cover)
+
+
+def fitted(
+    u: Array, p: Array, cover: Array, step: tuple[float, float], options: Options, by_height: bool = False
+) -> float:
+    """Slope of u (k, n, n) against p by weighted least squares of all k, or of their slopes; ``by_height``: that of p
+    against u, by differences along y too."""
+    if options.fit == "displacement":
+        parts = np.array(
+            [np.cov(a.ravel(), b.ravel(), aweights=cover.ravel(), ddof=0) for a, b in zip(u, p, strict=True)]
+        )
+        products, squares = parts[:, 0, 1].sum(), parts[:, 1, 1].sum()
+    else:
+        products = squares = 0.0
+        for axis, size in ((2, step[0]), (1, step[1]))[: 2 if by_height else 1]:
+            weight = cover.take(range(1, cover.shape[axis - 1]), axis - 1) * cover.take(
+                range(cover.shape[axis - 1] - 1), axis - 1
+            )
+            du, dp = np.diff(u, axis=axis) / size, np.diff(p, axis=axis) / size
+            products, squares = products + np.sum(weight * du * dp), squares + np.sum(weight * dp * dp)
+    return float(squares / products if by_height else products / squares)
+
+
+def press(bodies: Bodies, approach: float, pair: Pair, options: Options) -> Pressed:
+    """The patch at a rigid approach (m)."""
+    over = approach - bodies.low
+
+    def off(part: float) -> float:
+        return at_depth(bodies, bodies.low + part * over, pair, options).approach - approach
+
+    return at_depth(bodies, bodies.low + brentq(off, 0.2, 1.0, xtol=1e-15) * over, pair, options)
+
+
+@dataclass(frozen=True, eq=False)
+class Strips:
+    """Strips: y, low and high end in x (s,) and their width (m), pressure (s, n) from the leading edge back (Pa)."""
+
+    y: Array
+    low: Array
+    high: Array
+    width: float
+    pressure: Array
+
+
+def strips(bodies: Bodies, pressed: Pressed, cells: int, options: Options) -> Strips:
+    """Strips between the places where the distance passes the depth; one too short to hold a node or the middle
+    between two nodes is none, as the package looks there for contact."""
+    box, ends = pressed.box, []
+    for y in middles(*box[2:], cells):
+        line = bodies.line(float(y))
+        places = line.solve(pressed.depth, extrapolate=False)
+        looked = np.linspace(bodies.x[0], bodies.x[-1], 2 * bodies.x.size - 1)
+        if places.size and (line(looked) < pressed.depth).any():
+            ends.append((y, places.min(), places.max(), line))
+    y, low, high = (np.array([each[k] for each in ends]) for k in range(3))
+    rows = [each[3](middles(b, a, cells)) for each, a, b in zip(ends, low, high, strict=True)]
+    pressure = overlap(pressed.depth, bodies.low, np.array(rows), options)
+    width = (box[3] - box[2]) / cells
+    carried = np.sum(pressure * (high - low)[:, None] * width / cells)
+    return Strips(y, low, high, width, pressure * pressed.load / carried)
+
+
+def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Tractions (s, n), complex (Pa), and which cells slip."""
+    xi_x, xi_y, spin = motion
+    tractions, slips = np.zeros(net.pressure.shape, complex), np.zeros(net.pressure.shape, bool)
+    for s, (y, low, high) in enumerate(zip(net.y, net.low, net.high, strict=True)):
+        n = net.pressure.shape[1]
+        dx, p, slipping, before = (high - low) / n, 0j, False, 0.0
+        for i, bound in enumerate(mu * net.pressure[s]):
+            x, go = high - (i + 0.5) * dx, dx if i else 0.5 * dx
+            rigid = complex(xi_x - spin * y, xi_y + spin * (x + 0.5 * go)) / flexibility
+            trial = p - rigid * go
+            if abs(trial) <= bound:
+                p, slipping = trial, False
+            elif slipping:
+                psi = cmath.phase(p / -rigid)
+                shrunk = math.exp(-abs(rigid) * go / (0.5 * (before + bound)))
+                p = bound * -rigid / abs(rigid) * cmath.exp(2j * math.atan(math.tan(0.5 * psi) * shrunk))
+            else:
+                p, slipping = bound * trial / abs(trial), True
+            tractions[s, i], slips[s, i], before = p, slipping, bound
+    return tractions, slips
+
+
+def refitted(pressed: Pressed, net: Strips, tractions: Array, pair: Pair, options: Options) -> float:
+    """W_1 = W_2 (m/Pa) of the tractions of a march."""
+    n, box = options.net, pressed.box
+    step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
+    across = _common(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1)) / step[1]
+    cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
+    along = np.array([_common(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells]) / step[0]
+    crude = np.einsum("sj,sik,si->jk", across, along, tractions)
+    p = np.array([crude.real, crude.imag])
+    u = np.array([sum(spread(p[m], step, pair, np.array([k, m])) for m in range(2)) for k in range(2)])
+    return fitted(u, p, pressed.cover, step, options)
+
+
+def _common(low: Array, high: Array, edges: Array) -> Array:
+    """Lengths that intervals (m,) have in common with the parts between edges (n + 1,): (m, n)."""
+    return np.maximum(np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1]), 0.0)
+
+
+def roll(
+    bodies: Bodies,
+    pressed: Pressed,
+    mu: float,
+    motion: tuple[float, float, float],
+    pair: Pair,
+    cells: int,
+    options: Options,
+) -> tuple[Array, float]:
+    """fx, fy (N), mz (N m) and the share of the area that sticks (4,), and W_1 (m/Pa)."""
+    net = strips(bodies, pressed, cells, options)
+    first, _ = march(net, mu, 1.0 / pressed.stiffness, motion)
+    flexibility = refitted(pressed, net, first, pair, options)
+    p, slips = march(net, mu, flexibility, motion)
+    area = ((net.high - net.low) / cells * net.width)[:, None] * np.ones(cells)
+    x = np.array([middles(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])
+    force, turn = np.sum(p * area), np.sum((x * p.imag - net.y[:, None] * p.real) * area)
+    return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), flexibility

@@ -1,0 +1,65 @@
+"""The saloon of ``cars`` beside MuJoCo's own model of its file: energies at states, by no equation of a system."""
+
+import mujoco
+import numpy as np
+
+from models.engines.spatial_reference import SpatialReference
+from models.multibody.numbers import Handling
+from models.systems.handling.run import bodies_energy
+from models.vehicles.free_vehicle import rotor
+from validation.own_model.cars import CORNERS, SALOON
+
+BACKWARDS = ("rl swing", "rr swing", "rl spin", "rr spin")
+"""Joints of the file whose axes point along -y."""
+
+
+def energies_apart(handling: Handling, count: int) -> float:
+    """Largest difference of the energies (kinetic, weights, springs) at random states, of the largest energy.
+
+    Equal energies at all states are equal equations of motion, but for dampers and tyres.
+    """
+    draw, n = np.random.default_rng(1), len(handling.vehicle.coordinates())
+    states = [(draw.uniform(-0.3, 0.3, n), draw.uniform(-3.0, 3.0, n)) for _ in range(count)]
+    pairs = np.array([(_of_mujoco(handling, *each), _described(handling, *each)) for each in states])
+    return float(np.abs(np.diff(pairs, axis=1)).max() / np.abs(pairs).max())
+
+
+def _places() -> dict[str, tuple[str, str]]:
+    """Coordinates of the description by the joints of the file."""
+    places = {"engine roll": ("engine joint 1", "rx"), "engine bounce": ("engine", "z")}
+    for name in CORNERS:
+        front = name.startswith("f")
+        places[f"{name} {'travel' if front else 'swing'}"] = (
+            (f"{name} strut", "z") if front else (f"{name} arm joint 1", "ry")
+        )
+        places[f"{name} spin"] = (rotor(name), "ry")
+    return places
+
+
+def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """J, by MuJoCo's own model of the file in the pose of the car."""
+    model = mujoco.MjModel.from_xml_string(SALOON)
+    data, coordinates = mujoco.MjData(model), handling.vehicle.coordinates()
+    motion = SpatialReference(handling.vehicle).motions_of(q, v)["body"]
+    arm, turning = motion.rotation @ model.body("body").ipos, motion.turn @ v
+    data.qpos[:3], data.qvel[:3] = motion.centre - arm, motion.shift @ v - np.cross(turning, arm)
+    mujoco.mju_mat2Quat(data.qpos[3:7], motion.rotation.ravel())
+    data.qvel[3:6] = motion.rotation.T @ turning
+    for name, place in _places().items():
+        joint, sign = model.joint(name), -1.0 if name in BACKWARDS else 1.0
+        i = [*coordinates].index(place)  # type: ignore[arg-type]
+        data.qpos[joint.qposadr], data.qvel[joint.dofadr] = sign * q[i], sign * v[i]
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    mujoco.mj_forward(model, data)
+    mass = np.empty((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    return float(data.energy[0] + 0.5 * data.qvel @ mass @ data.qvel)
+
+
+def _described(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """J, by the description; springs without the preloads that the file does not have."""
+    places, springs = handling.vehicle.coordinates(), 0.0
+    for e in handling.vehicle.joint_elements:
+        travel = sum(k * q[places.index(at)] for at, k in zip(e.coordinates, e.factors, strict=True))
+        springs += 0.5 * e.stiffness * travel**2
+    return bodies_energy(handling, q, v) + springs

@@ -1,0 +1,1 @@
+"""The wheelset once more in plain code."""

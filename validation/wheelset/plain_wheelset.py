@@ -1,0 +1,211 @@
+"""A wheelset of cones on round rails in plain vectors: contact, Hertz, creep forces, equations of motion.
+
+The laws of ``models.rail.wheel_forces`` and ``models.rail.equations`` anew, from their statement, without their code.
+From the cone's vector equation follows where it touches; from Hertz' integrals, the normal force; from Kalker's table,
+or FASTSIM as a user calls it, the creep forces of a contact. The axes are the track's: x along, y to the right, z down.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from models.contact.fastsim import RollingEllipse, fastsim
+from models.contact.linear_theory import forces as linear_forces
+from models.rail.wheelset import Wheelset
+
+SLOWEST = 0.1
+"""Speed (m/s) below which creepage is relative to this one, and both directions of rolling are mixed."""
+LEAST = 1e-12
+"""Least share of the squared eccentricity, and of what it lacks to 1, that is looked for."""
+
+
+class Touch(NamedTuple):
+    """Penetration (m), normal into the rail, place from the wheelset's centre (m), curvature along the track (1/m)."""
+
+    depth: float
+    normal: np.ndarray
+    place: np.ndarray
+    along: float
+
+
+class Axle(NamedTuple):
+    """Motion of the wheelset: its centre from the middle of the track (m), velocity with that of travel (m/s), unit
+    vectors along the axle and horizontally ahead, angular velocity, spin included (rad/s)."""
+
+    centre: np.ndarray
+    velocity: np.ndarray
+    axle: np.ndarray
+    ahead: np.ndarray
+    turning: np.ndarray
+
+
+class PatchForces(NamedTuple):
+    """Force (N) of a contact on the wheelset, moment about its centre (N m), and what the contact reports by name."""
+
+    force: np.ndarray
+    moment: np.ndarray
+    told: dict[str, float]
+
+
+def axle_of(state: np.ndarray, speed: float) -> Axle:
+    """Vectors of a state (10,) of ``models.rail.equations``."""
+    y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    axle = np.cos(roll) * np.array([-np.sin(yaw), np.cos(yaw), 0.0]) + np.array([0.0, 0.0, np.sin(roll)])
+    frame = roll_rate * ahead + np.array([0.0, 0.0, yaw_rate])
+    turning = frame + (spin - frame @ axle) * axle
+    return Axle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, ahead, turning)
+
+
+def touch(wheelset: Wheelset, side: float, axle: Axle) -> Touch:
+    """Where a cone touches its rail; side : 1 right, -1 left.
+
+    The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
+    The generator of that plane runs from the apex; the place is where it crosses the head's axis as seen along n.
+    """
+    w, (sine, cosine) = wheelset, wheelset.slant
+    outward = side * axle.axle
+    size, phase = np.hypot(outward[1], outward[2]), np.arctan2(outward[1], outward[2])
+    angle = phase - np.arccos(sine / size) if outward[1] > 0.0 else phase + np.arccos(sine / size)
+    normal = np.array([0.0, np.sin(angle), np.cos(angle)])
+    apex = axle.centre + (w.half_gauge + w.radius / w.conicity) * outward
+    middle = np.array([0.0, side * (w.half_gauge + w.head_radius * sine), w.radius + w.head_radius * cosine])
+    radial = (normal - sine * outward) / cosine
+    inward = -cosine * outward + sine * radial
+    aside = np.cross(np.array([1.0, 0.0, 0.0]), normal)
+    way = ((middle - apex) @ aside) / (inward @ aside)
+    depth = w.head_radius - float(normal @ (middle - apex))
+    return Touch(depth, normal, apex + way * inward - axle.centre, float(cosine / (2.0 * way * sine)))
+
+
+def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
+    """Force (N) and semi-axes along and across (m) at a penetration (m) by Hertz' theory, K. L. Johnson, Contact
+    mechanics (1985), eqs (4.26) to (4.33); curvatures of z = along x^2 + across y^2 (1/m), modulus E* (Pa)."""
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    flat, steep = sorted((along, across))
+
+    def shape(m: float) -> float:
+        return float((ellipe(m) / (1.0 - m) - ellipk(m)) * flat - (ellipk(m) - ellipe(m)) * steep)
+
+    m = brentq(shape, LEAST, 1.0 - LEAST, xtol=1e-16) if steep > flat else 0.0
+    part = (ellipk(m) - ellipe(m)) / m if m > 1e-6 else np.pi / 4.0
+    long = np.sqrt(depth * part / (ellipk(m) * flat))
+    short = long * np.sqrt(1.0 - m)
+    force = 2.0 * np.pi / 3.0 * long * depth * modulus / ellipk(m)
+    return float(force), *((long, short) if along <= across else (short, long))
+
+
+def creeping(
+    wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, law: str, cells: int
+) -> np.ndarray:
+    """Creep forces (N) and moment (N m) of a contact (load, a, b) at creepages and spin (3,)."""
+    load, a, b = contact
+    if a == 0.0:
+        return np.zeros(3)
+    if law == "linear":
+        return np.array([float(part) for part in linear_forces(a, b, slip[0], slip[1], slip[2], wheelset.pair)])
+    creep = fastsim(
+        RollingEllipse(a, b, load, wheelset.friction, slip[0], slip[1], slip[2]), wheelset.pair, cells=cells
+    )
+    return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
+
+
+def patch(wheelset: Wheelset, side: float, axle: Axle, law: str, cells: int) -> PatchForces:
+    """What one rail does to the wheelset."""
+    w, speed, at = wheelset, axle.velocity[0], touch(wheelset, side, axle)
+    across = np.cross(at.normal, np.array([1.0, 0.0, 0.0]))
+    velocity = axle.velocity + np.cross(axle.turning, at.place)
+    slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ at.normal]), velocity @ at.normal
+    elastic, a, b = pressed(at.depth, at.along, 0.5 / w.head_radius, w.pair.modulus)
+    load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
+    forwards, by = float(np.clip(0.5 + 0.5 * speed / SLOWEST, 0.0, 1.0)), max(abs(speed), SLOWEST)
+    mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
+    if forwards > 0.0:
+        creep += forwards * creeping(w, (load, a, b), slip / by, law, cells)
+    if forwards < 1.0:
+        creep += (1.0 - forwards) * mirror * creeping(w, (load, a, b), mirror * slip / by, law, cells)
+    beyond = max(0.0, side * axle.centre[1] - w.flange_clearance)
+    push = np.array([0.0, -side * w.flange_stiffness * beyond, 0.0])
+    force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * at.normal + push
+    told = {"load": load, "fx": creep[0], "fy": creep[1], "mz": creep[2], "a": a, "b": b, "depth": at.depth}
+    told |= {"xi_x": slip[0] / by, "xi_y": slip[1] / by, "spin": slip[2] / by, "power": float(creep @ slip)}
+    told |= {"x": at.place[0], "y": at.place[1], "z": at.place[2], "flange_force": push[1]}
+    told |= {"angle": float(np.arcsin(-at.normal[1])), "damping_power": (elastic - load) * approach}
+    told["elastic_power"] = float(push @ velocity) - elastic * approach
+    return PatchForces(force, np.cross(at.place, force) + creep[2] * at.normal, told)
+
+
+class PlainWheelset:
+    """A wheelset at a speed (m/s) with a law of creep forces; the weight leans to the right by ``lean``."""
+
+    def __init__(self, wheelset: Wheelset, speed: float, law: str, cells: int = 21, lean: float = 0.0) -> None:
+        self.wheelset, self.speed, self.law, self.cells, self.lean = wheelset, speed, law, cells, lean
+        half = wheelset.load / (2.0 * wheelset.slant[1])
+        curvatures = wheelset.slant[1] / (2.0 * wheelset.radius), 0.5 / wheelset.head_radius
+
+        def short(depth: float) -> float:
+            return pressed(depth, *curvatures, wheelset.pair.modulus)[0] - half
+
+        self.sunk = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
+
+    def patches(self, state: np.ndarray) -> list[PatchForces]:
+        """Both rails' forces at a state (10,), right first."""
+        axle = axle_of(state, self.speed)
+        return [patch(self.wheelset, side, axle, self.law, self.cells) for side in (1.0, -1.0)]
+
+    def by_rails(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) and moment about the centre (N m) of both rails on the wheelset, in the track's axes."""
+        right, left = self.patches(state)
+        return right.force + left.force, right.moment + left.moment
+
+    def by_suspension(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) and moment (N m) of springs and dampers at both ends of the axle."""
+        w, axle = self.wheelset, axle_of(state, self.speed)
+        stiffness = np.array([w.stiffness_x, w.stiffness_y, w.stiffness_z])
+        damping = np.array([w.damping_x, w.damping_y, w.damping_z])
+        moving = np.array([0.0, *axle.velocity[1:]])
+        force, moment = np.zeros(3), np.zeros(3)
+        for side in (1.0, -1.0):
+            arm = side * w.half_spacing * axle.axle
+            off = axle.centre + arm - np.array([0.0, side * w.half_spacing, self.sunk])
+            pull = -stiffness * off - damping * (moving + np.cross(axle.turning, arm))
+            force, moment = force + pull, moment + np.cross(arm, pull)
+        return force, moment
+
+    def rates(self, state: np.ndarray) -> np.ndarray:
+        """Rates (10,) of a state (10,): dp/dt = F and dL/dt + W x L = M in axes that turn with W, not with the spin."""
+        w, axle = self.wheelset, axle_of(state, self.speed)
+        roll, (roll_rate, yaw_rate, spin) = state[2], state[7:]
+        sums = [by_rails + held for by_rails, held in zip(self.by_rails(state), self.by_suspension(state), strict=True)]
+        weight = w.load * np.array([0.0, self.lean, 1.0])
+        acceleration = (sums[0] + weight) / w.mass
+        upright = np.cross(axle.ahead, axle.axle)
+        moments = np.array([axis @ sums[1] for axis in (axle.ahead, axle.axle, upright)])
+        inertia, turning = (
+            np.array([w.yaw_inertia, w.spin_inertia, w.yaw_inertia]),
+            np.array([roll_rate, spin, yaw_rate * np.cos(roll)]),
+        )
+        axes = np.array([roll_rate, yaw_rate * np.sin(roll), yaw_rate * np.cos(roll)])
+        gained = (moments - np.cross(axes, inertia * turning)) / inertia
+        yawing = (gained[2] + yaw_rate * roll_rate * np.sin(roll)) / np.cos(roll)
+        moved = [state[5], state[6], roll_rate, yaw_rate, spin - yaw_rate * np.sin(roll)]
+        return np.array([*moved, acceleration[1], acceleration[2], gained[0], yawing, gained[1]])
+
+    def on_joints(self, state: np.ndarray) -> np.ndarray:
+        """Both rails' forces on the joints (5,): y, z, yaw, roll, spin about the axle (N, N m), by virtual work."""
+        axle, (force, moment) = axle_of(state, self.speed), self.by_rails(state)
+        return np.array([force[1], force[2], moment[2], moment @ axle.ahead, moment @ axle.axle])
+
+    def run(self, state: np.ndarray, step: float, count: int) -> np.ndarray:
+        """States (count + 1, 10) by steps (s) of the classical Runge-Kutta method."""
+        states = [np.asarray(state, float)]
+        for _ in range(count):
+            here = states[-1]
+            k1 = self.rates(here)
+            k2 = self.rates(here + 0.5 * step * k1)
+            k3 = self.rates(here + 0.5 * step * k2)
+            states.append(here + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + self.rates(here + step * k3)))
+        return np.array(states)
