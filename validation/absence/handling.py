@@ -28,6 +28,6 @@ def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
         "waves": len(handling.waves),
         "controls": sum(any(value for _, value in knots) for knots in controls),
         "pushes": len(handling.pushes),
-        "leaning wheels": sum(numbers[INCLINED] != 0.0 for numbers in map(handling.tyre_numbers, range(len(tyres)))),
+        "leaning wheels": sum(bool(numbers[INCLINED]) for numbers in map(handling.tyre_numbers, range(len(tyres)))),
     }
     return counts, path["positions"].tobytes()
