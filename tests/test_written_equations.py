@@ -50,7 +50,7 @@ def test_what_is_felt_inside_is_that_of_its_own_state():
     assert inside_gap(cut_cars()["twin"], 3) < INSTANT
 
 
-@pytest.mark.parametrize("name", ["r19_free", "twin", "curved"])
+@pytest.mark.parametrize("name", ["r19_free", "twin", "curved", "caravan", "train"])
 def test_a_car_on_tyres_moves_as_in_mujoco(name):
     car = rolling_cars()[name]
     assert rolling_gap(car, "mujoco", 9) < INSTANT

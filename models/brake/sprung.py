@@ -50,8 +50,11 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
     """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
-    here. Raises InputError for a vehicle of other axles, or that cannot be steered.
+    here. Raises InputError for a vehicle of other axles, that tows, or that cannot be steered.
     """
+    if vehicle.towed:
+        allowed = "must not be towed: the wheels of a braked vehicle on its suspension are those of its chassis"
+        raise InputError(vehicle.name, f"bodies[{vehicle.towed[0]}].hitch", None, allowed)
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
         left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])

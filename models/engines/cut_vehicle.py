@@ -116,7 +116,7 @@ class HubModel:
         if forces == "native" and engine not in (PLAIN, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
-            division = divide(vehicle, engine)
+            division = divide(vehicle.tree, vehicle.elements, engine)
             numbers = table(replace(vehicle, elements=division.shared), hub_inputs, step)
         self.division = division
         if hub_inputs.held or self.adaptive:
@@ -240,7 +240,7 @@ class NativeShare:
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
     """Parts of a vehicle that "exudyn" or "mujoco" computes by native elements, counted in a model that is built
     without a callback."""
-    division = divide(vehicle, engine)
+    division = divide(vehicle.tree, vehicle.elements, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
     elements, joints = built_share(engine, driven)
     return NativeShare(elements, joints, division.reasons)

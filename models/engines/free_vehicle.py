@@ -7,7 +7,7 @@ march by the classical Runge-Kutta method.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -148,22 +148,24 @@ def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
     return share
 
 
-def joints_alone(vehicle: SpatialVehicle) -> tuple[tuple[str, str], ...]:
-    """Native joints of each engine for a vehicle whose springs keep to the heading of its carrier, and why no more:
-    heads and texts of a plan. Joints are counted in built models.
+def native_share(
+    vehicle: SpatialVehicle, native: Mapping[str, tuple[NativePart, ...]] | None = None
+) -> tuple[tuple[str, str], ...]:
+    """Native joints and springs of each engine for a vehicle whose springs keep to the heading of its carrier, and why
+    no more: heads and texts of a plan. They are counted in built models.
 
     Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it. What
-    acts along coordinates is native.
+    acts along coordinates is native. native : further parts of each engine, of springs that keep to other bodies.
     """
-    driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None, joint_parts(vehicle))
-    count, bars = len(vehicle.springs) + len(driven.parts), len(vehicle.bars)
-    why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
-    native = []
+    along, bars, lines = joint_parts(vehicle), len(vehicle.bars), []
+    count = len(vehicle.springs) + len(along)
     for engine in ENGINES:
-        names, joints = built_share(engine, driven)
+        parts = (*along, *(native or {}).get(engine, ()))
+        names, joints = built_share(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
         told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
-        native.append(("native", told))
-    return (*native, *([("shared", f"springs, mounts and bars: {why}")] if vehicle.springs or bars else []))
+        lines.append(("native", told))
+    why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
+    return (*lines, *([("shared", f"springs, mounts and bars: {why}")] if vehicle.springs or bars else []))
 
 
 def _module(engine: str) -> Any:

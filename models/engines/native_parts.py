@@ -5,11 +5,12 @@ the body of one end and that body carries the other end. What an engine lacks st
 the hubs anyway, ``models.multibody.cut_kernel``: each part of it is named with the reason.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from models.vehicles.cut_vehicle import CutVehicle, Element
+from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Vector
 
 CURVES = ("mujoco",)
@@ -107,11 +108,11 @@ class Division:
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-def divide(vehicle: CutVehicle, engine: str) -> Division:
-    """All elements of a vehicle between "exudyn" or "mujoco" and the compiled forces."""
+def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
+    """Elements of a vehicle's tree between "exudyn" or "mujoco" and the compiled forces."""
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
-    for element in vehicle.elements:
-        travel = travel_of(vehicle.tree, element)
+    for element in elements:
+        travel = travel_of(tree, element)
         still = isinstance(travel, CoordinateTravel) and not travel.coordinates
         if travel is None or still:
             shared.append(element)

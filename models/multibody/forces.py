@@ -10,7 +10,7 @@ of their spring does: a road that is smooth to the tread does no work. They neve
 
 The wheel is a disc of the radius at which its centre is above the road. Where it touches, its velocity on the road is
 that of the disc, whose axle turns with the steering; creep forces act there. What holds a wheel's spin, the torque of
-its brake, its drive or of the lock that fixes it, holds on to the chassis.
+its brake, its drive or of the lock that fixes it, holds on to the chassis, or to the towed body that carries it.
 """
 
 import math
@@ -27,6 +27,7 @@ from models.multibody.tree import (
     PLACE,
     RATE,
     SPEED,
+    TURNED,
     TURNING,
     TWISTED,
     WHERE,
@@ -95,11 +96,14 @@ the carrier. These rows, and then their count, stand before the controls, the la
     DRIVEN,
     INCLINED,
     BRAKE_RATE,
+    CARRYING,
+    TOWED,
     PER_TYRE,
-) = range(17)
+) = range(19)
 """Numbers of a tyre: coordinates of its wheel and of its spin (-1: fixed); its point; height of that at rest (m); F0
 (N), k_z, c_z; R, b (m), k (N/m^3), mu; shares of steering, brake and drive; inclination (rad); spin (rad/s) at which
-the brake's torque is whole."""
+the brake's torque is whole; last coordinate of what carries it, the chassis or a towed body, and whether it is towed:
+then the wheel keeps to the heading of that body's x axis, else to the carrier's."""
 (PRESS, FX, FY, MZ, SLIP_X, SLIP_Y, TREAD, TURN, POWER, STEER_MOMENT, ANGLE, SPIN_TORQUE, REPORTED) = range(13)
 """Columns of a tyre's report: load (N), creep forces and moment on it in its own axes, slip velocities along and
 across (m/s), speed of the tread (m/s), turning (1/s), their power (W), moment about the steering axis (N m), steer
@@ -153,6 +157,14 @@ def _axle(steer, inclined):
 
 
 @lean
+def _turned_to(link, axle):
+    """An axle beside the heading of a link's x axis in the road's plane as one beside the carrier's heading."""
+    x, y, _ = three(link, TURNED)
+    level = math.sqrt(x * x + y * y)
+    return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
+
+
+@lean
 def _road_under(waves, count, frame, place):
     """Height (m) of the road under a place (m) of the carrier's axes, and the vector (-dz/dx, -dz/dy, 1) there."""
     x, y = in_space(frame, place)
@@ -180,6 +192,9 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     way, report = wheel.way, wheel.report
     spot, knuckle = row(tree.spots, PER_SPOT, int(tyre[POINT])), row(tree.links, PER_LINK, int(tyre[KNUCKLE]))
     p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer, tyre[INCLINED])
+    carrying = row(tree.links, PER_LINK, int(tyre[CARRYING]))
+    if tyre[TOWED] != 0.0:
+        axle = _turned_to(carrying, axle)
     passing = plus(three(spot, RATE), carried(frame, p))
     zeta, upwards = _road_under(waves, count, frame, p)
     load = _load(tyre, zeta - (p[2] - tyre[HEIGHT]), dot(passing, upwards), vehicle.ledger)
@@ -191,7 +206,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     radius = max(p[2] - zeta, 0.0) / (long * flat)
     down = times(plus(times(axle, dot(axle, normal)), times(normal, -1.0)), radius / flat)
     across, rotor = cross(normal, along), int(tyre[ROTOR])
-    spin = vehicle.rates[rotor] if rotor >= 0 else dot(three(vehicle.chassis, TURNING), axle) - dot(turning, axle)
+    spin = vehicle.rates[rotor] if rotor >= 0 else dot(three(carrying, TURNING), axle) - dot(turning, axle)
     whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yawing + steering))
     sliding = plus(passing, cross(whole, down))
     slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
@@ -226,31 +241,32 @@ def creep(tyre, creeping, vehicle, wheel):
     if rotor >= 0:
         vehicle.forces[rotor] += torque
     else:
-        _hold(torque, axle, knuckle, vehicle.chassis)
+        _hold(torque, axle, knuckle, row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING])))
     report[FX], report[FY], report[MZ], report[STEER_MOMENT] = creeping[0], creeping[1], creeping[2], moment[2]
     report[POWER] = creeping[0] * report[SLIP_X] + creeping[1] * report[SLIP_Y] + creeping[2] * report[TURN]
 
 
 @lean
 def turn_wheel(tyre, braking, driving, vehicle, wheel):
-    """Torque (N m) of brake and drive on one wheel, and against it on the chassis."""
+    """Torque (N m) of brake and drive on one wheel, and against it on what carries it."""
     rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (braking == 0.0 and driving == 0.0):
         return
     knuckle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE]))
-    spin = vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(vehicle.chassis, TURNING), axle)
+    carrying = row(vehicle.tree.links, PER_LINK, int(tyre[CARRYING]))
+    spin = vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(carrying, TURNING), axle)
     report[SPIN_TORQUE] = tyre[DRIVEN] * driving
     if braking != 0.0:
         report[SPIN_TORQUE] -= tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
     vehicle.forces[rotor] += report[SPIN_TORQUE]
     vehicle.ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
-    _hold(-report[SPIN_TORQUE], axle, knuckle, vehicle.chassis)
+    _hold(-report[SPIN_TORQUE], axle, knuckle, carrying)
 
 
 @lean
 def _hold(torque, axle, link, carrying):
-    """A torque about the axle from what carries the wheel to the chassis."""
+    """A torque about the axle from the link of a wheel's knuckle to that of what carries the wheel."""
     add(link, TWISTED, times(axle, -torque))
     add(carrying, TWISTED, times(axle, torque))
 
@@ -275,7 +291,9 @@ def enter(numbers, q, v, f, room, ledger):
     locate(beyond(table, int(numbers[OF_POINTS])), points, room, spots)
     for i in range(LEDGER):
         ledger[i] = 0.0
-    ledger[POTENTIAL], ledger[DISSIPATED] = press(table, int(numbers[OF_PARTS]), int(numbers[PARTS]), spots, q, v, f)
+    ledger[POTENTIAL], ledger[DISSIPATED] = press(
+        table, int(numbers[OF_PARTS]), int(numbers[PARTS]), room, spots, q, v, f
+    )
     chassis = row(room, PER_LINK, int(numbers[CHASSIS]))
     return MovingVehicle(v, f, ledger, carrier_frame(q, v), Tree(room, spots, ground), chassis)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Tyres:
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
     axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
     axle (kg m^2), chosen; fixed : tyres whose wheels do not spin; brake_rate : spin beside the chassis (rad/s) at which
-    a brake's torque is whole (within 24 %, by tanh).
+    a brake's torque is whole (within 24 %, by tanh). Wheels of towed bodies do not lean.
     """
 
     friction: float = 0.9
@@ -42,7 +43,8 @@ class Tyres:
 class Controls:
     """steer : angle of the front wheels (rad); brake, drive : torque on all wheels together (N m), both 0 or more.
 
-    front_brake : share of the front axle in braking; front_drive : in driving. The wheels of an axle share evenly.
+    front_brake : share of the front axle in braking; front_drive : in driving. All axles behind it share the rest
+    evenly, those of towed bodies in braking alone, and so do the wheels of an axle.
     """
 
     steer: Control = ((0.0, 0.0),)
@@ -68,8 +70,9 @@ class Handling:
     """A vehicle on the road: what every implementation marches.
 
     given : the vehicle of the ride; waves (m, 4) : the road as ``road`` makes it; slope : of the whole road, uphill
-    along x (rad); pushes : forces from outside. ``vehicle`` is the free one, ``numbers`` its table, ``gravity`` (3,) in
-    m/s^2.
+    along x (rad); pushes : forces from outside; forces : whose the springs and bars of towed bodies are, the engine's
+    as far as it has them ("native") or the compiled forces' ("compiled"). ``vehicle`` is the free one, ``numbers`` its
+    table, ``gravity`` (3,) in m/s^2.
     """
 
     given: SpatialVehicle
@@ -78,6 +81,7 @@ class Handling:
     waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     slope: float = 0.0
     pushes: tuple[Push, ...] = ()
+    forces: Literal["native", "compiled"] = "native"
     vehicle: SpatialVehicle = field(init=False)
     held: Preloads = field(init=False)
     numbers: np.ndarray = field(init=False)
@@ -205,22 +209,33 @@ def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
             raise InputError(
                 handling.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
             )
-        if s.frame != CARRIER:
-            allowed = "must be left out: in handling the axes of springs are fixed in the carrier, which only yaws"
-            raise InputError(handling.vehicle.name, f"springs[{s.name}].frame", s.frame, allowed)
         ends = points.number(s.first_body, s.first_point), points.number(s.second_body, s.second_point)
         rest = float(np.dot(np.subtract(s.second_point, s.first_point), s.axis))
         law = [s.stiffness, s.damping, handling.held.parts[s.name], s.friction, s.friction_rate, rest]
-        yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0], (s.travel_force, s.rate_force)
+        frame = _frame(handling.vehicle, f"springs[{s.name}]", s.frame)
+        yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0, frame], (s.travel_force, s.rate_force)
 
 
 def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
     for bar in handling.vehicle.bars:
         ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
-        rest, rolls = (bar.point_right[2] - bar.point_left[2]) / bar.track, (bar.body, "rx")
+        rest, frame = (
+            (bar.point_right[2] - bar.point_left[2]) / bar.track,
+            _frame(handling.vehicle, bar.name, bar.frame),
+        )
         law = [bar.stiffness, bar.damping, handling.held.parts[bar.name], 0.0, 1.0, rest]
-        turns = [float(handling.vehicle.coordinates().index(rolls)), 1.0]
-        yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0], (None, None)
+        turns = [-1.0, 0.0] if frame else [float(handling.vehicle.coordinates().index((bar.body, "rx"))), 1.0]
+        yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0, frame], (None, None)
+
+
+def _frame(vehicle: SpatialVehicle, place: str, frame: str | None) -> float:
+    """Last coordinate of the body in which a part's axis is fixed; 0 for the carrier."""
+    if frame == CARRIER:
+        return 0.0
+    if frame not in vehicle.towed:
+        allowed = "must be left out, or be a towed body: in handling axes are fixed in the carrier, which only yaws"
+        raise InputError(vehicle.name, f"{place}.frame", frame, allowed, vehicle.towed)
+    return float(anchor(vehicle, frame)[0])
 
 
 def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
@@ -249,10 +264,12 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     spins = (rotor(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
     share, front, c = 1.0 / len(axle), tyre.axle == 0, handling.controls
-    rear = max(t.axle for t in free.tyres) or 1  # all axles behind the first share evenly
+    rear, towed = max(t.axle for t in free.tyres) or 1, free.towed_under(tyre.body)
+    driven = max(t.axle for t in free.tyres if free.towed_under(t.body) is None) or 1
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
-    drive = share * (c.front_drive if front else (1.0 - c.front_drive) / rear)
-    side = np.sign(tyre.point[1])
+    drive = 0.0 if towed else share * (c.front_drive if front else (1.0 - c.front_drive) / driven)
+    leans = 0.0 if towed else np.sign(tyre.point[1]) * of.inclination
+    carrying, _ = anchor(free, towed or chassis_of(handling.given).name)
     return [
         joint,
         places.index(spins) if spins in places else -1,
@@ -268,8 +285,10 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
         float(front),
         brake,
         drive,
-        side * of.inclination,
+        leans,
         of.brake_rate,
+        carrying,
+        float(towed is not None),
     ]
 
 

@@ -1,7 +1,7 @@
 """Compiled forces of springs, dampers and anti-roll bars between points of a free vehicle.
 
-A part's travel is how far its second point lies beyond its first along an axis that the carrier has, and for a bar a
-share of a coordinate, less what it is at rest; its force draws both together.
+A part's travel is how far its second point lies beyond its first along an axis that the carrier or a towed body has,
+and for a bar a share of a coordinate, less what it is at rest; its force draws both together.
 """
 
 import math
@@ -10,7 +10,22 @@ import numpy as np
 
 from models.machine.compiled import lean
 from models.machine.stack import beyond, row
-from models.multibody.tree import PER_SPOT, PUSH, RATE, WHERE, add, dot, plus, three, times
+from models.multibody.tree import (
+    PER_LINK,
+    PER_SPOT,
+    PUSH,
+    RATE,
+    TURNING,
+    TWISTED,
+    WHERE,
+    add,
+    cross,
+    dot,
+    out,
+    plus,
+    three,
+    times,
+)
 from models.vehicles.spatial import Curve
 
 (
@@ -27,17 +42,20 @@ from models.vehicles.spatial import Curve
     AXIS,
     ON_TRAVEL,
     ON_RATE,
+    FRAME,
     PER_PART,
-) = (*range(11), 13, 14, 15)
+) = (*range(11), 13, 14, 15, 16)
 """Numbers of a part, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds to it (-1: none), and by
-how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends."""
+how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends;
+the last coordinate of the body in which its axis is fixed (0: the carrier)."""
 
 
 @lean
-def press(numbers, first, count, spots, q, v, f):
-    """Forces of all parts into spots and into ``f`` of their own coordinates; their energy (J) and power (W).
+def press(numbers, first, count, links, spots, q, v, f):
+    """Forces of all parts into spots, and into ``f`` of their own coordinates; their energy (J) and power (W).
 
-    numbers : pointer to the table; first, count : of the parts there.
+    numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
+    its two forces: a towed body by its link.
     """
     energy = power = 0.0
     for i in range(count):
@@ -47,8 +65,13 @@ def press(numbers, first, count, spots, q, v, f):
             row(spots, PER_SPOT, int(e[SECOND_POINT])),
             three(e, AXIS),
         )
-        travel = dot(axis, plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))) - e[REST]
+        frame, apart = int(e[FRAME]), plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))
+        if frame > 0:
+            axis = out(row(links, PER_LINK, frame), e, AXIS)
+        travel = dot(axis, apart) - e[REST]
         rate = dot(axis, plus(three(to_spot, RATE), times(three(from_spot, RATE), -1.0)))
+        if frame > 0:
+            rate += dot(apart, cross(three(row(links, PER_LINK, frame), TURNING), axis))
         coordinate = int(e[ADDED_COORDINATE])
         if coordinate >= 0:
             travel, rate = travel + e[ADDED_GAIN] * q[coordinate], rate + e[ADDED_GAIN] * v[coordinate]
@@ -66,6 +89,8 @@ def press(numbers, first, count, spots, q, v, f):
         force = times(axis, spring + other)
         add(from_spot, PUSH, force)
         add(to_spot, PUSH, times(force, -1.0))
+        if frame > 0:
+            add(row(links, PER_LINK, frame), TWISTED, cross(apart, force))
     return energy, power
 
 

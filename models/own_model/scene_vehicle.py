@@ -10,15 +10,15 @@ MJCF = ".xml"
 
 
 def scene_vehicle(
-    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False
+    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
 ) -> SpatialVehicle:
     """The vehicle by its name or by a file relative to ``folder``; unloaded.
 
-    ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may a vehicle file have
-    [reduced]? Raises InputError.
+    ``file`` and ``place`` say who asked for it, for the message if there is none. reduced, towing : may a vehicle file
+    have [reduced], and may it tow? Raises InputError.
     """
     if name.endswith(MJCF):
         from models.own_model.car import car
 
         return car(existing(name, Path(folder), file, place))
-    return load_vehicle(name, folder, file, place, reduced)
+    return load_vehicle(name, folder, file, place, reduced, towing)

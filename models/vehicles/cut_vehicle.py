@@ -15,7 +15,7 @@ from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
 from models.vehicles.sliding_springs import sliding_springs
 from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import Preloads, preloads
 
 GRAVITY = 9.81
 X, Y, Z, HEADING, PITCH, ROLL = range(6)
@@ -96,6 +96,12 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     sprung = sliding_springs(guided(vehicle, chassis))
     whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
+    loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
+    return CutVehicle(chassis, _tree(whole, chassis), whole, elements_of(whole, held), loads)
+
+
+def elements_of(vehicle: SpatialVehicle, held: Preloads) -> tuple[Element, ...]:
+    """Springs, then bars, of a vehicle whose parts all name their frames; held : what they bear at rest."""
 
     def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
@@ -118,10 +124,9 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
         rough = replace(straight, friction=s.friction, friction_rate=s.friction_rate)
         return replace(rough, travel_force=s.travel_force, rate_force=s.rate_force)
 
-    springs = map(bent, whole.springs)
-    bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in whole.bars)
-    loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
-    return CutVehicle(chassis, _tree(whole, chassis), whole, (*springs, *bars), loads)
+    springs = map(bent, vehicle.springs)
+    bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in vehicle.bars)
+    return (*springs, *bars)
 
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:

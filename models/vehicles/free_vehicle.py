@@ -71,7 +71,7 @@ def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
 
 def chassis_of(vehicle: SpatialVehicle) -> Body:
     """The body on which the tyres' side forces act; InputError unless it is free."""
-    names = {force.chassis for force in vehicle.side_forces}
+    names = {force.chassis for force in vehicle.side_forces if force.chassis not in vehicle.towed}
     missing = [tyre.name for tyre in vehicle.tyres if tyre.name not in {force.name for force in vehicle.side_forces}]
     if missing or len(names) != 1:
         raise InputError(
@@ -88,13 +88,14 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
 
 
 def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
-    """Refuse a trailer, or an axle, that takes its tyres to another heading than the chassis': forces keep to that."""
+    """Refuse an axle that takes its tyres to another heading than what carries it: forces keep to that."""
+    hitches = {vehicle.body(name).parent for name in vehicle.towed}
     for tyre in vehicle.tyres:
         for name in vehicle.chain(tyre.body):
-            if name != chassis and "rz" in vehicle.body(name).freedoms:
+            if name != chassis and name not in hitches and "rz" in vehicle.body(name).freedoms:
                 allowed = (
                     f"must not have rz: the body carries the tyre {tyre.name!r}, and tyres of a vehicle file keep to "
-                    f"the heading of {chassis!r}; a trailer stands in [trailer] of the system braking, in the plane"
+                    f"the heading of {chassis!r}, or of a body with a hitch, by which a trailer is towed"
                 )
                 raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(vehicle.body(name).freedoms), allowed)
 

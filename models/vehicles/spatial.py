@@ -302,7 +302,8 @@ class SpatialVehicle:
     and tyres carry the preloads that make the design position the equilibrium on a flat road. ``axles``: places x (m)
     of the axles from the front. ``limits`` : what a reduced vehicle has not, for closed forms of ride alone.
     ``joint_elements`` : what acts along coordinates themselves. ``ranges`` : lowest and highest values (m, rad) of
-    coordinates whose stops are left out. ``notes`` : sentences on what reading a file left out or changed.
+    coordinates whose stops are left out. ``notes`` : sentences on what reading a file left out or changed. ``towed`` :
+    bodies that another one tows, each fixed to a massless body at its hitch, whose turns are the joint between both.
     """
 
     name: str
@@ -319,6 +320,7 @@ class SpatialVehicle:
     joint_elements: tuple[JointElement, ...] = ()
     ranges: tuple[tuple[tuple[str, Freedom], float, float], ...] = ()
     notes: tuple[str, ...] = ()
+    towed: tuple[str, ...] = ()
 
     def coordinates(self) -> tuple[tuple[str, Freedom], ...]:
         """Coordinates in the order of the state: body by body, freedoms in the order of FREEDOMS."""
@@ -349,9 +351,18 @@ class SpatialVehicle:
         """A body and all that it rides on, down to the one without parent; nothing for None, the ground."""
         return () if name is None else (name, *self.chain(self.body(name).parent))
 
+    def towed_under(self, name: str | None) -> str | None:
+        """The towed body that carries a body, or is it; None where no towed body does."""
+        return next((body for body in self.chain(name) if body in self.towed), None)
+
     def turns(self, name: str | None) -> bool:
         """Whether a body may turn, by a freedom of its own or of what it rides on."""
         return any(freedom.startswith("r") for body in self.chain(name) for freedom in self.body(body).freedoms)
+
+
+def hitch_of(towed: str) -> str:
+    """Name of the massless body at the hitch of a towed one."""
+    return f"{towed} hitch"
 
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:

@@ -256,8 +256,11 @@ def _along(motion: Kinematics, element: JointElement) -> np.ndarray:
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
+    """Row of the angle of a bar, whose upright turns with its frame."""
     risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
-    return motion.coordinate(bar.body, "rx") - risen / bar.track
+    turning = np.subtract(bar.point_right, bar.point_left) @ motion.turned_axis(bar.frame, (0.0, 0.0, 1.0))
+    rolls = 0.0 if bar.frame == bar.body else motion.coordinate(bar.body, "rx")
+    return rolls - risen / bar.track + turning / bar.track
 
 
 def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
@@ -306,7 +309,8 @@ def _speed_forces(
         raise InputError(vehicle.name, "speed", speed, allowed)
     for force in vehicle.side_forces:
         sideways = motion.shift(force.body, force.point)[1]
-        steered = force.roll_steer * motion.coordinate(force.chassis, "rx") + motion.coordinate(force.chassis, "rz")
+        roll, _, yaw = motion.turn(force.chassis)
+        steered = force.roll_steer * roll + yaw
         damping += force.stiffness / speed * np.outer(sideways, sideways)
         stiffness -= force.stiffness * np.outer(sideways, steered)
     for drag in vehicle.drags:

@@ -17,6 +17,7 @@ def check(vehicle: SpatialVehicle, file: str) -> None:
     _connected(vehicle, file)
     _inert(vehicle, file)
     _movable(vehicle, file)
+    _towed(vehicle, file)
 
 
 def _bodies(vehicle: SpatialVehicle, file: str) -> None:
@@ -89,3 +90,14 @@ def _movable(vehicle: SpatialVehicle, file: str) -> None:
         if not motion.shift(force.body, force.point)[1].any():
             said = "side force on a chassis that cannot move sideways: give it the freedom y, or leave it out"
             raise InputError(file, f"tyres[{force.name}].cornering", force.stiffness, said)
+
+
+def _towed(vehicle: SpatialVehicle, file: str) -> None:
+    """Towed bodies have wheels, and so has the vehicle that tows them."""
+    on_wheels = {vehicle.towed_under(tyre.body) for tyre in vehicle.tyres}
+    for name in vehicle.towed:
+        if name not in on_wheels:
+            said = "is towed without wheels: no tyre is on it, or on a body that rides on it"
+            raise InputError(file, f"bodies[{name}].hitch", None, said)
+    if vehicle.towed and None not in on_wheels:
+        raise InputError(file, "tyres", [tyre.name for tyre in vehicle.tyres], "the towing vehicle has no tyre")

@@ -28,6 +28,7 @@ from models.vehicles.spatial import (
     Tyre,
     TyreOutput,
     Vector,
+    hitch_of,
 )
 from models.vehicles.vehicle_checks import check
 from models.vehicles.vehicle_tables import (
@@ -52,12 +53,12 @@ def shipped() -> tuple[str, ...]:
 
 
 def load_vehicle(
-    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False
+    name: str, folder: str | Path = ".", file: str = "", place: str = "", reduced: bool = False, towing: bool = False
 ) -> SpatialVehicle:
     """A vehicle that comes with twinrig, by its name, or a user's TOML file, relative to ``folder``; unloaded.
 
     ``file`` and ``place`` say who asked for it, for the message if there is none. reduced : may it have [reduced]?
-    Raises InputError.
+    towing : may it tow bodies by a hitch? Raises InputError.
     """
     path = vehicle_path(name, folder, file, place)
     vehicle = build_vehicle(parse(path), path.name)
@@ -68,6 +69,9 @@ def load_vehicle(
             name,
             "has a table [reduced], which only the study ride of linear vehicles reads: name the whole vehicle here",
         )
+    if vehicle.towed and not towing:
+        allowed = f"tows {vehicle.towed[0]!r} by a hitch, which only the system handling drives: name a vehicle alone"
+        raise InputError(file, place, name, allowed)
     return vehicle
 
 
@@ -113,6 +117,7 @@ class _Builder:
         self._unique("axles", tables.axles)
         self._unique("tyres", tables.tyres)
         self._unique("outputs", tables.outputs)
+        self.towed = tuple(body.name for body in tables.bodies if body.hitch is not None)
         self.bodies = self._bodies()
         self.axles = self._axles()
         self.tyres = {tyre.name: self._tyre(tyre) for tyre in tables.tyres}
@@ -135,6 +140,7 @@ class _Builder:
             side_forces=self._side_forces(),
             drags=() if drag is None else (Drag(self._body("drag.body", drag.body), drag.coefficient),),
             outputs=tuple(self._output(output, parts) for output in tables.outputs),
+            towed=self.towed,
         )
         check(vehicle, self.file)
         return replace(vehicle, limits=self._limits(vehicle))
@@ -187,9 +193,29 @@ class _Builder:
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
             inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
             at, freedoms = _vector(ready.position), tuple(ready.freedoms)
-            done[ready.name] = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
+            whole = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
+            if ready.hitch is not None:
+                hitch = self._hitch(whole, _vector(ready.hitch))
+                done[hitch.name], whole = hitch, replace(whole, freedoms=(), parent=hitch.name)
+            done[ready.name] = whole
             del waiting[ready.name]
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
+
+    def _hitch(self, body: Body, point: Vector) -> Body:
+        """The massless body with the turns of a towed one, about the point where its parent tows it."""
+        place, name = _place("bodies", body.name), hitch_of(body.name)
+        self._need(body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent")
+        turns = "rz" in body.freedoms and all(freedom.startswith("r") for freedom in body.freedoms)
+        self._need(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
+        names = [each.name for each in (*self.tables.bodies, *self.tables.seats)]
+        self._need(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
+        return Body(name, 0.0, point, body.freedoms, parent=body.parent)
+
+    def _towed_under(self, name: str | None) -> str | None:
+        """The towed body that carries a body, or is it."""
+        while name is not None and name not in self.towed:
+            name = self.bodies[name].parent
+        return name
 
     def _axles(self) -> dict[str, AxleTable]:
         """Axles by name: each behind the one before, and with a tyre."""
@@ -223,12 +249,15 @@ class _Builder:
             rate,
             spring.friction,
             spring.friction_rate,
-            self._frame(place, spring.frame),
+            self._frame(place, spring.frame, ends),
         )
 
-    def _frame(self, place: str, name: str | None) -> str | None:
-        """The body that a table names as its frame, if any."""
-        return None if name is None else self._body(f"{place}.frame", name)
+    def _frame(self, place: str, name: str | None, ends: tuple[str, str | None]) -> str | None:
+        """The body that a table names as its frame, or else the towed one that carries both ends, if any."""
+        if name is not None:
+            return self._body(f"{place}.frame", name)
+        first, second = map(self._towed_under, ends)
+        return first if first == second else None
 
     def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""
@@ -274,7 +303,7 @@ class _Builder:
             acts = any(mount.stiffness) or any(mount.damping)
             place = _place("mounts", mount.name, "stiffness")
             self._need(acts, place, mount.stiffness, "has neither spring nor damper")
-            frame = self._frame(_place("mounts", mount.name), mount.frame)
+            frame = self._frame(_place("mounts", mount.name), mount.frame, ends)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
                 yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
@@ -282,7 +311,8 @@ class _Builder:
         """Carrier below, occupant above: turned round so that force is positive in compression."""
         carrier = self._body(_place("seats", seat.name, "body"), seat.body)
         at = _vector(seat.position)
-        return SpringDamper(seat.name, seat.name, carrier, at, at, (0.0, 0.0, 1.0), seat.stiffness, seat.damping)
+        law, frame = (seat.stiffness, seat.damping), self._towed_under(carrier)
+        return SpringDamper(seat.name, seat.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
     def _tyre(self, tyre: TyreTable) -> Tyre:
         place, axle = _place("tyres", tyre.name), self.axles[tyre.axle]
@@ -295,13 +325,15 @@ class _Builder:
     def _bar(self, bar: BarTable) -> AntiRollBar:
         place, names = _place("anti_roll_bars", bar.name), tuple(self.tyres)
         body = self.bodies[self._body(f"{place}.body", bar.body)]
-        rolls = "rx" in body.freedoms and body.parent is None
-        self._need(rolls, f"{place}.body", bar.body, "needs a body with the freedom rx and without a parent")
+        towed = body.name in self.towed
+        rolls = towed or ("rx" in body.freedoms and body.parent is None)
+        allowed = "needs a body with the freedom rx and without a parent, or a towed one"
+        self._need(rolls, f"{place}.body", bar.body, allowed)
         left, right = (self.tyres[self._known(f"{place}.tyres", name, "tyre", names)] for name in bar.tyres)
         pair = left.axle == right.axle and left.point[1] > right.point[1]
         self._need(pair, f"{place}.tyres", bar.tyres, "must be the left and the right tyre of one axle")
-        ends = (left.body, right.body, left.point, right.point)
-        return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping)
+        ends, frame = (left.body, right.body, left.point, right.point), body.name if towed else None
+        return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping, frame)
 
     def _side_forces(self) -> tuple[SideForce, ...]:
         """Side forces of the tyres on the chassis, which guides the wheels sideways."""
@@ -317,11 +349,13 @@ class _Builder:
         self._body("chassis", chassis)
         for tyre in rolling:
             x, y, _ = self.tyres[tyre.name].point
-            guided = tyre.body == chassis or "y" not in self.bodies[tyre.body].freedoms
-            allowed = f"its side force acts on the chassis: body {tyre.body!r} must not have the freedom y"
+            carrying = self._towed_under(tyre.body) or chassis
+            guided = tyre.body == carrying or "y" not in self.bodies[tyre.body].freedoms
+            kind = "chassis" if carrying == chassis else "towed body"
+            allowed = f"its side force acts on the {kind}: body {tyre.body!r} must not have the freedom y"
             self._need(guided, _place("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
             steer = self.axles[tyre.axle].roll_steer
-            forces.append(SideForce(tyre.name, chassis, (x, y, 0.0), chassis, tyre.cornering, steer))
+            forces.append(SideForce(tyre.name, carrying, (x, y, 0.0), carrying, tyre.cornering, steer))
         return tuple(forces)
 
     def _output(self, output: OutputTable, parts: tuple[str, ...]) -> SpatialOutput:

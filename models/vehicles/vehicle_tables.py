@@ -45,6 +45,7 @@ class BodyTable(Entry):
     inertia: NotNegativeTriple = of("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
     products: Triple = of("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
     parent: str | None = Field(None, description="body it rides on; its freedoms then count relative to that body")
+    hitch: Triple | None = of("m", "where its parent tows it, as a trailer: its freedoms are turns about it", None)
 
 
 class CurveTable(Strict):

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from models.multibody.forces import INCLINED
 from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene
 
@@ -19,10 +20,14 @@ def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
     path = run(scene, engine)
     handling = path.detail.handling
     controls = (handling.controls.steer, handling.controls.brake, handling.controls.drive)
+    tyres, vehicle = handling.vehicle.tyres, handling.vehicle
     counts = {
+        "coordinates": len(vehicle.coordinates()),
+        "wheels": len(tyres),
+        "towed bodies": len(vehicle.towed),
         "waves": len(handling.waves),
         "controls": sum(any(value for _, value in knots) for knots in controls),
         "pushes": len(handling.pushes),
-        "leaning wheels": len(handling.vehicle.tyres) * (handling.tyres.inclination != 0.0),
+        "leaning wheels": sum(bool(numbers[INCLINED]) for numbers in map(handling.tyre_numbers, range(len(tyres)))),
     }
     return counts, path["positions"].tobytes()

@@ -63,6 +63,7 @@ CASES = (
     "wheelset",
     "contact_bridges",
     "handling",
+    "trailer",
     "bicycle",
     "race_car",
     "measured_drive",

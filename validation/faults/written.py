@@ -15,6 +15,7 @@ from models.engines.cut_vehicle import build as hub_model
 from models.multibody import cut_kernel as cut_at
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
+from models.multibody.parts import FRAME, PER_PART
 from models.systems.handling.run import REFERENCE, build
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
@@ -27,9 +28,9 @@ from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_
 BOUND = 1e-12
 
 
-def _on_tyres() -> float:
-    """Accelerations of the twin, steered and braked on a rough slope, in MuJoCo and by the plain equations."""
-    car = rolling_cars()["twin"]
+def _on_tyres(name: str = "twin") -> float:
+    """Accelerations of a car, steered and braked on a rough slope, in MuJoCo and by the plain equations."""
+    car = rolling_cars()[name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
     return off(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
 
@@ -45,6 +46,9 @@ def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
 
 CHECKS = {
     "tyres": Check("accelerations of a car on tyres by its plain equations", "of the largest", BOUND, _on_tyres),
+    "towing": Check(
+        "accelerations of a train on tyres by its plain equations", "of the largest", BOUND, lambda: _on_tyres("train")
+    ),
     "hubs": Check(
         "accelerations of a cut car on hub forces", "of the largest", BOUND, lambda: _on_hubs(lambda all_of: all_of[0])
     ),
@@ -89,6 +93,22 @@ def _sample(real: Any) -> Any:
         return np.asarray(real(vehicle, replace(hub_inputs, hubs=hubs), step))
 
     return made
+
+
+def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[Any], Any]:
+    """A column of the table's tyres or parts, which tells what is towed, is 0 of all of them."""
+
+    def changed(real: Any) -> Any:
+        def made(car: Any) -> np.ndarray:
+            numbers: np.ndarray = real(car)
+            first = int(numbers[section])
+            rows = numbers[first : first + int(numbers[count]) * per_row].reshape(-1, per_row)
+            rows[:, column] = 0.0
+            return numbers
+
+        return made
+
+    return changed
 
 
 def _stiff_bars(real: Any) -> Any:
@@ -159,6 +179,16 @@ FAULTS = (
         "axes of springs fixed in space",
         "frame",
         attribute("models.multibody.plain.parts:frame_of", lambda real: lambda part, default: None),
+    ),
+    Fault(
+        "wheels of a trailer keep to the car's heading",
+        "towing",
+        attribute(f"{TABLE}:table", _of_towed(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
+    ),
+    Fault(
+        "springs of a trailer keep to the car's heading",
+        "towing",
+        attribute(f"{TABLE}:table", _of_towed(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
     ),
     Fault("bars 1 % stiffer, on tyres", "bar", attribute(f"{TABLE}:_bars", _stiff_bars)),
     Fault("a bar turned round, cut", "bar", attribute(f"{CUT_TABLE}:_element", _turned_bar)),

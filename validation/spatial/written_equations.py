@@ -24,15 +24,18 @@ from models.systems.handling.run import REFERENCE, build
 from models.systems.hub_forces.measurement import HubForces, two_tracks
 from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
-from models.vehicles.spatial import Curve, SpatialVehicle
+from models.vehicles.spatial import Curve, SpatialVehicle, hitch_of
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import off
 from validation.spatial.cars import anywhere, static, twin
+from validation.spatial.trains import caravan, train
 
 SEED, STEP, SPEED = 41, 1e-3, 22.0
 FRAMES = ("hub", "body", "inertial")
 TILT = 0.3
 """rad, by which a chassis rolls and pitches at random."""
+FOLD = 1.5
+"""rad, by which a trailer yaws at random."""
 BUMP = Curve((-0.1, -0.02, 0.02, 0.1), (-4000.0, 0.0, 0.0, 6000.0))
 DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 150.0, 400.0))
 TURN = Controls(
@@ -50,24 +53,30 @@ def curved() -> SpatialVehicle:
 
 
 def rolling_cars() -> dict[str, Handling]:
-    """Cars on a rough slope, steered, braked, driven and pushed: as shipped, without symmetry, with curves."""
+    """Cars on a rough slope, steered, braked, driven and pushed: as shipped, without symmetry, with curves, and with
+    trailers."""
     waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
     gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
     return {
         "r19_free": Handling(r19, Tyres(), TURN, waves),
         "twin": Handling(twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN, waves, 0.05, (gust,)),
         "curved": Handling(curved(), Tyres(spin_inertia=1.2), TURN, waves),
+        "caravan": Handling(caravan(), Tyres(inclination=0.02), TURN, waves),
+        "train": Handling(train(), Tyres(fixed=("fl", "dr", "bl"), cells=11), TURN, waves, 0.05, (gust,)),
     }
 
 
 def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     """Times (s), positions and rates (n,) at random: any heading, leaning, at speeds from standing to 25 m/s."""
     rng, places = np.random.default_rng(SEED), car.vehicle.coordinates()
-    leans = [places.index(("sway", turn)) for turn in ("rx", "ry")]
+    towing = ("sway", *map(hitch_of, car.vehicle.towed))
+    leans = [i for i, (name, freedom) in enumerate(places) if name in towing and freedom in ("rx", "ry")]
+    folds = [i for i, (name, freedom) in enumerate(places) if name in towing and freedom == "rz"]
     for i in range(count):
         speed = (0.0, 0.05, 25.0)[i % 3] * rng.uniform()
         q, v = rng.uniform(-0.03, 0.03, len(places)), rng.uniform(-0.5, 0.5, len(places))
-        q[:3], q[leans] = (*rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.1, 3.1)), rng.uniform(-TILT, TILT, 2)
+        q[:3] = *rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.1, 3.1)
+        q[leans], q[folds] = rng.uniform(-TILT, TILT, len(leans)), rng.uniform(-FOLD, FOLD, len(folds))
         ahead = car.straight(speed)[1]
         v = v * min(1.0, 0.1 + speed) + ahead
         v[:2] += speed * np.array([np.cos(q[2]) - 1.0, np.sin(q[2])])

@@ -92,11 +92,15 @@ class PlainRolling:
         self._joints = joint_rows(self.bodies, vehicle)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(vehicle)
         chassis = chassis_of(handling.given)
-        self._chassis, self._carrier = self.bodies.row[chassis.name], self.bodies.row[CARRIER]
+        self._carrier = self.bodies.row[CARRIER]
         self._middle = self.bodies.points([(chassis.name, chassis.position)])
         self._drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
         self._pushed = self.bodies.points([(push.body, push.point) for push in handling.pushes])
         tyres = vehicle.tyres
+        towed = [vehicle.towed_under(tyre.body) for tyre in tyres]
+        self._towed = np.array([name is not None for name in towed])
+        self._carrying = [self.bodies.row[name or chassis.name] for name in towed]
+        self._headings = [self.bodies.row[name or CARRIER] for name in towed]
         self._points = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
         self._rotors = np.array([self.bodies.index(rotor(tyre.name), "ry") for tyre in tyres])
         self._height, self._stiffness, self._damping = (
@@ -108,16 +112,19 @@ class PlainRolling:
         cornering = np.array([sides[tyre.name] for tyre in tyres])
         of = handling.tyres
         self._bristles = cornering / (cornering_factor(of.cells) * self._radius * sunk * of.half_width)
-        self._leans = of.inclination * np.sign([tyre.point[1] for tyre in tyres])
+        self._leans = np.where(self._towed, 0.0, of.inclination * np.sign([tyre.point[1] for tyre in tyres]))
         self._shares(tyres)
 
     def _shares(self, tyres: tuple[Tyre, ...]) -> None:
-        """Shares of steering, brake and drive of every tyre: those of an axle share evenly, and so do axles behind."""
+        """Shares of steering, brake and drive of every tyre: wheels of an axle share evenly, and so do axles behind;
+        what is towed is not driven."""
         axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
         beside, behind, front = np.array([np.sum(axles == axle) for axle in axles]), max(axles.max(), 1), axles == 0
         self._steered = front.astype(float)
         self._braked = np.where(front, controls.front_brake, (1.0 - controls.front_brake) / behind) / beside
-        self._driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
+        behind = max(axles[~self._towed].max(), 1)
+        driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
+        self._driven = np.where(self._towed, 0.0, driven)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """State, forces and accelerations at a time (s), positions and rates (n,)."""
@@ -200,9 +207,12 @@ class PlainRolling:
     def _slide(
         self, motion: Motion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside the chassis, rad/s; steering (w,), rad/s."""
+        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside what carries them, rad/s.
+
+        steering (w,) : rates of steering, rad/s.
+        """
         axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
-        locked = ((motion.turning(self._chassis) - turning) * axle).sum(1)
+        locked = ((np.array([motion.turning(row) for row in self._carrying]) - turning) * axle).sum(1)
         spin = np.where(self._rotors >= 0, v[self._rotors], locked)
         whole = turning + axle * spin[:, None] + np.multiply.outer(steering, UP)
         sliding = points[:, RATE] + _cross(whole, contact.down)
@@ -211,11 +221,14 @@ class PlainRolling:
         return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
     def _axles(self, motion: Motion, steer: np.ndarray) -> np.ndarray:
-        """Axles (w, 3), to the left of their wheels: steered and leaning in the carrier's axes."""
-        level = np.cos(self._leans)
-        axes = np.column_stack([-np.sin(steer) * level, np.cos(steer) * level, np.sin(self._leans)])
-        turned: np.ndarray = axes @ motion.axes(self._carrier)[PLACE].T
-        return turned
+        """Axles (w, 3), to the left of their wheels: steered and leaning beside where the carrier heads, or a towed
+        body by its x axis in the road's plane."""
+        ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
+        ahead /= _length(ahead)[:, None]
+        left, level = _cross(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
+        sideways = np.cos(steer)[:, None] * left - np.sin(steer)[:, None] * ahead
+        axles: np.ndarray = level * sideways + np.multiply.outer(np.sin(self._leans), UP)
+        return axles
 
     def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
         """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
@@ -241,18 +254,21 @@ class PlainRolling:
         return total, moments
 
     def _hold(self, motion: Motion, i: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of a moment that the chassis takes over from the body of wheel i."""
-        return motion.by_moment(self._chassis, moment) - motion.by_moment(int(self._points.rows[i]), moment)
+        """Generalised forces (n,) of a moment that what carries wheel i takes over from the wheel's body."""
+        return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
-        """Torques (w,) of brake and drive on wheels (N m) that spin ``relative_spin`` the chassis (rad/s)."""
+        """Torques (w,) of brake and drive on wheels (N m).
+
+        relative_spin (w,) : beside what carries each wheel, rad/s.
+        """
         controls, of = self.handling.controls, self.handling.tyres
         braking, driving = driven(controls.brake, t)[0], driven(controls.drive, t)[0]
         torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
     def _turn_wheels(self, motion: Motion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of torques on the wheels, and against them on the chassis."""
+        """Generalised forces (n,) of torques on the wheels, and against them on what carries these."""
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
             total[self._rotors[i]] += torques[i]

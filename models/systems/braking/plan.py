@@ -126,10 +126,10 @@ def describe(scene: BrakingScene) -> str:
 def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
     """Which forces of a suspended vehicle engines compute by native elements, which all engines share, and which are
     independent."""
-    from models.engines.free_vehicle import joints_alone
+    from models.engines.free_vehicle import native_share
 
     return [
-        *joints_alone(sprung_of(scene).handling.vehicle),
+        *native_share(sprung_of(scene).handling.vehicle),
         ("shared", "tyres, wheels that turn, brakes and the road: no engine has them"),
         ("reference", "plain code that shares no force with them, where --engine reference asks for it"),
     ]

@@ -9,6 +9,7 @@ from models.core.result import Result
 from models.multibody.numbers import GRAVITY, Handling
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
+from models.vehicles.spatial import hitch_of
 
 LOADED = 2.5
 """Of the load at rest: up to about so much a tyre's cornering stiffness grows with its load (Pacejka, Tyre and Vehicle
@@ -105,10 +106,11 @@ def _stops(handling: Handling) -> list[Assumption]:
 def _travels(handling: Handling) -> list[Assumption]:
     """Assumptions on springs that carry a wheel alone: within their curves, or where they have none, before the stops
     of a car."""
-    chassis, bodies = chassis_of(handling.given).name, {tyre.body for tyre in handling.given.tyres}
+    carrying = {chassis_of(handling.given).name, *handling.given.towed}
+    bodies = {tyre.body for tyre in handling.given.tyres}
     listed = []
     for spring in handling.given.springs:
-        upright = spring.axis[2] > 0.9 and spring.first_body == chassis and spring.second_body in bodies
+        upright = spring.axis[2] > 0.9 and spring.first_body in carrying and spring.second_body in bodies
         if not upright or (spring.second_body, "z") not in handling.vehicle.coordinates():
             continue
         column = handling.vehicle.coordinates().index((str(spring.second_body), "z"))
@@ -144,8 +146,10 @@ def _static(handling: Handling) -> np.ndarray:
 
 def _lean(run: Result, handling: Handling) -> Watched:
     places = handling.vehicle.coordinates()
-    turns = (("roll", "rx"), ("pitch", "ry"))
-    return {name: run["positions"][:, places.index((SWAY, turn))] for name, turn in turns}
+    names = {SWAY: "", **{hitch_of(name): f" of {name} beside what tows it" for name in handling.vehicle.towed}}
+    turns = [("roll", "rx"), ("pitch", "ry")]
+    leans = {f"{angle}{of}": (body, turn) for body, of in names.items() for angle, turn in turns}
+    return {name: run["positions"][:, places.index(place)] for name, place in leans.items() if place in places}
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:

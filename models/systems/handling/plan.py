@@ -4,10 +4,14 @@ from models.core.assumptions import assumption_lines
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.engines.error_control import plan_lines
-from models.engines.free_vehicle import joints_alone
+from models.engines.free_vehicle import ENGINES, native_share
+from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
+from models.systems.handling.towed_springs import divided
 from models.vehicles.plausible import plausible
+from models.vehicles.spatial import hitch_of
+from models.vehicles.towing import hitch_load
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
@@ -34,6 +38,7 @@ def describe(scene: HandlingScene) -> str:
             "vehicle",
             f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
         ),
+        *(_line("trailer", _trailer(first, name)) for name in free.towed),
         _line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
         _line(
             "road",
@@ -44,13 +49,32 @@ def describe(scene: HandlingScene) -> str:
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
         *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
-        *(_line(*line) for line in joints_alone(free)),
+        *(_line(*line) for line in _shares(first)),
         _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
         _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
     ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
+
+
+def _shares(handling: Handling) -> list[tuple[str, str]]:
+    """What of the springs is native in each engine, and why no more: heads and texts."""
+    divisions = {engine: divided(handling, engine) for engine in ENGINES}
+    native = {engine: division.native for engine, division in divisions.items()}
+    reasons = [
+        ("shared", f"{engine}: {name}: {why}")
+        for engine, division in divisions.items()
+        for name, why in division.reasons.items()
+    ]
+    return [*native_share(handling.vehicle, native), *reasons]
+
+
+def _trailer(handling: Handling, name: str) -> str:
+    hitch, load = handling.vehicle.body(hitch_of(name)), hitch_load(handling.vehicle, handling.held, name)
+    x, y, z = hitch.position
+    towing = handling.vehicle.chain(name)[2]
+    return f"{name}, towed by {towing} at ({x:g}, {y:g}, {z:g}) m, turns {' '.join(hitch.freedoms)}; {load:.0f} N on it"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

@@ -24,9 +24,10 @@ from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
+from models.systems.handling.towed_springs import divided, numbers_beside
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of, spinning
-from models.vehicles.spatial import JointElement
+from models.vehicles.spatial import Freedom, JointElement, hitch_of
 from models.vehicles.spatial_linear import mass
 
 if TYPE_CHECKING:
@@ -36,8 +37,9 @@ REFERENCE = "reference"
 """The independent reference: plain equations that share no force with the engines; half a minute for every second."""
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
-UPRIGHT = 0.5
-"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane."""
+UPRIGHT, FOLDED = 0.5, 1.57
+"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane; and
+yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
 ORDER, NET_ORDER = 3.0, 2.0
 """Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
 UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
@@ -281,7 +283,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
-    return free_model(engine, driven_by(handling), settings)
+    division, whole = divided(handling, engine), driven_by(handling)
+    parts = (*whole.parts, *division.native)
+    return free_model(engine, replace(whole, numbers=numbers_beside(handling, division), parts=parts), settings)
 
 
 def _plain(handling: Handling) -> "PlainRolling":
@@ -292,7 +296,7 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 def driven_by(handling: Handling) -> Driven:
     """The car as engines build it: the bodies, what acts along their coordinates, and the compiled forces with their
-    table."""
+    whole table."""
     parts = joint_parts(handling.vehicle)
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
@@ -368,15 +372,23 @@ def _along(handling: Handling, element: JointElement, values: np.ndarray) -> np.
 
 
 def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
-    """Refuse a run whose car turns over: what follows is no car's motion."""
-    leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
-    over = (np.abs(positions[:, leans]) > UPRIGHT).any(axis=1)
-    if over.any():
-        raise RunFailed(
-            engine,
-            f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or steer less",
-            float(times[np.argmax(over)]),
-        )
+    """Refuse a run whose car turns over, or whose train jackknifes: what follows is no motion of theirs."""
+    for body, freedoms, most, what in _bounds(h):
+        columns = [
+            i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
+        ]
+        over = (np.abs(positions[:, columns]) > most).any(axis=1)
+        if over.any():
+            raise RunFailed(engine, f"{what}; drive more slowly or steer less", float(times[np.argmax(over)]))
+
+
+def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
+    """Turns of a body that have a largest angle (rad), and what it means to go beyond."""
+    yield SWAY, ("rx", "ry"), UPRIGHT, f"the car turns over: it leans by more than {UPRIGHT} rad"
+    for name in h.vehicle.towed:
+        beside = f"by more than {{}} rad beside what tows it: {name!r}"
+        yield hitch_of(name), ("rx", "ry"), UPRIGHT, f"a trailer turns over: it leans {beside.format(UPRIGHT)}"
+        yield hitch_of(name), ("rz",), FOLDED, f"the train jackknifes: a trailer turns {beside.format(FOLDED)}"
 
 
 def _check_step(drive: Drive, engine: str) -> None:

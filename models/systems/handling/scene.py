@@ -32,7 +32,7 @@ LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0
 
 
 class HandlingVehicle(Strict):
-    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
+    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre; it may tow."""
 
     file: str = Field(
         default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
@@ -72,6 +72,10 @@ class RunTable(Strict):
 
     step: float = quantity(
         "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
+    )
+    forces: Literal["native", "compiled"] = Field(
+        default="native",
+        description="springs of what is towed: the engine's own as far as it has them, or compiled forces",
     )
 
 
@@ -141,7 +145,7 @@ class HandlingScene(SceneFile):
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
         tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
-        return extended(Handling(self._vehicle(), tyres, manoeuvre.controls(), waves), self)
+        return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
 
     def drive(self, name: str) -> "Measured":
         """The measured drive of a manoeuvre, as long as the manoeuvre; InputError for a file that holds none."""
@@ -159,9 +163,9 @@ class HandlingScene(SceneFile):
         """Time (s) at which results of a manoeuvre begin: that of the measured file, or else 0."""
         return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
 
-    def _vehicle(self) -> SpatialVehicle:
-        """The vehicle of the file, its cornering stiffness as [tyres] says."""
-        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+    def given(self) -> SpatialVehicle:
+        """The vehicle of the file with what it tows, its cornering stiffness as [tyres] says."""
+        vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
         if not (ratios := self.tyres.cornering):
             return vehicle
         axles = len({tyre.axle for tyre in vehicle.tyres})

@@ -5,6 +5,10 @@ has the side force -C (s_y + t phi) and the moment C t s_y - D phi about its nor
 turning over its way, t = 3 pi a / 32 its trail and D = C b^2 / 5 for its half width b. With v the lateral velocity at
 the centre of mass, r the yaw rate and u the speed, an axle at x from it slides by s_y = (v + x r) / u - delta and
 turns by phi = r / u. Equilibrium of side forces and of moments is linear in v and r.
+
+A body that is towed heads by the angle theta to the left of the vehicle. In a steady turn an axle of it slides as one
+that is steered by theta. What it and all that it tows have of forces and inertia balances about its hitch, which is an
+equation for each of these angles.
 """
 
 from dataclasses import dataclass
@@ -13,18 +17,21 @@ import numpy as np
 
 from models.multibody.forces import BRISTLES, HALF_WIDTH, RADIUS, STATIC, STEERED, VERTICAL
 from models.multibody.numbers import Handling
+from models.vehicles.spatial import SpatialVehicle, hitch_of
 
 
 @dataclass(frozen=True)
 class SteadyTurn:
-    """Yaw rate (rad/s) and lateral velocity at the centre of mass (m/s) per rad of steer.
+    """Yaw rate (rad/s) and lateral velocity at the centre of mass of all (m/s) per rad of steer.
 
-    ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u.
+    ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
+    ``headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
     """
 
     yaw_gain: float
     side_gain: float
     understeer: float
+    headings: tuple[float, ...] = ()
 
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
@@ -32,17 +39,32 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     free = handling.vehicle
     mass = sum(body.mass for body in free.bodies)
     centre = sum(body.mass * body.position[0] for body in free.bodies) / mass
-    matrix, steered = np.array([[0.0, -mass * speed], [0.0, 0.0]]), np.zeros(2)
+    size = 2 + len(free.towed)
+    matrix, steered = np.zeros((size, size)), np.zeros(size)
+    for body in free.bodies:
+        by_force, _ = _balances(free, body.name, body.position[0], centre)
+        matrix[:, 1] -= body.mass * speed * by_force
     for i, tyre in enumerate(free.tyres):
         n = handling.tyre_numbers(i)
         a = np.sqrt(n[RADIUS] * n[STATIC] / n[VERTICAL])
         c = 8.0 / 3.0 * a**2 * n[HALF_WIDTH] * n[BRISTLES]
-        trail, turning, x = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0, tyre.point[0] - centre
-        slip = np.array([1.0, x]) / speed
-        force = -c * (slip + np.array([0.0, trail / speed]))
-        moment = c * (trail * slip - np.array([0.0, turning / speed]))
-        matrix += np.array([force, x * force + moment])
-        steered += n[STEERED] * c * np.array([-1.0, -x + trail])
-    side, yaw = np.linalg.solve(matrix, steered)
-    wheelbase = max(t.point[0] for t in free.tyres) - min(t.point[0] for t in free.tyres)
-    return SteadyTurn(float(yaw), float(side), float((speed / yaw - wheelbase) / speed**2))
+        trail, turning = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0
+        heading = [-float(name == free.towed_under(tyre.body)) for name in free.towed]
+        slip = np.array([1.0 / speed, (tyre.point[0] - centre) / speed, *heading])
+        turn = np.eye(size)[1] / speed
+        by_force, by_moment = _balances(free, tyre.body, tyre.point[0], centre)
+        matrix += c * np.outer(by_moment, trail * slip - turning * turn) - c * np.outer(by_force, slip + trail * turn)
+        steered += n[STEERED] * c * (trail * by_moment - by_force)
+    side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
+    places = [tyre.point[0] for tyre in free.tyres if free.towed_under(tyre.body) is None]
+    wheelbase = max(places) - min(places)
+    return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
+
+
+def _balances(free: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
+    """(2 + towed,) each: how a side force on a body at x (m), and a moment about the vertical, enter the balances of
+    side forces, of moments about the centre, and of moments about the hitch of each body that is towed."""
+    chain = free.chain(body)
+    behind = np.array([float(name in chain) for name in free.towed])
+    hitches = np.array([free.body(hitch_of(name)).position[0] for name in free.towed])
+    return np.array([1.0, x - centre, *(behind * (x - hitches))]), np.array([0.0, 1.0, *behind])

@@ -20,7 +20,7 @@ def exported(scene: HubScene, engine: str) -> Exported:
 
 def of_cut(engine: str, vehicle: CutVehicle, subject: Subject, more: list[str]) -> Exported:
     """A cut vehicle; ``more`` says what else it leaves out."""
-    division = divide(vehicle, engine)
+    division = divide(vehicle.tree, vehicle.elements, engine)
     weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
     driven = Driven(vehicle.tree, weight, np.zeros(1), None, None, division.native)
     left_out = [

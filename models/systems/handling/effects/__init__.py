@@ -1,12 +1,13 @@
 """Effects of scenes of handling: see ``models.core.scene_effects``.
 
-Counts are those of all manoeuvres: waves of the road, wheels that lean, controls that act, pushes from outside.
+Counts are those of all manoeuvres: coordinates, wheels and towed bodies of the vehicle, waves of the road, wheels that
+lean, controls that act, pushes from outside.
 """
 
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry
+from models.core.scene_effects import Entry, Table
 
 
 def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual: Any) -> Entry:
@@ -29,6 +30,26 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
 
     place = f"manoeuvres.NAME.{key}"
     return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in)
+
+
+ALONE, TOWING = "r19_free", "r19_caravan"
+"""Shipped vehicles, the second of which is the first with a caravan."""
+
+
+def _without_trailer(table: Table, scene: Any) -> None:
+    """The shipped car without its caravan; what is left of a file of the user's is for the user to say."""
+    if scene.vehicle.file != TOWING:
+        allowed = "has bodies with a hitch: name a vehicle file without them"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
+    table["vehicle"]["file"] = ALONE
+
+
+def _with_trailer(table: Table, scene: Any) -> None:
+    """The shipped caravan behind the shipped car."""
+    if scene.vehicle.file != ALONE:
+        allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
+    table.setdefault("vehicle", {})["file"] = TOWING
 
 
 MEASURED = ("steer", "brake", "drive")
@@ -73,5 +94,14 @@ TABLE = {
         "nothing: the same forces at an angle, with spin",
         {"leaning wheels": 4},
         usual=0.02,
+    ),
+    "trailer": Entry(
+        "Bodies that the vehicle tows by a hitch, on springs and wheels of their own",
+        "vehicle.file",
+        "the coordinates of its hitch, wheels and spins, and a tyre per wheel",
+        {"coordinates": 7, "towed bodies": 1, "wheels": 2},
+        there=lambda scene: bool(scene.given().towed),
+        leave_out=_without_trailer,
+        put_in=_with_trailer,
     ),
 }

@@ -1,0 +1,111 @@
+"""A car that tows on its suspension: loads by levers, steady turns, circles, energy, engines, and a planted fault."""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.multibody.numbers import Handling, Tyres
+from models.road.plane_waves import plane_waves
+from models.systems.handling.run import Drive, driven, energy, unaccounted
+from models.vehicles.spatial import SpatialVehicle
+from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
+from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
+from validation.spatial.trains import caravan, loose_train, train
+from validation.spatial.written_equations import TURN
+
+TITLE = "A car with a trailer on its suspension"
+SYSTEM: System = "rolling-vehicle"
+TRAINS = {"caravan": caravan, "train": train}
+STEADY = {"caravan": caravan, "train": loose_train}
+SPEED, TURNING = 22.0, 15.0
+TURN_BOUND = 1e-3
+
+
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """Loads and engines; in the full run also turns, a circle, energy, and a fault."""
+    rows = [_levers_row(), *(_engines_row(name, 0.05 if quick else 1.0) for name in TRAINS)]
+    if not quick:
+        rows += [*(row for name in TRAINS for row in _turn_rows(name)), _circle_row(), _energy_row(), _fault_row()]
+    return rows, {}
+
+
+def _driven(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
+    """A turn on a rough road, steered, braked and driven."""
+    return driven(engine, Handling(vehicle, Tyres(), TURN, plane_waves(4e-6, seed=3)), SPEED, duration)
+
+
+def _levers_row() -> Row:
+    return Observed(
+        "trailer.loads",
+        SYSTEM,
+        "static loads on the caravan's ball and on all three axles, over those by their levers, less 1",
+        levers_error(),
+        "",
+    ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
+
+
+def _engines_row(name: str, duration: float) -> Row:
+    one, other = (_driven(engine, TRAINS[name](), duration).run for engine in ("mujoco", "exudyn"))
+    gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
+    return Observed(
+        f"trailer.engines.{name}",
+        SYSTEM,
+        f"{duration:g} s of a turn of the {name} on a rough road: positions and rates of the two engines",
+        float(gap),
+        "m, rad, m/s, rad/s",
+    ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
+
+
+def _turn_rows(name: str) -> list[Row]:
+    errors = towed_turn(STEADY[name](), TURNING)
+    why = "linear tyres, with trail and turning slip; a body that is towed balances about its hitch"
+    return [
+        Observed(
+            f"trailer.turn.{name}",
+            SYSTEM,
+            f"yaw gain of a steady turn of small slip of the {name} at {TURNING:g} m/s, over the closed form's, less 1",
+            errors.yaw,
+            "",
+        ).at_most(TURN_BOUND, why, "closed form"),
+        Observed(
+            f"trailer.heading.{name}",
+            SYSTEM,
+            f"headings of what is towed in it beside the car, less the closed form's, per rad of steer ({name})",
+            float(np.abs(errors.headings).max()),
+            "rad/rad",
+        ).at_most(TURN_BOUND, why, "closed form"),
+    ]
+
+
+def _circle_row() -> Row:
+    return Observed(
+        "trailer.circle",
+        SYSTEM,
+        "angle of the caravan beside the car in a circle at 3 m/s, over that of axles that roll as they head, less 1",
+        circle_error(),
+        "",
+    ).at_most(0.03, "a patch that turns on its way pulls 3 pi a / 32 behind its centre: 1 % of 3 m", "closed form")
+
+
+def _energy_row() -> Row:
+    drive = _driven("mujoco", caravan(), 0.4)
+    return Observed(
+        "trailer.ledger",
+        SYSTEM,
+        "energy of a turn with the caravan that nothing accounts for, over all of it",
+        float(np.abs(unaccounted(drive)).max() / energy(drive)[0]),
+        "",
+    ).at_most(1e-7, "Simpson's rule over springs, dampers, tyres, drag, brakes and steering", "closed form")
+
+
+def _fault_row() -> Row:
+    errors = towed_turn(caravan(), TURNING, keep_to_the_car)
+    seen = abs(errors.yaw) > TURN_BOUND or np.abs(errors.headings).max() > TURN_BOUND
+    return behaves(
+        "trailer.fault",
+        SYSTEM,
+        "planted: wheels of the caravan keep to the car's heading, by the steady turn",
+        "caught" if seen else "missed",
+        "caught",
+        "both engines share the force: they agree on it",
+    )

@@ -1,0 +1,100 @@
+"""Cars with trailers beside closed forms: static loads by levers, small steady turns, circles of wheels that roll."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.multibody import forces as at
+from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.systems.handling.run import Drive, driven
+from models.systems.handling.single_track import steady_turn
+from models.vehicles.spatial import SpatialVehicle, hitch_of
+from models.vehicles.towing import hitch_load
+from validation.spatial.trains import caravan
+
+SMALL = 2e-5
+"""rad of steer: slip so small that no bristle slides."""
+
+
+@dataclass(frozen=True)
+class TurnErrors:
+    """A settled turn beside its closed form: yaw gain over the form's, less 1; headings of the towed bodies beside the
+    car, less the form's (rad per rad of steer)."""
+
+    yaw: float
+    headings: np.ndarray
+
+
+def levers_error() -> float:
+    """Largest error of the shipped caravan's load on the ball and of all axle loads, over those of its levers.
+
+    About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
+    """
+    car = Handling(caravan())
+    free, (towed,) = car.vehicle, car.vehicle.towed
+    front, rear, axle = car.given.axles
+    weights = np.array(
+        [(body.mass * GRAVITY, body.position[0], towed in free.chain(body.name)) for body in free.bodies]
+    )
+    (w, x, _), hitch = weights[weights[:, 2] == 1.0].T, free.body(hitch_of(towed)).position[0]
+    borne = float(w @ (hitch - x)) / (hitch - axle)
+    ball = float(w.sum()) - borne
+    w, x, _ = weights[weights[:, 2] == 0.0].T
+    behind = (float(w @ (front - x)) + ball * (front - hitch)) / (front - rear)
+    wanted = [float(w.sum()) + ball - behind, behind, borne, ball]
+    loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
+    loads.append(hitch_load(free, car.held, towed))
+    return max(abs(load / lever - 1.0) for load, lever in zip(loads, wanted, strict=True))
+
+
+def towed_turn(
+    vehicle: SpatialVehicle, speed: float, change: Callable[[Handling], None] | None = None, duration: float = 8.0
+) -> TurnErrors:
+    """Turns of small slip at a speed (m/s) in MuJoCo, beside their closed form.
+
+    One to the left less one to the right: a vehicle without symmetry pulls. change : plants a fault in the table;
+    duration : s.
+    """
+    turns = []
+    for steer in (SMALL, -SMALL):
+        car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
+        wanted = steady_turn(car, speed)
+        if change is not None:
+            change(car)
+        turns.append(driven("mujoco", car, speed, duration))
+    left, right = (np.array([turn.velocity()[-1, 2], *headings(turn)]) for turn in turns)
+    yaw, *towed = (left - right) / (2.0 * SMALL)
+    return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.headings)
+
+
+def headings(drive: Drive) -> list[float]:
+    """Last heading (rad) of every towed body beside the car: its own yaw, and those of all between both."""
+    free = drive.handling.vehicle
+    yaws = {
+        name: float(drive.run.positions[-1, free.coordinates().index((hitch_of(name), "rz"))]) for name in free.towed
+    }
+    return [sum(yaws[each] for each in free.chain(name) if each in yaws) for name in free.towed]
+
+
+def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
+    """Angle of the shipped caravan beside the car at a walking pace, over that of wheels that roll where they head,
+    less 1.
+
+    A rear axle at a wheelbase L behind one that is steered by delta rolls on a circle of R = L / tan(delta); the ball,
+    e behind it, on one of sqrt(R^2 + e^2), and the caravan's axle, l behind the ball, touches its own circle.
+    """
+    car = Handling(replace(caravan(), drags=()), Tyres(), Controls(steer=((0.0, 0.0), (2.0, steer))))
+    front, rear, axle = car.given.axles
+    hitch = car.vehicle.body(hitch_of(car.vehicle.towed[0])).position[0]
+    radius, back, bar = (front - rear) / math.tan(steer), rear - hitch, hitch - axle
+    wanted = math.atan(back / radius) + math.asin(bar / math.hypot(radius, back))
+    (angle,) = headings(driven("mujoco", car, speed, 8.0))
+    return -angle / wanted - 1.0
+
+
+def keep_to_the_car(car: Handling) -> None:
+    """Plant a fault: wheels of towed bodies keep to the heading of the car."""
+    for i in range(len(car.vehicle.tyres)):
+        car.tyre_numbers(i)[at.TOWED] = 0.0
