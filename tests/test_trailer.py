@@ -85,9 +85,7 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
     (tmp_path / "mine.toml").write_text((SHIPPED / "r19_caravan.toml").read_text())
     towing = scene(vehicle={"file": str(tmp_path / "mine.toml")})
     assert "trailer" in named(towing)
-    with pytest.raises(
-        InputError, match=r"vehicle\.file = .*mine\.toml': has bodies with a hitch: name a vehicle file"
-    ):
+    with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):
         without(towing, "trailer")
 
 
