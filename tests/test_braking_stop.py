@@ -37,14 +37,14 @@ def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
         (2, "turning", -1e-9, "turns backwards"),
         (1, "turning", 20.1, "turns faster than it rolls"),
         (3, "speed", 1e-4, "creeps"),
-        (3, "place", 5.001, "creeps"),
+        (3, "position", 5.001, "creeps"),
         (1, "speed", np.nan, "no number"),
     ],
 )
 def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
     path = QuarterPath(
         time=np.array([0.0, 0.5, 1.0, 1.5]),
-        place=np.array([0.0, 4.0, 5.0, 5.0]),
+        position=np.array([0.0, 4.0, 5.0, 5.0]),
         speed=np.array([10.0, 5.0, 0.0, 0.0]),
         turning=np.array([20.0, 9.0, 0.0, 0.0]),
         locked=np.zeros(4),

@@ -145,7 +145,7 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
     if engine == "mujoco":
         tree, lowered = realisable(tree)
         assert lowered == [text for text in answer.left_out if "inertia" in text]
-    smooth = tuple(part.element for part in divide(whole, engine).native)
+    smooth = tuple(part.element for part in divide(whole.tree, whole.elements, engine).native)
     hub_inputs = HubInputs(np.zeros((3, 6 * len(whole.hubs))))
     product = hub_model(engine, replace(whole, tree=tree, elements=smooth), hub_inputs, 1e-3, 1e-3, "native")
     assert product.division.shared == ()
@@ -154,7 +154,8 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
 
 def test_parts_that_are_left_out_of_a_cut_car_are_named():
     for engine in ("mujoco", "exudyn"):
-        reasons = divide(rough_car(), engine).reasons
+        car = rough_car()
+        reasons = divide(car.tree, car.elements, engine).reasons
         answer = of_cut(engine, rough_car(), Subject("car", "car.toml", ""), ["stabiliser"])
         assert reasons
         assert all(any(name in text and why in text for text in answer.left_out) for name, why in reasons.items())
