@@ -75,7 +75,7 @@ def test_the_first_evaluation_reads_no_stale_law():
 
 def test_an_axis_fixed_in_what_does_not_carry_the_other_end_stays_shared():
     """A mount in the engine's axes, whose other end is on the chassis, which the engine does not carry."""
-    division = divide(turned(), "mujoco")
+    division = divide(turned().tree, turned().elements, "mujoco")
     assert division.reasons == dict.fromkeys(("left mount.x", "rear mount.z", "front left"), NO_FRAME)
     assert sum(isinstance(part.travel, AxialTravel) for part in division.native) == 7  # of nine of mounts
 
@@ -85,7 +85,7 @@ def test_a_spring_that_nothing_strains_is_no_element():
     car = r19()
     across = replace(car, elements=(*car.elements[:-3], replace(car.elements[-3], axis=np.array([1.0, 0.0, 0.0]))))
     assert car.elements[-3].name == "right seat"
-    assert divide(across, "mujoco").reasons == {"right seat": NO_TRAVEL}
+    assert divide(across.tree, across.elements, "mujoco").reasons == {"right seat": NO_TRAVEL}
     assert acceleration_error("mujoco", across, random_states(across, 2)) < 1e-12
 
 

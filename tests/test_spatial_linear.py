@@ -216,19 +216,21 @@ def test_outputs_and_road(loaded):
     rows = gradient(lambda q: deformations(vehicle, q), n)
     tyre_rows = rows[-3:]
     a, v, s, force, moment, load, deflection, roll = linear.outputs
-    for found, spec in zip((a.acceleration, v.rate, s.displacement), vehicle.outputs, strict=False):
+    for found, spec in zip(
+        (a.acceleration_factors, v.rate_factors, s.displacement_factors), vehicle.outputs, strict=False
+    ):
         moved = gradient(lambda q, o=spec: place(vehicle, o.body, o.point, q) @ o.axis, n)
         np.testing.assert_allclose(found, moved, atol=1e-10)
-    np.testing.assert_allclose(force.displacement, 2e4 * rows[0], atol=1e-6)
-    np.testing.assert_allclose(force.rate, 900.0 * rows[0], atol=1e-7)
-    np.testing.assert_allclose(moment.displacement, 800.0 * rows[-4], atol=1e-7)
-    np.testing.assert_allclose(load.displacement, -1.4e5 * tyre_rows[2], atol=1e-5)
-    np.testing.assert_array_equal(load.road, [0, 0, 1.4e5])
-    np.testing.assert_array_equal(load.road_rate, [0, 0, 70.0])
-    np.testing.assert_array_equal(deflection.road, [1, 0, 0])
-    np.testing.assert_allclose(deflection.displacement, -tyre_rows[0], atol=1e-10)
+    np.testing.assert_allclose(force.displacement_factors, 2e4 * rows[0], atol=1e-6)
+    np.testing.assert_allclose(force.rate_factors, 900.0 * rows[0], atol=1e-7)
+    np.testing.assert_allclose(moment.displacement_factors, 800.0 * rows[-4], atol=1e-7)
+    np.testing.assert_allclose(load.displacement_factors, -1.4e5 * tyre_rows[2], atol=1e-5)
+    np.testing.assert_array_equal(load.road_factors, [0, 0, 1.4e5])
+    np.testing.assert_array_equal(load.road_rate_factors, [0, 0, 70.0])
+    np.testing.assert_array_equal(deflection.road_factors, [1, 0, 0])
+    np.testing.assert_allclose(deflection.displacement_factors, -tyre_rows[0], atol=1e-10)
     rolls = [freedom == "rx" and body in ("body", "engine") for body, freedom in linear.coordinates]
-    np.testing.assert_array_equal(roll.acceleration, np.array(rolls, float))
+    np.testing.assert_array_equal(roll.acceleration_factors, np.array(rolls, float))
     np.testing.assert_allclose(
         linear.road_stiffness, (np.array([1.5e5, 1.6e5, 1.4e5])[:, None] * tyre_rows).T, atol=1e-5
     )

@@ -213,7 +213,11 @@ def test_standard_errors_of_a_run():
     vehicle, _ = ride("quarter_car")
     linear = linearise(vehicle)
     height = replace(
-        linear.outputs[0], acceleration=np.zeros(2), rate=np.zeros(2), displacement=np.zeros(2), road=np.ones(1)
+        linear.outputs[0],
+        acceleration_factors=np.zeros(2),
+        rate_factors=np.zeros(2),
+        displacement_factors=np.zeros(2),
+        road_factors=np.ones(1),
     )
     road = excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
     P, a, T = stationary(excited(replace(linear, outputs=(height,)), road, 10.0)).variance[0], 3.0, 200.0
