@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -121,10 +122,12 @@ def test_twenty_workers_killed_at_random_moments_change_nothing(workers, tmp_pat
     due = set(draw.choice(np.arange(1, 200), 20, replace=False).tolist())
 
     def kill(state):
-        alive = [int(path.name) for path in tmp_path.iterdir() if int(path.name) not in killed]
-        if state.done in due and alive:
-            killed.append(alive[int(draw.integers(len(alive)))])
-            os.kill(killed[-1], signal.SIGKILL)
+        seen = [int(path.name) for path in tmp_path.iterdir() if int(path.name) not in killed]
+        for process in draw.permutation(seen).tolist() if state.done in due else []:
+            with suppress(ProcessLookupError):  # of a pool that has gone
+                os.kill(process, signal.SIGKILL)
+                killed.append(process)
+                return
 
     with processes(workers) as executor:
         found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=Blocks(1), progress=kill)["x"]

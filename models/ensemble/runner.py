@@ -31,8 +31,9 @@ AHEAD = 64
 has more."""
 TOLD = 5
 """Failed blocks that a message names."""
-LIVES = 3
-"""Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
+LIVES, AMONG_OTHERS = 4, 2
+"""Times that a block may lose its worker, of which so many among others; then it is computed alone, and is to blame
+where that fails twice: once may be anybody's kill."""
 
 
 T = TypeVar("T")
@@ -291,7 +292,7 @@ def _answers(
                 if died:
                     lost[i] += 1
                 if died and lost[i] < LIVES:
-                    alone.append((i, block)) if lost[i] == LIVES - 1 else queue.appendleft((i, block))
+                    (alone if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
                     yield i, block, future.result() if error is None else _said(error)
             queue.extend(islice(missing, max(ahead - len(queue), 0)))
