@@ -188,6 +188,9 @@ def cluster(address: str, *places: Path) -> Iterator[Executor]:
         raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None
     with client:
         _require_alike(client, address, places)
+        from models.ensemble.dask_worker import Plain
+
+        client.register_plugin(Plain())
         yield OnCluster(client)
 
 
