@@ -19,7 +19,7 @@ def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path
     problem = chosen.bands.problem
     times = problem.clock.times
     shown = times <= times[0] + SECONDS
-    figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6), layout="constrained")
+    figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6))
     for axis, channel, row, half in zip(
         axes, problem.channels, chosen.bands.predicted, chosen.bands.half_width, strict=False
     ):

@@ -254,7 +254,7 @@ def _angles(exam: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.nda
 def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str = "") -> Path:
     """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
     times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
-    drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, ncols=2, width_ratios=(2.4, 1))
+    drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
     for (left, right), answer in zip(panels, answers, strict=True):
         values, unit, scale = run.samples(answer), f"k{answer.unit}", 1e-3
         if np.abs(values).max() < 1e3:
@@ -287,7 +287,7 @@ def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
 
 def overlay_figure(exam: Examination, run: Outcome, compared: Sequence[Compared], path: Path) -> Path:
     """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
-    drawn, panels = _timed(len(compared), 1.7 * len(compared) + 0.7, ncols=2, width_ratios=(2.4, 1))
+    drawn, panels = _timed(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
     for (left, right), each in zip(panels, compared, strict=True):
         times, measured, computed = overlay(exam.recording, run, each.signal, each.answer)
         near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
