@@ -4,7 +4,7 @@ import io
 import json
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -307,10 +307,12 @@ def identify(
     if not measurement.is_file():
         raise InputError(measurement, "--from", None, "no such file")
     folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
-    more = {"engine": engines[0] if engines else "", "low_pass": low_pass, "profiles": profiles}
-    finish(
-        lambda tell: report(loaded, measurement, keys, folder, tell, **more), folder, as_json, (), False, loaded.system
-    )
+    usual = engines[0] if engines else ""
+
+    def computed(tell: Callable[[str, float], None]) -> dict[str, Any]:
+        return report(loaded, measurement, keys, folder, tell, profiles, engine=usual, low_pass=low_pass)
+
+    finish(computed, folder, as_json, (), False, loaded.system)
 
 
 @app.command()

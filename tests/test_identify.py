@@ -125,10 +125,10 @@ def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
 def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
     """Stages that are kept give the same bits."""
     path = measured(scene)
-    whole, _ = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    whole = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
     stages = sorted((tmp_path / "kept" / "stages").glob("block*"))
     stages[-1].unlink()
-    again, _ = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    again = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
     assert np.array_equal(whole.fit.values, again.fit.values)
     with pytest.raises(InputError, match="another job"):
         identify(begun(scene), path, KEYS, low_pass=4.0, folder=tmp_path / "kept")

@@ -20,7 +20,8 @@ from models.systems.contact.cases_table import answer
 from models.systems.contact.run import Built, contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
-from models.systems.handling.run import driven, unaccounted
+from models.systems.handling.energy import unaccounted
+from models.systems.handling.run import driven
 from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.omissions import effects_of

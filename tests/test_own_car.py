@@ -19,8 +19,9 @@ from models.multibody.plain.statics import held_at_rest
 from models.own_model.car import car
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
+from models.systems.handling.energy import unaccounted
 from models.systems.handling.export import of_handling
-from models.systems.handling.run import REFERENCE, build, driven, unaccounted
+from models.systems.handling.run import REFERENCE, build, driven
 from models.systems.ride.run import run as run_ride
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.free_vehicle import CARRIER

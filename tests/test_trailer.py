@@ -13,9 +13,10 @@ from models.core.scene_effects import named, without
 from models.engines.free_vehicle import built_share, free_model
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
+from models.systems.handling.energy import energy, unaccounted
 from models.systems.handling.plan import describe
 from models.systems.handling.run import build as build_model
-from models.systems.handling.run import driven, driven_by, energy, run, unaccounted
+from models.systems.handling.run import driven, driven_by, run
 from models.systems.handling.scene import build
 from models.systems.handling.towed_springs import divided, numbers_beside
 from models.vehicles.spatial_linear import linearise

@@ -31,29 +31,28 @@ def identify(
     *,
     engine: str = "",
     low_pass: float = 0.0,
-    profiles: bool = False,
     folder: Path | None = None,
     tell: Tell = lambda text, share: None,
-) -> tuple[Uncertainty, list[Profile]]:
-    """Estimates of keys of any scene whose run has channels over time, with their uncertainty and profiles.
+) -> Uncertainty:
+    """Estimates of keys of any scene whose run has channels over time, with their uncertainty.
 
     scene : as ``load_scene`` gives it; measurement : its channels have the names of the run's; parameters : KEY or
-    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; profiles : of every parameter, else
-    of those that the data do not determine; folder : keeps finished stages. Raises InputError and RunFailed.
+    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; folder : keeps finished stages.
+    Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
     if folder is None:
-        known = uncertainty(fit(problem, None, tell))
-    else:
-        store = Store(folder / STAGES)
-        with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
-            known = uncertainty(fit(problem, store, tell))
-    wanted = [k for k in range(len(problem.parameters)) if profiles or not known.determined[k]]
-    return known, list(_profiles(scene, known, wanted, tell))
+        return uncertainty(fit(problem, None, tell))
+    store = Store(folder / STAGES)
+    with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
+        return uncertainty(fit(problem, store, tell))
 
 
-def _profiles(scene: Any, known: Uncertainty, wanted: list[int], tell: Tell) -> Iterator[Profile]:
-    """Profiles of some parameters, computed by the scene's crew."""
+def profiles_of(
+    scene: Any, known: Uncertainty, every: bool = False, tell: Tell = lambda text, share: None
+) -> Iterator[Profile]:
+    """Profiles of every parameter, or of those that the data do not determine, computed by the scene's crew."""
+    wanted = [k for k in range(len(known.fit.problem.parameters)) if every or not known.determined[k]]
     with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
         for done, (k, made) in enumerate(in_order(partial(profile, known), iter(wanted), pool), start=1):
             tell(f"profile of {known.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
@@ -74,11 +73,12 @@ def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, l
 
 
 def report(
-    scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, **more: Any
+    scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, every: bool, **more: Any
 ) -> dict[str, Any]:
-    """Identify, save ``identify.json`` and ``identify.png``, and say it in lines."""
-    known, profiles = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
-    answer = as_dict(known, profiles)
+    """Identify, save ``identify.json`` and ``identify.png``, and say it in lines; every : profiles of all of them."""
+    known = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
+    drawn = list(profiles_of(scene, known, every, tell))
+    answer = as_dict(known, drawn)
     write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
     draw(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
     return {
@@ -86,7 +86,7 @@ def report(
         "folder": str(folder),
         "failed": {},
         "identified": answer,
-        "table": lines(known, profiles),
+        "table": lines(known, drawn),
         "results": {},
     }
 

@@ -15,9 +15,10 @@ from models.engines.mujoco_quiet import installed
 from models.machine.compiled import njit
 from models.machine.timing import interleave, median
 from models.multibody import forces as at
-from models.multibody.numbers import Controls, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import Drive, driven, driven_by, energy, friction_distance, unaccounted
+from models.systems.handling.energy import energy, unaccounted
+from models.systems.handling.run import Drive, driven, driven_by
 from models.systems.handling.single_track import steady_turn
 from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
@@ -167,7 +168,7 @@ def _stop_rows() -> list[Row]:
     drive = driven("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
-    stopped = friction_distance(speed, mu) - friction_distance(ahead[-1], mu)
+    stopped = (speed**2 - ahead[-1] ** 2) / (2.0 * mu * GRAVITY)  # sliding friction alone
     return [
         Observed(
             "handling.slide",

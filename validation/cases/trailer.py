@@ -6,7 +6,8 @@ import numpy as np
 
 from models.multibody.numbers import Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import Drive, driven, energy, unaccounted
+from models.systems.handling.energy import energy, unaccounted
+from models.systems.handling.run import Drive, driven
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn

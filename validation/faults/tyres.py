@@ -7,7 +7,8 @@ import numpy as np
 
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
-from models.systems.handling.run import bodies_energy, build
+from models.systems.handling.energy import bodies_energy
+from models.systems.handling.run import build
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import off
 from validation.faults.campaign import Campaign, Check, Fault

@@ -27,7 +27,8 @@ from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULAR
 from models.rail.wheelset import CHOSEN
-from models.systems.handling.run import Drive, build, driven, energy, read
+from models.systems.handling.energy import energy
+from models.systems.handling.run import Drive, build, driven, read
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built, off

@@ -5,7 +5,7 @@ import numpy as np
 
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.numbers import Handling
-from models.systems.handling.run import bodies_energy
+from models.systems.handling.energy import bodies_energy
 from models.vehicles.free_vehicle import rotor
 from validation.own_model.cars import CORNERS, SALOON
 

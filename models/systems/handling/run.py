@@ -19,9 +19,8 @@ from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.native_parts import joint_parts
-from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
-from models.multibody.numbers import GRAVITY, Control, Handling
+from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.systems.handling.towed_springs import divided, numbers_beside
@@ -358,13 +357,13 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
     at.reports(handling.numbers, run.times, *states, report, ledger)
     for element in handling.vehicle.joint_elements:
-        travel, rate = (_along(handling, element, values) for values in states)
+        travel, rate = (along(handling, element, values) for values in states)
         ledger[:, at.POTENTIAL] += (element.held + 0.5 * element.stiffness * travel) * travel
         ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
 
 
-def _along(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
+def along(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
     """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
     places = handling.vehicle.coordinates()
     columns = [places.index(place) for place in element.coordinates]
@@ -412,38 +411,3 @@ def _check_step(drive: Drive, engine: str) -> None:
                 "or end the run before",
                 float(times[row]),
             )
-
-
-def energy(drive: Drive) -> np.ndarray:
-    """(m,) J: kinetic energy, weights, springs and tyres, by the rigid bodies' own velocities."""
-    run = drive.run
-    motion = np.array([bodies_energy(drive.handling, q, v) for q, v in zip(run.positions, run.rates, strict=True)])
-    return motion + drive.ledger[:, at.POTENTIAL]
-
-
-def unaccounted(drive: Drive) -> np.ndarray:
-    """(m,) J: energy less what it was at the start and less what was put in and taken out since, by Simpson's rule.
-
-    Rows lie at every second step: the middle one of three belongs to the rule.
-    """
-    power, times, whole = drive.power(), drive.run.times, energy(drive)[::2]
-    work = np.cumsum((times[1] - times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
-    return whole[1:] - whole[0] - work
-
-
-def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Kinetic energy and that of weights (J), body by body by the written-out motion: without any engine."""
-    total, motions = 0.0, SpatialReference(handling.vehicle).motions_of(q, v)
-    for body in handling.vehicle.bodies:
-        motion = motions[body.name]
-        speed, spin = motion.shift @ v, motion.rotation.T @ (motion.turn @ v)
-        total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
-        total -= body.mass * handling.gravity @ motion.centre
-    for element in handling.vehicle.joint_elements:
-        total += 0.5 * element.inertia * float(_along(handling, element, v)) ** 2
-    return float(total)
-
-
-def friction_distance(speed: float, mu: float) -> float:
-    """Distance (m) in which sliding friction alone stops: v^2 / (2 mu g)."""
-    return speed**2 / (2.0 * mu * GRAVITY)

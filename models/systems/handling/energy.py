@@ -1,0 +1,38 @@
+"""Energy of a drive, by the rigid bodies' own velocities, and whether its ledger closes."""
+
+import numpy as np
+
+from models.engines.spatial_reference import SpatialReference
+from models.multibody import forces as at
+from models.multibody.numbers import Handling
+from models.systems.handling.run import Drive, along
+
+
+def energy(drive: Drive) -> np.ndarray:
+    """(m,) J: kinetic energy, weights, springs and tyres, by the rigid bodies' own velocities."""
+    run = drive.run
+    motion = np.array([bodies_energy(drive.handling, q, v) for q, v in zip(run.positions, run.rates, strict=True)])
+    return motion + drive.ledger[:, at.POTENTIAL]
+
+
+def unaccounted(drive: Drive) -> np.ndarray:
+    """(m,) J: energy less what it was at the start and less what was put in and taken out since, by Simpson's rule.
+
+    Rows lie at every second step: the middle one of three belongs to the rule.
+    """
+    power, times, whole = drive.power(), drive.run.times, energy(drive)[::2]
+    work = np.cumsum((times[1] - times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
+    return whole[1:] - whole[0] - work
+
+
+def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """Kinetic energy and that of weights (J), body by body by the written-out motion: without any engine."""
+    total, motions = 0.0, SpatialReference(handling.vehicle).motions_of(q, v)
+    for body in handling.vehicle.bodies:
+        motion = motions[body.name]
+        speed, spin = motion.shift @ v, motion.rotation.T @ (motion.turn @ v)
+        total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
+        total -= body.mass * handling.gravity @ motion.centre
+    for element in handling.vehicle.joint_elements:
+        total += 0.5 * element.inertia * float(along(handling, element, v)) ** 2
+    return float(total)
