@@ -116,10 +116,10 @@ class Mortal:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("workers", [1, 2, 5])
-def test_twenty_workers_killed_at_random_moments_change_nothing(workers, tmp_path):
+@pytest.mark.parametrize(("workers", "kills"), [(1, 4), (2, 20), (5, 4)])
+def test_workers_killed_at_random_moments_change_nothing(workers, kills, tmp_path):
     draw, killed = np.random.default_rng(workers), list[int]()
-    due = set(draw.choice(np.arange(1, 200), 20, replace=False).tolist())
+    due = set(draw.choice(np.arange(1, 200), kills, replace=False).tolist())
 
     def kill(state):
         seen = [int(path.name) for path in tmp_path.iterdir() if int(path.name) not in killed]
@@ -131,4 +131,4 @@ def test_twenty_workers_killed_at_random_moments_change_nothing(workers, tmp_pat
 
     with processes(workers) as executor:
         found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=Blocks(1), progress=kill)["x"]
-    assert len(killed) >= 10 and np.array_equal(found, np.sqrt(np.arange(200)))
+    assert 2 * len(killed) >= kills and np.array_equal(found, np.sqrt(np.arange(200)))
