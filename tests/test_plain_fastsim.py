@@ -33,8 +33,8 @@ PROGRAMS = [
         ("elliptic", "blended", "plain"),
     )
 ]
-CLOSE = 1e-9
-"""Of mu N, and of mu N times the longer semi-axis: some thousand operations; angles against roots in the turning."""
+CLOSE = 1e-12
+"""Of mu N, and of mu N times the longer semi-axis: some thousand operations, each right to rounding."""
 
 
 def named(program):
