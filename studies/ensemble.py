@@ -84,7 +84,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
     times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
     true = measured.states[np.rint(times / scene.run.step).astype(int)]
-    found = PathStatistics(true, max(options.saved, options.engine_paths))
+    statistics = PathStatistics(true, max(options.saved, options.engine_paths))
 
     def tell(finished: Done) -> None:
         progress(f"reference: {finished}", finished.done / finished.paths)
@@ -97,7 +97,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
         for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS, pool, cut, tell):
-            found.add(block)
+            statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
@@ -105,16 +105,16 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                 repeated = run_paths(mujoco_threads(*asked, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
-            gaps[engine] = gap(found.first, repeated, times)
+            gaps[engine] = gap(statistics.first, repeated, times)
     write_measurement(measured, folder, period)
-    rows = _rows(options, times, found)
-    channels, axes = _channels(times, found, options.saved)
+    rows = _rows(options, times, statistics)
+    channels, axes = _channels(times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _told(saved, first, rows, options, found).save(folder / "ensemble.nc")
-    table = text(options, scene, rows, found, gaps)
+    _told(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
+    table = text(options, scene, rows, statistics, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(times, found, options, results, folder)
+    _figure(times, statistics, options, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -127,29 +127,37 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _channels(times: np.ndarray, found: PathStatistics, saved: int) -> tuple[dict[str, Channel], dict[str, Channel]]:
+def _channels(
+    times: np.ndarray, statistics: PathStatistics, saved: int
+) -> tuple[dict[str, Channel], dict[str, Channel]]:
     """The first paths and the statistics of all, with their axes."""
-    paths = {name: values[:saved] for name, values in found.first.items()}
+    paths = {name: values[:saved] for name, values in statistics.first.items()}
     units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
     channels = {
         "states": Channel(("path", "time", "state"), paths["states"], units),
         "drift_off": Channel("path", paths["drift_off"], "s", "drift-off, infinite if never"),
         "failed": Channel("path", paths["failed"], "s", "last good time of a path that failed"),
-        "mean_error": Channel(("time", "state"), found.covariance.mean, units, "mean of all paths less the true one"),
-        "covariance": Channel(("time", "state", "other_state"), found.covariance.covariance, units, "of all paths"),
-        "drift_offs": Channel("drift_off_time", found.drift_off.counts, "-", "number of all paths that drifted off"),
+        "mean_error": Channel(
+            ("time", "state"), statistics.covariance.mean, units, "mean of all paths less the true one"
+        ),
+        "covariance": Channel(
+            ("time", "state", "other_state"), statistics.covariance.covariance, units, "of all paths"
+        ),
+        "drift_offs": Channel(
+            "drift_off_time", statistics.drift_off.counts, "-", "number of all paths that drifted off"
+        ),
     }
     axes = {
         "time": Channel("time", times, "s"),
         "state": Channel("state", names),
         "other_state": Channel("other_state", names),
-        "drift_off_time": Channel("drift_off_time", found.drift_off.values, "s"),
+        "drift_off_time": Channel("drift_off_time", statistics.drift_off.values, "s"),
     }
     return channels, axes
 
 
 def _told(
-    saved: Result, first: Result, rows: list[dict[str, float]], options: Options, found: PathStatistics
+    saved: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
     """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
     error = json.loads(first.data.attrs["error"])
@@ -159,30 +167,30 @@ def _told(
         for name, unit in (("pitch", "rad"), ("heave", "m"))
         for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }
-    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(found))]
+    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(statistics))]
     return of_chance(
         judged(saved, assumed), {f"deviation of {name}": breach for name, breach in worst.items()}, options.paths
     )
 
 
-def _steepest(found: PathStatistics) -> Watched:
+def _steepest(statistics: PathStatistics) -> Watched:
     """Largest pitch (rad) of all paths at each time; of those that left all bounds it is none."""
-    return {"any path": found.steepest}
+    return {"any path": statistics.steepest}
 
 
-def _rows(options: Options, times: np.ndarray, found: PathStatistics) -> list[dict[str, float]]:
+def _rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
     """Standard deviation and its standard error of pitch and heave at the asked times."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
-        pitch, heave = (found.moments.deviation(row, place) for place in (PITCH, HEAVE))
+        pitch, heave = (statistics.moments.deviation(row, place) for place in (PITCH, HEAVE))
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows
 
 
 def text(
-    options: Options, scene: Scene, rows: list[dict[str, float]], found: PathStatistics, gaps: dict[str, float]
+    options: Options, scene: Scene, rows: list[dict[str, float]], statistics: PathStatistics, gaps: dict[str, float]
 ) -> list[str]:
     """The table as lines of text."""
     lines = [
@@ -197,9 +205,9 @@ def text(
     ]
     lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
     for level in QUANTILES:
-        value, low, high = found.drift_off.quantile(level)
+        value, low, high = statistics.drift_off.quantile(level)
         lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
-    lines += [f"  {found.lost} paths left all bounds and count as drifted off by then"] if found.lost else []
+    lines += [f"  {statistics.lost} paths left all bounds and count as drifted off by then"] if statistics.lost else []
     for engine, worst in gaps.items():
         differ = (
             f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
@@ -213,23 +221,23 @@ def _time(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "never"
 
 
-def _figure(times: np.ndarray, found: PathStatistics, options: Options, results: Results, folder: Path) -> None:
+def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, DARK, WIDE, heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
-    draw_fan(fan, times[1:], found.fan[:, 1:])
+    draw_fan(fan, times[1:], statistics.fan[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )
     fan.legend(loc="lower right")
-    there = np.isfinite(found.drift_off.values)
-    drifted, counts = found.drift_off.values[there], found.drift_off.counts[there]
+    there = np.isfinite(statistics.drift_off.values)
+    drifted, counts = statistics.drift_off.values[there], statistics.drift_off.counts[there]
     histogram.hist(drifted, bins=40, weights=counts, color=BLUE, alpha=0.6)
     for level, style in zip(QUANTILES, (":", "-", ":"), strict=True):
-        value = found.drift_off.quantile(level)[0]
+        value = statistics.drift_off.quantile(level)[0]
         if np.isfinite(value):
             histogram.axvline(value, color=DARK, linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
     histogram.set_title(f"Drift-offs: paths [-] ({options.paths - counts.sum()} never)")

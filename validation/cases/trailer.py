@@ -46,8 +46,8 @@ def _levers_row() -> Row:
 
 
 def _engines_row(name: str, duration: float) -> Row:
-    one, other = (_driven(engine, TRAINS[name](), duration).run for engine in ("mujoco", "exudyn"))
-    gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
+    first, second = (_driven(engine, TRAINS[name](), duration).run for engine in ("mujoco", "exudyn"))
+    gap = max(np.abs(first.positions - second.positions).max(), np.abs(first.rates - second.rates).max())
     return Observed(
         f"trailer.engines.{name}",
         SYSTEM,
