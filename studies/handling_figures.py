@@ -10,7 +10,8 @@ from models.core.told import Results
 from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, heading, legend_below, panels, save
 from models.systems.handling.run import Drive
 
-TYRES = (BLUE, SKY, VERMILION, ORANGE)
+TYRES, LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
+"""Colours of four tyres, and lines of the first four, the next four (of what is towed) and so on."""
 
 
 def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
@@ -33,7 +34,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
         (moments, drive["mz"], "moment [N m]", "Aligning moments"),
     ):
         for i, tyre in enumerate(drive.handling.vehicle.tyres):
-            axis.plot(drive.run.times, values[:, i], color=TYRES[i % 4], label=tyre.name)
+            axis.plot(drive.run.times, values[:, i], label=tyre.name, **_looks(i))
         axis.set(ylabel=label, title=name)
     for axis in over_time:
         axis.set_xlabel("time [s]")
@@ -42,6 +43,11 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     start = f"from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}"
     heading(figure, f"{title}: {start}", runs)
     return save(figure, path)
+
+
+def _looks(i: int) -> dict[str, Any]:
+    """Colour and line of a tyre by its number."""
+    return {"color": TYRES[i % 4], "linestyle": LINES[i // 4 % 4]}
 
 
 def _path(axis: Axes, drive: Drive) -> None:
@@ -61,7 +67,7 @@ def _circle(axis: Axes, drive: Drive) -> None:
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
     for i, (side, ahead) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
-        axis.plot(side, ahead, color=TYRES[i % 4], lw=0.9)
+        axis.plot(side, ahead, **_looks(i), lw=0.9)
     axis.set(
         xlabel="side force / μN [-]",
         ylabel="force ahead / μN [-]",
