@@ -203,6 +203,7 @@ class CompiledSamples:
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
     def __call__(self, commands, record, sample, braking, motion, *others):
+        """``samples`` of the fields of a ``Subject``."""
         return self.march(by_reference(commands, record, sample, braking, motion, others))
 
 
