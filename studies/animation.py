@@ -35,7 +35,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
         written.append(still(folder / f"{motion.engine}.png", image))
     said = missing(film.format)
     if film.format != "png" and not said:
-        frames = _told(page.frames(), film.frames, progress)
+        frames = _with_progress(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
     table = [difference(motions), ", ".join(path.name for path in written), said]
     return {
@@ -48,7 +48,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _told(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
+def _with_progress(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
     """The frames, each of which moves the progress bar."""
     for k, frame in enumerate(frames):
         progress(f"frame {k + 1} of {count}", RUN + (1.0 - RUN) * k / count)

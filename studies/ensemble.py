@@ -110,7 +110,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     rows = _rows(options, times, statistics)
     channels, axes = _channels(times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _told(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
+    _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
     table = text(options, scene, rows, statistics, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
@@ -156,7 +156,7 @@ def _channels(
     return channels, axes
 
 
-def _told(
+def _with_errors(
     saved: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
     """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""

@@ -53,7 +53,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, progress=partial(_told, progress, scene, k), error=scene.error
+            scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
@@ -74,7 +74,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     }
 
 
-def _told(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
+def _report_progress(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
     progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
 
 

@@ -112,7 +112,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "results": results,
         "table": table,
-        "rows": [_numbers(source) for source in sources],
+        "rows": [_numbers_of_ways(source) for source in sources],
     }
 
 
@@ -224,7 +224,7 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
     return saved
 
 
-def _numbers(source: Source) -> dict[str, Any]:
+def _numbers_of_ways(source: Source) -> dict[str, Any]:
     """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
     assert source.quality is not None
     ways = {}
@@ -238,7 +238,7 @@ def _numbers(source: Source) -> dict[str, Any]:
 def _lines(source: Source, p: Parameters) -> list[str]:
     """Lines: the verdict on the readings, then one for each method."""
     assert source.quality is not None
-    numbers, kind = _numbers(source), "error" if source.truth else "size"
+    numbers, kind = _numbers_of_ways(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
     lines = [
         f"  {source.name}",

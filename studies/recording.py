@@ -44,7 +44,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
         "findings": queries(finding for finding in exam.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in exam.findings),
         "channels": _sizes(exam),
-        "table": [*_told(exam), f"  the page: {page}"],
+        "table": [*_lines_of_findings(exam), f"  the page: {page}"],
     }
 
 
@@ -67,7 +67,7 @@ def _sizes(exam: Examination) -> dict[str, Any]:
     return sizes
 
 
-def _told(exam: Examination) -> list[str]:
+def _lines_of_findings(exam: Examination) -> list[str]:
     """Lines for the terminal: findings that matter, and how the runs ended."""
     lines = [f"  {finding.weight}: {finding.text}" for finding in gathered(exam.findings) if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in exam.findings)

@@ -87,7 +87,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     top = Heading(scene.title, results)
     _save(results, folder)
     _save_system(scene, linear, speed, folder)
-    if along := _along(vehicle):
+    if along := _with_points_along_body(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
         at = run_scene(plain, "reference", vehicle=along, points=SweepPoints([speed], roads)).detail
         places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
@@ -122,7 +122,7 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
     }
 
 
-def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
+def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     """The vehicle with the vertical acceleration of points along its heaviest body that pitches, if there is one."""
     bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
     if not bodies or len(vehicle.axles) < 2:

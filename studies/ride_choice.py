@@ -72,7 +72,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.further(frozenset(choice.left_out))
-        alone = [_alone(chooser, effect) for effect in chooser.effects]
+        alone = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
@@ -99,7 +99,7 @@ def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     return results
 
 
-def _alone(chooser: Chooser, effect: Effect) -> Alone:
+def _effect_alone(chooser: Chooser, effect: Effect) -> Alone:
     single = frozenset([effect])
     return Alone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
 

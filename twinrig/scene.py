@@ -50,7 +50,9 @@ class Scene:
 
     def __repr__(self) -> str:
         head = f"{self.title}\n  system {self.system}, scene {self.file}"
-        return "\n".join([head, *(f"  {key} = {value!r}" for key, value in _leaves(self.table) if key != "title")])
+        return "\n".join(
+            [head, *(f"  {key} = {value!r}" for key, value in _dotted_values(self.table) if key != "title")]
+        )
 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping[str, Any]) -> Scene:
@@ -79,10 +81,10 @@ def plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def _dotted_values(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys with their values."""
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
-            yield from _leaves(value, f"{before}{key}.")
+            yield from _dotted_values(value, f"{before}{key}.")
         else:
             yield f"{before}{key}", value

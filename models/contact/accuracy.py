@@ -88,14 +88,17 @@ def rolled(contact: Contact, motion: Motion, cells: int, *, fields: bool = False
         force, moment = _of_linear(contact, motion, fine)
         return fine, Error(0.0, force, 0.0, moment)
     coarse = contact.roll(motion, halved(cells))
-    (force, moment), (likely, turning) = _most(contact, cells, fine, coarse), _likely(contact, cells, fine, coarse)
+    (force, moment), (likely, turning) = (
+        _largest_errors(contact, cells, fine, coarse),
+        _likely_errors(contact, cells, fine, coarse),
+    )
     theory, moment_theory = _of_theory(contact, motion, fine)
     return fine, Error(force, theory, moment, moment_theory, likely, turning)
 
 
 def left(contact: Contact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
     """Errors of force (N) and moment (N m) that the cells leave at most."""
-    return _most(contact, cells, fine, contact.roll(motion, halved(cells)))
+    return _largest_errors(contact, cells, fine, contact.roll(motion, halved(cells)))
 
 
 def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
@@ -104,7 +107,7 @@ def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
 
-def _most(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _largest_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -113,7 +116,7 @@ def _most(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[f
     return error, contact.lever * error
 
 
-def _likely(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _likely_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     """Force and moment each by its own difference, LIKELY of it, with small shares of what two grids miss together."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:

@@ -85,7 +85,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
 def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
-    pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
+    pushed = {(k, m): _displacement_by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
         whole = np.sum([pushed[k, m] for m in loaded], axis=0)
@@ -103,7 +103,7 @@ def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Ar
     return stiffness, np.array(approach)
 
 
-def _by(source: Net, target: Net, pair: Pair) -> Array:
+def _displacement_by(source: Net, target: Net, pair: Pair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
         return displacement(source.pressure, *source.step, pair.modulus)

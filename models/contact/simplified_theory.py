@@ -202,7 +202,9 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
     """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
-        depth = _found(lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge)
+        depth = _depth_for_load(
+            lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge
+        )
         alone = load_at_depth(patch, depth, pair, options)
         return _gathered(alone.approach / along, (alone,), pair, options)
 
@@ -210,10 +212,10 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
         depths = zip(patches, _shallow(patches, reached), strict=True)
         return _total([load_at_depth(patch, depth, pair, options) for patch, depth in depths])
 
-    return _shared(patches, _found(alone_at, load, lowest, np.inf), load, pair, options)
+    return _shared(patches, _depth_for_load(alone_at, load, lowest, np.inf), load, pair, options)
 
 
-def _found(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
+def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
     """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until it is, then Brent's method."""
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()

@@ -197,11 +197,11 @@ def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
     """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
     points, gap = side.gaps(pose)
     k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
-    share = _share(gap, k)
+    share = _parabola_minimum(gap, k)
     return points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
 
 
-def _share(gap: Array, k: int) -> float:
+def _parabola_minimum(gap: Array, k: int) -> float:
     """Where the parabola through three gaps is least, in steps from the one in the middle."""
     rise, bend = _parabola(gap, k)
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
@@ -227,14 +227,14 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
     for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
         if gap[k] < DEEP and 0 < k < gap.size - 1:
-            touches.append(_touch(side, pose, points, gap, (first, k, last)))
+            touches.append(_touching_place(side, pose, points, gap, (first, k, last)))
     return sorted(touches, key=lambda touch: touch.gap)
 
 
-def _touch(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
+def _touching_place(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
     """One touching place, where the parabola through three gaps is least, and the distance around it."""
     first, k, last = at
-    share = _share(gap, k)
+    share = _parabola_minimum(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))

@@ -143,7 +143,7 @@ class HubModel:
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
         states[0] = np.concatenate((q, v))
         for first, last in self.hub_inputs.spans():
-            self._hold(first, last)
+            self._hold_forces(first, last)
             try:
                 path = self._march(states[first, : self.size], states[first, self.size :], last - first)
             except RunFailed as error:
@@ -165,7 +165,7 @@ class HubModel:
     def _times(self, steps: int) -> np.ndarray:
         return self.step * np.arange(steps + 1)
 
-    def _hold(self, first: int, last: int) -> None:
+    def _hold_forces(self, first: int, last: int) -> None:
         """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
         hub_inputs = self.hub_inputs.during(first, last)
         if self.plain:

@@ -37,7 +37,7 @@ class Build:
     callbacks: int = 0
 
 
-def _exact(assembly: Assembly) -> Build:
+def _exact_bodies(assembly: Assembly) -> Build:
     """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -151,7 +151,7 @@ def _linear(assembly: Assembly) -> Build:
 
 def native(assembly: Assembly) -> Build:
     """Bodies, weights, springs and dampers without any input, in a system that is not assembled yet."""
-    return _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+    return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
 
 
 def columns(built: Build, vehicle: Vehicle) -> list[int]:
@@ -260,10 +260,10 @@ class ExudynModel:
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
         accelerations = self._free_acceleration(time, q, v)
-        accelerations[list(self.assembly.guided)] = self._wanted(time)
+        accelerations[list(self.assembly.guided)] = self._prescribed_accelerations(time)
         return accelerations
 
-    def _wanted(self, time: float) -> np.ndarray:
+    def _prescribed_accelerations(self, time: float) -> np.ndarray:
         """Accelerations of the prescribed coordinates, if any."""
         signal, count = self.assembly.input, len(self.assembly.guided)
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
@@ -306,7 +306,7 @@ class ExudynModel:
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces that enforce the prescribed coordinates at one row of a run, and their inertia terms (N, N m)."""
         wanted, free = (
-            self._wanted(time),
+            self._prescribed_accelerations(time),
             self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],
         )
         return self._inertia * (wanted - free), self._inertia * wanted

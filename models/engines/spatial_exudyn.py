@@ -40,7 +40,7 @@ class SpatialExudyn:
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 
-    def _all(self, values: np.ndarray) -> np.ndarray:
+    def _values_in_exudyn_order(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) in Exudyn's own order, tree by tree."""
         out = np.empty(self.size)
         out[self._columns] = values
@@ -55,7 +55,7 @@ class SpatialExudyn:
             return np.linalg.solve(*self._mass_and_force(q, v))
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        start(self.mbs, self._all(q), self._all(v))
+        start(self.mbs, self._values_in_exudyn_order(q), self._values_in_exudyn_order(v))
         mass, force = mass_and_force(self.mbs, time)
         return mass[np.ix_(self._columns, self._columns)], force[self._columns]
 
@@ -106,14 +106,18 @@ class SpatialExudyn:
         data, columns = self.mbs.systemData, []
         data.SetODE2Coordinates(np.zeros(self.size))
         for unit in np.eye(self.size):
-            data.SetODE2Coordinates_t(self._all(unit))
+            data.SetODE2Coordinates_t(self._values_in_exudyn_order(unit))
             columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
         return np.column_stack(columns)
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
         """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
         settings, rest = timed("exudyn", self.settings), np.zeros(self.size)
-        start(self.mbs, self._all(rest if q is None else q), self._all(rest if v is None else v))
+        start(
+            self.mbs,
+            self._values_in_exudyn_order(rest if q is None else q),
+            self._values_in_exudyn_order(rest if v is None else v),
+        )
         note = solve(self.mbs, settings)
         return sound("exudyn", settings, *self._recorded(settings), note, counted(self.mbs))
 

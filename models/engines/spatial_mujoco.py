@@ -55,7 +55,7 @@ class SpatialMujoco:
         check(self.model, self.data)
 
     @contextmanager
-    def _still(self) -> Iterator[np.ndarray]:
+    def _hold_road(self) -> Iterator[np.ndarray]:
         """The callback reads the row (2 w,) of the road that is given here, at every time."""
         numbers = self.model.numeric_data
         first = int(numbers[ROAD])
@@ -73,7 +73,7 @@ class SpatialMujoco:
         if road is None:
             with installed(self.law):
                 return self._acceleration(q, v, time)
-        with self._still() as row:
+        with self._hold_road() as row:
             row[:] = road
             return self._acceleration(q, v)
 
@@ -86,7 +86,7 @@ class SpatialMujoco:
     def linearise(self) -> LinearVehicle:
         """M from MuJoCo; D, K and the road's columns by central differences of the acceleration, callback included."""
         n, zero, h = self.model.nv, np.zeros(self.model.nv), difference_step(self.vehicle)
-        with self._still() as row:
+        with self._hold_road() as row:
 
             def on_road(heights_and_rates: np.ndarray) -> np.ndarray:
                 row[:] = heights_and_rates

@@ -282,7 +282,7 @@ class Equations:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATES)
         start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
-        return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
+        return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced(self, shift: float) -> Array:
         """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
@@ -292,9 +292,9 @@ class Equations:
         if w.profiles:
             rise, start[ROLL] = w.profiles.touching(w.radius, shift)
             start[Z] += rise
-        return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
+        return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _settled(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
+    def _state_in_balance(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
         """The state with two of its values such that two accelerations vanish."""
         places = list(coordinates)
         scale = np.maximum(np.abs(start[places]), self.body.sunk)

@@ -177,7 +177,7 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
     orbit, fresh, left = guess, False, math.inf
     for _ in range(NEWTON):
         try:
-            end = _end(orbit.equations, orbit.state, orbit.period, orbit.steps)
+            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
         missed = ((end - orbit.state) / SIZES)[RETURNS]
@@ -200,7 +200,7 @@ def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
     )
 
 
-def _end(equations: Equations, state: Array, period: float, steps: int) -> Array:
+def _state_after(equations: Equations, state: Array, period: float, steps: int) -> Array:
     return equations.run(state, period, period / steps, steps).states[-1]
 
 
@@ -208,9 +208,12 @@ def _linearised(orbit: Orbit) -> Orbit:
     """The orbit with slopes from its own linearisation."""
     eq, T, n, state, signs = orbit.equations, orbit.period, orbit.steps, orbit.state, (-1.0, 1.0)
     ends = [
-        *([_end(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs] for k in RETURNS),
-        [_end(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
-        [_end(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
+        *(
+            [_state_after(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs]
+            for k in RETURNS
+        ),
+        [_state_after(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
+        [_state_after(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
     ]
     columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
     return replace(orbit, slopes=np.array(columns).T)

@@ -66,8 +66,8 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     if split.marginal:
         P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
     C = system.C @ V
-    floor, change = silence(C, P), _seen(C, correction)
-    variance = _seen(C, P)
+    floor, change = silence(C, P), _output_variances(C, correction)
+    variance = _output_variances(C, P)
     variance = np.where(variance > floor, variance, 0.0)
     grown = growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
     status, reason = verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
@@ -238,7 +238,7 @@ def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
     return (integral + integral.T) / 2
 
 
-def _seen(C: np.ndarray, P: np.ndarray) -> np.ndarray:
+def _output_variances(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Variances (p,) of y = C x."""
     return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
 

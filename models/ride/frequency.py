@@ -130,7 +130,7 @@ def quadrature(
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
     total = abs(first).sum(axis=0)
     limit = np.maximum(TOLERANCE * np.maximum(total, SILENT * terms), rounding)
-    variance, error, taken = _halved(over, edges, first, limit)
+    variance, error, taken = _halve_panels(over, edges, first, limit)
     error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
@@ -145,7 +145,7 @@ def _check_stable(vehicle: LinearVehicle) -> None:
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
-def _halved(
+def _halve_panels(
     over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""

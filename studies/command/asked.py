@@ -125,14 +125,14 @@ def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple
     if name is None or name == "all":
         return engines
     if ":" in name:
-        return _outside(name, system, option)
+        return _registered_outside(name, system, option)
     named = (*engines, *KNOWN[system].on_request)
     if name not in named:
         raise InputError(option, "", name, "no such engine", (*named, "all"))
     return (name,)
 
 
-def _outside(name: str, system: str, option: str) -> tuple[str, ...]:
+def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
     if system != DEFAULT:
         raise InputError(option, "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")

@@ -61,15 +61,19 @@ class Swept:
 
     def broken(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
-        return [i for i, results in enumerate(self.results) if any(map(broken_of, _of(results, engine).values()))]
+        return [
+            i
+            for i, results in enumerate(self.results)
+            if any(map(broken_of, _results_of_engine(results, engine).values()))
+        ]
 
     def warned(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", has an error that is a warning."""
-        shown = (map(worst_of, _of(results, engine).values()) for results in self.results)
+        shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
-def _of(results: Results, engine: str) -> Results:
+def _results_of_engine(results: Results, engine: str) -> Results:
     """Results that an engine's curve rests on: its own, and those of none."""
     others = set(LABELS) - {engine} if engine else set()
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
@@ -109,12 +113,12 @@ def moves(column: list[Any]) -> bool:
 
 def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
     figure, axes = panels(len(shown), min(ACROSS, len(shown)), 2.3)
-    at, ticks = _places(swept.values)
+    at, ticks = _axis_places(swept.values)
     for axis, (what, curves) in zip(axes, shown, strict=True):
         _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(at, ticks)
-        elif _spread(at):
+        elif _wants_log_axis(at):
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
@@ -124,7 +128,7 @@ def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Pat
     save(figure, path)
 
 
-def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     """Places on the axis and, for values that are no numbers, what is written there."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.array(values, float), []
@@ -144,7 +148,7 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
             label=LABELS[engine] or None,
         )
         _marks(axis, at, np.array(column, float), swept, engine)
-    if all(_spread(np.array(there(column), float)) for column in curves.values()):
+    if all(_wants_log_axis(np.array(there(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
@@ -168,5 +172,5 @@ def _with_unit(quantity: str) -> str:
     return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
 
 
-def _spread(values: np.ndarray) -> bool:
+def _wants_log_axis(values: np.ndarray) -> bool:
     return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())

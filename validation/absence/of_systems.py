@@ -98,25 +98,25 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
 def added(system: str, effect: str, quick: bool = False) -> Counts:
     """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
     both."""
-    before, after = _before(system, effect, quick), seen(system, pair(system, effect)[1], quick)
-    return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
+    before, after = _counts_without_effect(system, effect, quick), seen(system, pair(system, effect)[1], quick)
+    return {engine: _increases(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
 
 
-def _before(system: str, effect: str, quick: bool) -> Counts:
+def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
     """Counts of the scene without an effect."""
     if effect in by_hand(system):
-        return _counted(system, (), json.dumps(by_hand(system)[effect][0]), quick)
-    return _counted(system, module_of(system, effect).NEEDS, "{}", quick)
+        return _counts_text(system, (), json.dumps(by_hand(system)[effect][0]), quick)
+    return _counts_text(system, module_of(system, effect).NEEDS, "{}", quick)
 
 
 @cache
-def _counted(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
+def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
     """Counts of a bare scene with some effects, or with tables of its own, as text."""
     scene = beside(bare(system, **json.loads(tables)), *needs)
     return {engine: counts for engine, (counts, _) in seen(system, scene, quick).items()}
 
 
-def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
+def _increases(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
     return {key: n - before[key] for key, n in after.items() if n != before[key]}
 
 
@@ -205,11 +205,11 @@ def rows(quick: bool) -> list[Row]:
     return [
         *present,
         engines,
-        *(row for system, probe in seen_there["systems"].items() for row in _absent(system, probe)),
+        *(row for system, probe in seen_there["systems"].items() for row in _absent_modules(system, probe)),
     ]
 
 
-def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
+def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
     why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
     return [
         Observed(

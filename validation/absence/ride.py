@@ -95,11 +95,11 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         "bent springs": sum(spring.bent for spring in vehicle.springs) if in_time else 0,
         "tyres that lift": sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
-    result = run(scene, engine, **({"sampling": _few()} if in_time else {}))
+    result = run(scene, engine, **({"sampling": _with_fewest_copies()} if in_time else {}))
     return counts, result["deviation"].tobytes()
 
 
-def _few() -> Any:
+def _with_fewest_copies() -> Any:
     """Context with the smallest allowed number of copies."""
     from models.systems.ride.nonlinear import Sampling
 
@@ -194,7 +194,7 @@ def rows(quick: bool = False) -> list[Row]:
             "absent.ride.curves",
             SYSTEM,
             "number of curves and callbacks of a quarter car, and of a quarter car with three curves",
-            f"{_counts(bare)}; {_counts(curved)}",
+            f"{_counts_text(bare)}; {_counts_text(curved)}",
             "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
             "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own",
         ),
@@ -209,5 +209,5 @@ def rows(quick: bool = False) -> list[Row]:
     ]
 
 
-def _counts(counts: dict[str, tuple[int, int]]) -> str:
+def _counts_text(counts: dict[str, tuple[int, int]]) -> str:
     return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in counts.items())

@@ -71,7 +71,7 @@ def _scene(**tables: Any) -> Any:
     return build({"system": "braking", "title": "limit", **tables}, "limit.toml")
 
 
-def _end(scene: Any) -> RunFailed | None:
+def _error_of_procedure(scene: Any) -> RunFailed | None:
     """Error of a scene's only procedure; None if it ran."""
     try:
         run(scene)
@@ -82,7 +82,7 @@ def _end(scene: Any) -> RunFailed | None:
 
 def _jackknife_row() -> Row:
     """The drawbar's angle when the run ends, of a train whose truck slides round: against its limit."""
-    end = _end(
+    end = _error_of_procedure(
         _scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
             run={"duration": 6.0},
@@ -113,7 +113,7 @@ def _roll_rows() -> list[Row]:
     """A high truck of one track in a J-turn on dry road: lateral acceleration at which it is told to roll over."""
     track, height = 1.8, 2.2
     axle = {"track": track}
-    end = _end(
+    end = _error_of_procedure(
         _scene(
             vehicle={"override": {"height": height, "front": axle, "rear": axle}},
             load_transfer={"front": 0.5},

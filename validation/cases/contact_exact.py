@@ -280,7 +280,7 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
         return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]
     lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
-    solved = [_beside(row, 20 if quick else 40) for row in table]
+    solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
     force, moment = (max(part[i] for part in solved) for i in (2, 3))
     return solved, [
         _row("sample", words, force, 0.01, "its own error and ours", side="native"),
@@ -295,7 +295,7 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     ]
 
 
-def _beside(row: dict[str, str], cells: int) -> list[Any]:
+def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
     """Kind, a/b, difference of the force by mu N and of the moment by mu N sqrt(ab); the file is in mm, N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]

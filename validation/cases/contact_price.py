@@ -167,7 +167,7 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
     """The errors that the cells are said to leave, against those found on many cells."""
     rows, some = [], cases[::9] if quick else cases
     for choices, cells in product(ALIKE[: 1 if quick else None], (21,) if quick else NETS):
-        share = _beyond(some, cells, choices)
+        share = _shares_beyond_stated(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
             rows.append(
@@ -184,7 +184,7 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
     return rows
 
 
-def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[float]:
+def _shares_beyond_stated(cases: list[Case], cells: int, choices: dict[str, str]) -> list[float]:
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
     answers = []
     for case in cases:

@@ -82,7 +82,7 @@ def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
 
 def tables(data: Saved) -> list[Table]:
     """The catalogue, counts by family, and the one table of hard cases."""
-    return [_catalogue(data), _counts(data), _all(data["cases"])]
+    return [_catalogue(data), _counts_by_family(data), _table_of_cases(data["cases"])]
 
 
 def _catalogue(data: Saved) -> Table:
@@ -103,7 +103,7 @@ def _catalogue(data: Saved) -> Table:
     )
 
 
-def _counts(data: Saved) -> Table:
+def _counts_by_family(data: Saved) -> Table:
     """Cases, those that were run and their outcomes, of every family and of all of them."""
     known = Counter(family for family, _ in data["known"])
     groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
@@ -125,7 +125,7 @@ def _counts(data: Saved) -> Table:
     )
 
 
-def _all(entries: list[Saved]) -> Table:
+def _table_of_cases(entries: list[Saved]) -> Table:
     """Every case: what is hard, what it is checked against, and what each implementation makes of it."""
     rows = tuple(
         (

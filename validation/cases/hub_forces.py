@@ -45,7 +45,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         _wrenches(car),
         *_gravity(car),
         _toppling(car),
-        _together(car, 0.2 if quick else 2.0),
+        _noisy_free_runs(car, 0.2 if quick else 2.0),
         *hub_inputs.rows(car, quick),
     ]
     if quick:
@@ -54,7 +54,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     scenes = {frame: _scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
-        rows += [*_stabilised(frame, comparison), _exact(frame, comparison)]
+        rows += [*_stabilised(frame, comparison), _prescribed_truth(frame, comparison)]
     return rows + _faults(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
 
 
@@ -163,7 +163,7 @@ def _toppling(vehicle: CutVehicle) -> Row:
     ).within(expected, 0.02 * expected, "springs that give change it by less than one per cent", "closed form")
 
 
-def _together(vehicle: CutVehicle, duration: float) -> Row:
+def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
     """Free on noise in every engine."""
     steps = round(duration / STEP)
     hub_inputs = static(vehicle, steps + 1)
@@ -298,7 +298,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     return rows
 
 
-def _exact(frame: str, comparison: Comparison) -> Row:
+def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
     """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
     measurement = comparison.measurement
     assert measurement.truth is not None

@@ -43,7 +43,7 @@ WHEELS = {"right": 2, "left": 5}
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
     published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
-    placed, each = _placed("A-2", published[:, 0])
+    placed, each = _timed_positions("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     rows.append(
         Observed(
@@ -54,10 +54,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
-    data: dict[str, Any] = {"A-2": [_told(each) for each in placed], "published": published.tolist()}
+    data: dict[str, Any] = {"A-2": [_table_of_patches(each) for each in placed], "published": published.tolist()}
     if not quick:
-        static, each_still = _placed("A-1", CONTACT[::2, 0])
-        data["A-1"] = [_told(each) for each in static]
+        static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
+        data["A-1"] = [_table_of_patches(each) for each in static]
         rows += [
             *_static_rows(static),
             *_split_rows(placed[10]),
@@ -69,7 +69,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, data
 
 
-def _placed(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
+def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
     """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
@@ -255,7 +255,7 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
     ]
 
 
-def _told(placed: Placed) -> dict[str, Any]:
+def _table_of_patches(placed: Placed) -> dict[str, Any]:
     """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
     return {"shift": 1e3 * placed.shift} | {
         wheel: [

@@ -122,9 +122,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         findings = planted(virtual, folder, fault.spoil, **fault.faults)
         rows += _rows(fault, findings)
         said[fault.name] = findings[0].text if findings else "nothing"
-    rows.append(_quiet("quick", [planted(virtual, folder)]))
+    rows.append(_clean_recordings_row("quick", [planted(virtual, folder)]))
     if not quick:
-        rows += [*_clean(folder), *_strangers(folder), *_together(virtual, folder), _spread(virtual, folder)]
+        rows += [
+            *_clean_recordings(folder),
+            *_wrong_vehicles(folder),
+            *_three_faults_rows(virtual, folder),
+            _spread(virtual, folder),
+        ]
         size = 1e6 * _size(drifting(virtual, 5e-4, folder), "drift")
         rows += [_sized("clocks", "drift between the clocks of two files", size, "1e-6", 500.0), *_moving_car(folder)]
     return rows, {"said": said}
@@ -142,7 +147,7 @@ def _sized(key: str, quantity: str, size: float, unit: str, wanted: float) -> Ro
     return Observed(id, SYSTEM, quantity, size, unit).within(wanted, SHARE * abs(wanted), why, "closed form")
 
 
-def _none(key: str, quantity: str, texts: list[str], why: str) -> Row:
+def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> Row:
     """Row of findings of which there must be none."""
     id, said = f"measured_checks.{key}", "; ".join(texts) or why
     return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
@@ -164,10 +169,10 @@ def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
     return rows
 
 
-def _quiet(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
+def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     """No error and no doubt in clean recordings."""
     what = f"errors and doubts in {len(recordings)} clean recordings"
-    return _none(
+    return _row_of_no_findings(
         f"clean.{name}",
         what,
         [finding.text for findings in recordings for finding in findings],
@@ -175,15 +180,17 @@ def _quiet(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     )
 
 
-def _clean(folder: Path) -> list[Row]:
+def _clean_recordings(folder: Path) -> list[Row]:
     """Four roads, two vehicles, two samples of noise each; recordings of 5 to 20 s."""
     return [
-        _quiet(vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)])
+        _clean_recordings_row(
+            vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)]
+        )
         for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
     ]
 
 
-def _strangers(folder: Path) -> list[Row]:
+def _wrong_vehicles(folder: Path) -> list[Row]:
     """A car that is not the one of the file, R19-free: heavier, or with other springs."""
     findings_by_car = {
         name: findings(replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder)
@@ -201,11 +208,11 @@ def _strangers(folder: Path) -> list[Row]:
     other = "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     return [
         Observed(id, SYSTEM, what, excess, "%").within(wanted, SHARE * 6.6, why, "closed form"),
-        _none("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
+        _row_of_no_findings("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
-def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
+def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: three faults at once are all named."""
     spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
     findings = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})

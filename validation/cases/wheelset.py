@@ -163,7 +163,7 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _usual(speeds: Speeds, name: str) -> float:
+def _speed_of_path(speeds: Speeds, name: str) -> float:
     """Speed (m/s) of a path: above the critical one, 60 where there is none."""
     critical = speeds[name]["reference"]
     return min(ABOVE * critical, 180.0) if critical is not None else 60.0
@@ -175,7 +175,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", cells)
+        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", cells)
         step = _step(Equations(*setup))
         for engine in IMPLEMENTATIONS:
             equations = implementation(engine)(*setup)
@@ -226,7 +226,7 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
     for name, wheelset in wheelsets.items():
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
-        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", 11)
+        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", 11)
         first = attained(Equations(*setup), step=_step(Equations(*setup)))
         if first is not None:
             guesses = {engine: beside(first, implementation(engine)(*setup)) for engine in engines}

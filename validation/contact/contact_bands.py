@@ -119,10 +119,10 @@ def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[floa
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
     kinds = theory.spinning < 0.5, theory.spinning >= 0.5
-    return tuple([_largest(error, rows & some, theory.group) for some in within] for rows in kinds)
+    return tuple([_largest_quantile(error, rows & some, theory.group) for some in within] for rows in kinds)
 
 
-def _largest(error: Array, rows: Array, group: Array) -> float:
+def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
     """Largest quantile of a group with more than a few contacts; of all together where none has them."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
     told = [part for part in parts if part.size >= FEW] or [error[rows]]

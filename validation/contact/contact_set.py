@@ -55,7 +55,7 @@ def cases() -> list[Case]:
 
 def drawn(part: int) -> list[Case]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
-    return _drawn(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
+    return _draw_contacts(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
 
 
 def wide(part: int) -> list[Case]:
@@ -63,10 +63,12 @@ def wide(part: int) -> list[Case]:
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE[FITTED]) * part
     streams = enumerate(WIDE[part], first)
-    return [case for stream in streams for case in _drawn(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)]
+    return [
+        case for stream in streams for case in _draw_contacts(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)
+    ]
 
 
-def _drawn(
+def _draw_contacts(
     stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[Pair], absent: float = 0.0
 ) -> list[Case]:
     """Contacts of a stream of numbers, of pairs in turn; each creepage is absent in a share of them, but never all."""

@@ -132,10 +132,10 @@ def stiffnesses(ellipse: Ellipse, peak: float, kind: str) -> Array:
         return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.flexible))
     square = creep**2
     mean = square.sum() / (square @ ellipse.flexible)
-    return three + _part(ellipse, creep * ellipse.a * three / peak) * (mean - three)
+    return three + _flexibility_share(ellipse, creep * ellipse.a * three / peak) * (mean - three)
 
 
-def _part(ellipse: Ellipse, reach: Array) -> float:
+def _flexibility_share(ellipse: Ellipse, reach: Array) -> float:
     """Part of the one flexibility by the reach of the three creepages (3,)."""
     x, y, z = reach
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
@@ -187,7 +187,7 @@ def _strip(
         if abs(trial) <= bound(x):
             p, slipping = trial, False
         elif turns and slipping and i > 0:
-            p = bound(x) * _turned(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
+            p = bound(x) * _direction_after_step(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
         else:
             p, slipping = bound(x) * trial / abs(trial), True
         tractions.append(p)
@@ -195,7 +195,7 @@ def _strip(
     return tractions, slips
 
 
-def _turned(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
+def _direction_after_step(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
     """Direction of a slipping traction after a step dx; rigid : slip by flexibility in the step's middle, ``turning``
     its lateral part's change per m of x, bound : Pa there.
 

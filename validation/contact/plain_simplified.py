@@ -71,7 +71,7 @@ class Bodies:
 
     def _valley(self) -> tuple[Array, Array]:
         lines = np.linspace(self.y[0], self.y[-1], 2 * self.y.size - 1)
-        least = np.array([_least(self.line(y)) for y in lines])
+        least = np.array([_lowest_value(self.line(y)) for y in lines])
         order = np.argsort(np.append(lines, self.bottom[1]), kind="stable")
         roots = np.append(np.sqrt(np.maximum(least - self.low, 0.0)), 0.0)
         return np.append(lines, self.bottom[1])[order], roots[order]
@@ -86,7 +86,7 @@ class Bodies:
         return ends[0], ends[1], ends[2], ends[3]
 
 
-def _least(line: CubicHermiteSpline) -> float:
+def _lowest_value(line: CubicHermiteSpline) -> float:
     """Least value of a spline within its nodes."""
     turning = line.derivative().roots(extrapolate=False)
     return float(min(line(line.x).min(), line(turning[np.isfinite(turning)]).min(initial=np.inf)))

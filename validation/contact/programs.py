@@ -20,7 +20,7 @@ ROUNDS = 5
 
 def compare(cases: list[Case]) -> dict[str, Any]:
     """Errors of both programs by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one evaluation."""
-    pressed = {(c.a, c.b): _pressed(c) for c in cases}
+    pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
     def old(case: Case) -> Creep:
         return fastsim(RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **OLD)
@@ -33,7 +33,7 @@ def compare(cases: list[Case]) -> dict[str, Any]:
 
     errors = {"1982": [error(case, old(case)) for case in cases], "1983": [error(case, new(case)) for case in cases]}
     normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
-    ways = {"1982": old, "press": _pressed, "1983": new}
+    ways = {"1982": old, "press": _normal_contact, "1983": new}
     jobs = [partial(way, cases[len(cases) // 2]) for way in ways.values()]
     seconds = dict(zip(ways, interleave(jobs, ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
@@ -43,7 +43,7 @@ OLD: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one",
 """The program of 1982, on as many cells as the fine net of the other one has."""
 
 
-def _pressed(case: Case) -> NormalContact:
+def _normal_contact(case: Case) -> NormalContact:
     return interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
 
 

@@ -57,9 +57,15 @@ class Campaign:
         """Size over tolerance of every check, without a fault first and then with each, or with every such one."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
         planted = self.faults[::every]
-        return [clean, *({"fault": fault.name, "place": fault.place, "ratios": self._with(fault)} for fault in planted)]
+        return [
+            clean,
+            *(
+                {"fault": fault.name, "place": fault.place, "ratios": self._ratios_with_fault(fault)}
+                for fault in planted
+            ),
+        ]
 
-    def _with(self, fault: Fault) -> dict[str, float]:
+    def _ratios_with_fault(self, fault: Fault) -> dict[str, float]:
         with fault.inside()():
             return self._ratios()
 

@@ -49,7 +49,8 @@ def moved(place: Callable[[float, float, float], float]) -> Change:
     def changed(assembly: Assembly) -> Assembly:
         p, changed_vehicle = assembly.parameters, assembly.vehicle
         held = tuple(
-            replace(strut, upper=_at(strut.upper, place(strut.upper.x, p.a, p.b))) for strut in changed_vehicle.struts
+            replace(strut, upper=_point_moved_to(strut.upper, place(strut.upper.x, p.a, p.b)))
+            for strut in changed_vehicle.struts
         )
         axles = tuple(replace(axle, x=place(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
         return replace(assembly, vehicle=replace(changed_vehicle, struts=held, axles=axles))
@@ -57,7 +58,7 @@ def moved(place: Callable[[float, float, float], float]) -> Change:
     return changed
 
 
-def _at(point: Point, x: float) -> Point:
+def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
@@ -155,13 +156,13 @@ class OtherTrack(Altered):
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, 4)."""
-        return self.signal.sample(start, step, count) + self._beside().sample(start, step, count)
+        return self.signal.sample(start, step, count) + self._other_profile().sample(start, step, count)
 
     def at(self, time: float) -> np.ndarray:
         """Road at one time (s), shape (4,): heights under the front and the rear wheel (m), then their rates (m/s)."""
-        return self.signal.at(time) + self._beside().at(time)
+        return self.signal.at(time) + self._other_profile().at(time)
 
-    def _beside(self) -> Any:
+    def _other_profile(self) -> Any:
         return replace(self.signal, profile=iso8608_road("A", 1))
 
 

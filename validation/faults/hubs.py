@@ -31,7 +31,7 @@ def _jacobians() -> float:
     return off(built.forces_at_rest(q) - bare.forces_at_rest(q), by_jacobians(built, q, rows[0]))
 
 
-def _still() -> float:
+def _accelerations_at_rest() -> float:
     """Accelerations at rest on the static loads (m/s^2, rad/s^2)."""
     rest = np.zeros(r19().size)
     return float(np.abs(_driven(static(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
@@ -39,7 +39,7 @@ def _still() -> float:
 
 CHECKS = {
     "Jacobians": Check("joint forces by MuJoCo's own Jacobians", "of the largest", 1e-12, _jacobians),
-    "still": Check("no acceleration on the static loads", "m/s^2, rad/s^2", 1e-9, _still),
+    "still": Check("no acceleration on the static loads", "m/s^2, rad/s^2", 1e-9, _accelerations_at_rest),
 }
 
 

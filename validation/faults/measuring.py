@@ -49,7 +49,7 @@ def _variance() -> float:
     return abs(float(np.mean(stream**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
 
 
-def _again() -> float:
+def _stream_difference() -> float:
     """Difference between a stream read in pieces and read whole."""
     parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
@@ -148,7 +148,7 @@ def _levels() -> float:
 CHECKS = {
     "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _streams),
     "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance),
-    "pieces": Check("a stream in pieces is the whole", "", 1e-15, _again),
+    "pieces": Check("a stream in pieces is the whole", "", 1e-15, _stream_difference),
     "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage),
     "pairs": Check("range pairs by the same", "of the largest", 1e-12, _pairs),
     "crossings": Check("crossings counted by hand", "of the largest", 1e-12, _crossings),
@@ -175,7 +175,7 @@ def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
     )
 
 
-def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
+def _change_resampling(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
     return attribute(
         "models.measured.resampling:onto",
         lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
@@ -189,7 +189,7 @@ def _factor(name: str, factor: float) -> Patch:
     )
 
 
-def _counted(change: Callable[[Any], Any]) -> Patch:
+def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
     """Spans, means and counts of the cycles changed."""
     return attribute("models.fatigue.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
 
@@ -228,9 +228,11 @@ FAULTS = (
             lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
         ),
     ),
-    Fault("residue counted as whole cycles", "counting", _counted(lambda own: (own[0], own[1], np.ceil(own[2])))),
-    Fault("residue lost", "counting", _counted(lambda own: (own[0], own[1], np.floor(own[2])))),
-    Fault("amplitude for range", "counting", _counted(lambda own: (own[0] / 2.0, own[1], own[2]))),
+    Fault(
+        "residue counted as whole cycles", "counting", _change_rainflow(lambda own: (own[0], own[1], np.ceil(own[2])))
+    ),
+    Fault("residue lost", "counting", _change_rainflow(lambda own: (own[0], own[1], np.floor(own[2])))),
+    Fault("amplitude for range", "counting", _change_rainflow(lambda own: (own[0] / 2.0, own[1], own[2]))),
     Fault(
         "pairs beyond a range, not from it on",
         "counting",
@@ -244,8 +246,8 @@ FAULTS = (
     Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
     Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
     Fault("sign of one channel", "units", _factor("mm", -1.0)),
-    Fault("a sample late", "clock", _onto(1.0)),
-    Fault("half a sample late", "clock", _onto(0.5)),
+    Fault("a sample late", "clock", _change_resampling(1.0)),
+    Fault("half a sample late", "clock", _change_resampling(0.5)),
     Fault(
         "gaps bridged",
         "clock",

@@ -86,7 +86,7 @@ def _friction() -> float:
     return float(np.abs(np.hypot(report["fx"], report["fy"]) / bound - 1.0).max())
 
 
-def _rest() -> float:
+def _spin_and_load_at_rest() -> float:
     """Spin and carried load at rest."""
     rest = equations().rest
     report = _report(rest)
@@ -113,7 +113,7 @@ CHECKS = {
         1e-3,
         lambda: abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0),
     ),
-    "rest": Check("spin and load at rest", "relative", 1e-5, _rest),
+    "rest": Check("spin and load at rest", "relative", 1e-5, _spin_and_load_at_rest),
     "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear),
 }
 

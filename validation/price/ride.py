@@ -109,7 +109,7 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     """All routes; counts and errors are judged, seconds are not."""
     ride = problem()
     swept = 3 if quick else SWEPT
-    points = [_lyapunov(ride), _swept(ride, swept)]
+    points = [_lyapunov(ride), _route_point_of_sweep(ride, swept)]
     jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
     for count, last, even in (*((*net, False) for net in GRIDS[quick]), (*UNIFORM, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
@@ -139,7 +139,7 @@ def _lyapunov(ride: Ride) -> RoutePoint:
     return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
-def _swept(ride: Ride, speeds: int) -> RoutePoint:
+def _route_point_of_sweep(ride: Ride, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes", wraps=module.modes) as made:

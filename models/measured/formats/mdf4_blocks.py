@@ -43,7 +43,7 @@ def check_blocks(path: Path) -> list[Finding]:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
             text = "the recorder did not finish this file: let its software finalise it, or asammdf save it anew"
             raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), text)
-        blocks = dict(_walk(path, data, size))
+        blocks = dict(_linked_blocks(path, data, size))
         if blocks[FIRST].kind != b"##HD":
             raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
     _chains(path, blocks)
@@ -51,7 +51,7 @@ def check_blocks(path: Path) -> list[Finding]:
     return [finding for place, block in groups for finding in _records(path, place, block, blocks)]
 
 
-def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
+def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
     """Every block that a link leads to, with its place."""
     seen, ahead, cut = {FIRST}, [FIRST], f"; the file has {size} bytes: it is cut off or damaged"
     while ahead:

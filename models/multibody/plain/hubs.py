@@ -63,7 +63,7 @@ class PlainHubs:
         inside = spring + other
         by_hubs, wrenches = self._act(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
-        acceleration, moments = self._hold(mass, force, guide, q, v)
+        acceleration, moments = self._guide_accelerations(mass, force, guide, q, v)
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
@@ -124,7 +124,7 @@ class PlainHubs:
         side = grip * cornering * (roll_steer * q[ROLL] + q[HEADING] - sideways / speed)
         return np.array([-load * rising / speed, side, load]), side * np.array([-down[2], 0.0, down[0]])
 
-    def _hold(
+    def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""

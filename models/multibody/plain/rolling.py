@@ -113,9 +113,9 @@ class PlainRolling:
         of = handling.tyres
         self._bristles = cornering / (cornering_factor(of.cells) * self._radius * sunk * of.half_width)
         self._leans = np.where(self._towed, 0.0, of.inclination * np.sign([tyre.point[1] for tyre in tyres]))
-        self._shares(tyres)
+        self._shares_of_tyres(tyres)
 
-    def _shares(self, tyres: tuple[Tyre, ...]) -> None:
+    def _shares_of_tyres(self, tyres: tuple[Tyre, ...]) -> None:
         """Shares of steering, brake and drive of every tyre: wheels of an axle share evenly, and so do axles behind;
         what is towed is not driven."""
         axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
@@ -133,7 +133,7 @@ class PlainRolling:
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
         by_tyres, report, ledger = self._roll(t, motion, v)
-        outside, power = self._outside(t, motion)
+        outside, power = self._drag_and_pushes(t, motion)
         travel, rate = self._joints @ q, self._joints @ v
         along, damped = self._joint_held + self._joint_stiffness * travel, self._joint_damping * rate
         mass += self._joints.T * self._joint_inertia @ self._joints
@@ -159,10 +159,10 @@ class PlainRolling:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
         steer, steering = driven(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
-        contact = self._touch(motion, points, angle)
+        contact = self._loads_and_points(motion, points, angle)
         slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
         creep = self._creep(contact, slides)
-        force, moments = self._press(motion, points, contact, creep)
+        force, moments = self._tyre_forces(motion, points, contact, creep)
         torques = self._torques(t, beside)
         force += self._turn_wheels(motion, contact.axle, torques)
         power = (creep * slides[:, :3]).sum(1)
@@ -185,7 +185,7 @@ class PlainRolling:
         )
         return force, report, ledger
 
-    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
+    def _loads_and_points(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
         """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
@@ -237,7 +237,7 @@ class PlainRolling:
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
         return tyre_forces(patch, slides, of.cells)
 
-    def _press(
+    def _tyre_forces(
         self, motion: Motion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
@@ -275,7 +275,7 @@ class PlainRolling:
             total -= self._hold(motion, i, torques[i] * axles[i])
         return total
 
-    def _outside(self, t: float, motion: Motion) -> tuple[np.ndarray, float]:
+    def _drag_and_pushes(self, t: float, motion: Motion) -> tuple[np.ndarray, float]:
         """Generalised forces (n,) of drag and pushes, and their power (W)."""
         heading = motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0

@@ -147,7 +147,7 @@ def _simplified(case: Case, cells: int) -> Roll:
     return lambda motion: contact.roll(motion, cells)
 
 
-def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
+def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
     def rolled(case: Case, cells: int) -> Roll:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
@@ -158,14 +158,14 @@ def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
 FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
 """Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
 WAYS = (
-    TheorySettings("linear theory", (1,), _of(Linear)),
+    TheorySettings("linear theory", (1,), _rolled_by_theory(Linear)),
     TheorySettings("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
     TheorySettings("FASTSIM, plain march", FINE, _fastsim(march="plain")),
     TheorySettings("FASTSIM", FAST, _fastsim()),
     TheorySettings("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
     TheorySettings("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
     TheorySettings("theory of 1983", NET, _simplified),
-    TheorySettings("exact theory", GRID, _of(ExactOnEllipse)),
+    TheorySettings("exact theory", GRID, _rolled_by_theory(ExactOnEllipse)),
 )
 
 
@@ -280,12 +280,12 @@ def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
     cases."""
     errors = attrgetter("mean"), attrgetter("most")
     return [
-        (f"{100 * target:g} %", *(_told(cheapest(points, target, error), error) for error in errors))
+        (f"{100 * target:g} %", *(_point_text(cheapest(points, target, error), error) for error in errors))
         for target in TARGETS
     ]
 
 
-def _told(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
+def _point_text(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
     if point is None:
         return "none"
     seconds = cost((point.seconds, *point.range))

@@ -93,9 +93,9 @@ def consequences(
             put_right = run(stretch(recording, samples | corrected, folder / place), folder / place)
         except (InputError, RunFailed):
             return Consequence(finding)
-        return _worst(finding, known[first], put_right, answers)
+        return _most_changed_force(finding, known[first], put_right, answers)
 
-    return tuple(consequence(number, finding) for number, finding in enumerate(_different(findings)))
+    return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
 def judged(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
@@ -120,7 +120,7 @@ def told(consequences: Iterable[Consequence]) -> list[str]:
     return out
 
 
-def _different(findings: Iterable[Finding]) -> list[Finding]:
+def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
     """Doubts, those of the same check about the same channels once; what a filter says follows from all others."""
     doubts = [finding for finding in findings if finding.weight == "doubt"]
     first = {(finding.check, finding.signals or finding.place): finding for finding in reversed(doubts)}
@@ -144,7 +144,7 @@ def stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
     return Recording(recording.signals, columns, recording.period)
 
 
-def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
+def _most_changed_force(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
     """The section force that differs most, of those that carry anything."""
     first = min(round(SETTLING / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
@@ -158,7 +158,7 @@ def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequenc
     return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
 
-def _late(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     """Read later by the delay, or by what a clock has drifted since the start."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
@@ -178,7 +178,7 @@ def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
     return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))
 
 
-def _gained(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _divided_by_factor(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples[s] / factor for s in signals}
@@ -226,11 +226,11 @@ def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, peri
 
 
 CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
-    "shift": _late,
-    "drift": _late,
-    "gain": _gained,
-    "sign": _gained,
-    "unit": _gained,
+    "shift": _read_later,
+    "drift": _read_later,
+    "gain": _divided_by_factor,
+    "sign": _divided_by_factor,
+    "unit": _divided_by_factor,
     "offset": _offset,
     "lever": _referred,
     "exchanged": _exchanged,

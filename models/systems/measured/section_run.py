@@ -232,7 +232,7 @@ class _March:
         try:
             states = model.marched(*np.split(self.state, 2)).states
         except RunFailed:
-            states = self._until(model)
+            states = self._march_until_failure(model)
         inside = states[:, 4:]  # where it is and where it heads may be anything
         toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > UPRIGHT
         bad = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(inside) > SIZE_BOUND).any(axis=1)
@@ -247,7 +247,7 @@ class _March:
         states = states[: max(good, 1)]
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
-    def _until(self, model: HubModel) -> np.ndarray:
+    def _march_until_failure(self, model: HubModel) -> np.ndarray:
         """States of a block that the engine gave up: the longest part, by halves, that it can march."""
         good, bad, states = 0, model.steps, self.state[None]
         while bad - good > 1:

@@ -84,10 +84,10 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        columns = zip(*map(self._kept, self.runs(paths)), strict=True)
+        columns = zip(*map(self._saved_part, self.runs(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
-    def _kept(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
+    def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
         if isinstance(run, RunFailed):
             last = 0.0 if run.time is None else run.time
             return np.full((len(self.rows), 8), np.nan), last, last

@@ -67,7 +67,7 @@ def run(
         if scene.drive is not None:
             return _driven(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or goes_in_time(scene)):
-            return _swept(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
+            return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
@@ -76,7 +76,9 @@ def run(
         return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
 
 
-def _swept(scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool) -> Result:
+def _deviations_by_speed(
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
+) -> Result:
     """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
     from models.ride.sweep import sweep
 

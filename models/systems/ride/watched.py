@@ -94,15 +94,15 @@ class Spectral:
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
         """Standard deviations (speeds,) by name, not finite where there is none."""
-        rows, names = [], [output.name for output in self._seen(self.speeds[0]).outputs]
+        rows, names = [], [output.name for output in self._watched_at_speed(self.speeds[0]).outputs]
         for speed in self.speeds:
             try:
-                rows.append(sweep(self._seen, {"own": self.road}, [speed]).deviation[0, 0])
+                rows.append(sweep(self._watched_at_speed, {"own": self.road}, [speed]).deviation[0, 0])
             except InputError:
                 rows.append(np.full(len(names), np.nan))
         return dict(zip(names, np.array(rows).T, strict=True))
 
-    def _seen(self, speed: float) -> LinearVehicle:
+    def _watched_at_speed(self, speed: float) -> LinearVehicle:
         return watching(self.linear(speed), self.vehicle, speed)
 
 

@@ -52,7 +52,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     cells = scene.contact.cells
     other = halved(cells) if cells >= FEWEST else 2 * cells
     try:
-        coarse = _coarse(scene, march, other)
+        coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other} cells the path fails: {failure}")
     told = _of_steps(scene, march, fine, coarse)
@@ -79,7 +79,7 @@ def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int |
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse(scene: WheelsetScene, march: March, cells: int) -> Series:
+def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
     """The path on other cells, in twice the step where that can be."""
     with suppress(InputError, RunFailed):
         return series(march(changed(scene, 2.0, cells=cells)))

@@ -116,7 +116,7 @@ class BrakingStop:
         self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self.true, other = (self._by(*each) for each in solvers)
+        self.true, other = (self._distance_by_scipy(*each) for each in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -134,7 +134,7 @@ class BrakingStop:
     def build(self, setting: Setting) -> Solver:
         """The stop by one method in steps."""
         substeps = round(SAMPLE / setting.value)
-        run = self._ours if setting.method == OURS else partial(self._others, setting.method)
+        run = self._stop_by_twinrig if setting.method == OURS else partial(self._stop_by_method, setting.method)
         return Solver(partial(run, substeps))
 
     def errors(self, solution: Result) -> dict[str, float]:
@@ -148,7 +148,7 @@ class BrakingStop:
         vehicle.run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * MORE)
 
-    def _by(self, method: str, tolerance: float) -> float:
+    def _distance_by_scipy(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return tight_distance(FRONT, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
@@ -165,13 +165,13 @@ class BrakingStop:
             torques.append(part[1:, 0].copy())
         return np.concatenate(torques)
 
-    def _ours(self, substeps: int) -> Result:
+    def _stop_by_twinrig(self, substeps: int) -> Result:
         stop = braked(FRONT, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed)
         if stop.rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
 
-    def _others(self, method: str, substeps: int) -> Result:
+    def _stop_by_method(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
         torques, step = self._torques(substeps), SAMPLE / substeps
         friction = Change(Curve(self.slips, self.mu[0]), Curve(self.slips, self.mu[1]), self.change)

@@ -173,7 +173,7 @@ class RoadExcited:
         times = GRID * np.arange(round(DURATION / GRID) + 1)
         self._states = self._solution(times).T
         others = [dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
-        differences = [self._largest(other - self._states) for other in others]
+        differences = [self._largest_errors(other - self._states) for other in others]
         self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
@@ -187,16 +187,16 @@ class RoadExcited:
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of a wheel force (N) and of a state, at the integrator's own instants; the run is judged."""
         judge(self.assembly, solution)
-        return self._largest(solution.states - self._at(solution.times))
+        return self._largest_errors(solution.states - self._reference_states(solution.times))
 
-    def _at(self, times: np.ndarray) -> np.ndarray:
+    def _reference_states(self, times: np.ndarray) -> np.ndarray:
         """Reference states (n, 8): stored where the times lie on the grid, else the solver's own interpolant."""
         index = np.rint(times / GRID).astype(int)
         if np.abs(times - GRID * index).max() < 1e-12:
             return self._states[index]
         return self._solution(times).T
 
-    def _largest(self, off: np.ndarray) -> dict[str, float]:
+    def _largest_errors(self, off: np.ndarray) -> dict[str, float]:
         """Largest force and state error from the states' differences (n, 8); the road cancels."""
         p = self.assembly.parameters
         forces = off[:, :2] * [p.k1, p.k2] + off[:, 4:6] * [p.d1, p.d2]

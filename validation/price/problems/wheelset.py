@@ -140,8 +140,8 @@ class RollingWheels:
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other = (self.read(self._by(*solver).state) for solver in SOLVERS)
-        self.uncertainty = self._off(other)
+        self._true, other = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
+        self.uncertainty = self._channel_errors(other)
         self.bound = self.wheels.mu * self.wheels.load
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -176,11 +176,11 @@ class RollingWheels:
             return self._mujoco(method, steps)
         if not setting.adaptive:
             check_step("reference", self.wheels, method, setting.value, steps)
-        return Solver(partial(self._by, method, setting.value))
+        return Solver(partial(self._run_by_method, method, setting.value))
 
     def errors(self, solution: Result) -> dict[str, float]:
         """Largest error of the creep forces along and across (N), and of the displacements along and across (m)."""
-        return self._off(self.read(solution.state))
+        return self._channel_errors(self.read(solution.state))
 
     def read(self, state: Array) -> dict[str, Array]:
         """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
@@ -188,10 +188,10 @@ class RollingWheels:
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
 
-    def _off(self, channels: dict[str, Array]) -> dict[str, float]:
+    def _channel_errors(self, channels: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
-    def _by(self, method: str, value: float) -> Result:
+    def _run_by_method(self, method: str, value: float) -> Result:
         """The written equations by RK4 in steps, or by scipy at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":

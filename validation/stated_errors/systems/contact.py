@@ -25,10 +25,10 @@ LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that are refused are drawn anew."""
-    return drawn(count, seed, lambda random: _sample(_drawn(random)))
+    return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
 
 
-def _drawn(rng: np.random.Generator) -> ContactScene:
+def _draw_scene(rng: np.random.Generator) -> ContactScene:
     theory = str(rng.choice(THEORIES))
     method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST, LARGEST[theory]))}
     if theory == "fastsim":
