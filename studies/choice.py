@@ -75,10 +75,10 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
     """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
     check(scene, engines)
     beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
-    return told([scene, *beside], engines, folder, progress)
+    return save_choices([scene, *beside], engines, folder, progress)
 
 
-def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choices of scenes, the first by one of these engines, saved and drawn."""
     scene, choices = scenes[0], list[SceneChoice]()
     for i, each in enumerate(scenes):
@@ -294,12 +294,12 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
         rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
-    rows += misled(scene_choice)
+    rows += misleading_activities(scene_choice)
     worst = float((choice.confirmed + choice.chance).max())
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
 
 
-def misled(choice_of: SceneChoice) -> list[str]:
+def misleading_activities(choice_of: SceneChoice) -> list[str]:
     """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
     total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
     for effect in choice_of.alone:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import Watched, judged
+from models.core.assumptions import Watched, with_assumptions
 from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -169,7 +169,9 @@ def _with_errors(
     }
     assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(statistics))]
     return of_chance(
-        judged(saved, assumed), {f"deviation of {name}": breach for name, breach in worst.items()}, options.paths
+        with_assumptions(saved, assumed),
+        {f"deviation of {name}": breach for name, breach in worst.items()},
+        options.paths,
     )
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
@@ -216,7 +216,7 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
     saved = result(scene, channels, axes, engine=source.name)
     assert source.quality is not None
     record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
-    judged(saved, assumptions(record, source.ways["integrated"]))
+    with_assumptions(saved, assumptions(record, source.ways["integrated"]))
     if scene.error:
         beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
         not_estimated(saved, f"noise and mounts err most, and {beside}")

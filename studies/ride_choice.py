@@ -21,7 +21,7 @@ from models.systems import run as run_scene
 from models.systems.ride.of_scene import goes_in_time, told_by
 from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
 from models.systems.ride.scene import RideScene
-from studies.choice import told
+from studies.choice import save_choices
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -65,7 +65,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     """Choose, by runs for bent springs; saves ``choice.nc``, two CSV of it, a figure, files of what is left."""
     check(scene, engines)
     if goes_in_time(scene):
-        return told([scene], engines, folder, progress)
+        return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
     with told_by(scene):
         chooser = Chooser.of(scene)

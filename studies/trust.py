@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -146,7 +146,7 @@ def _ensemble(
 def _with_errors(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
     """The result with the error of the steps, of the run without noise, and the standard error of the median."""
     saved.data.attrs["error"] = quiet.data.attrs["error"]
-    judged(saved, [small_errors(options.angle)])
+    with_assumptions(saved, [small_errors(options.angle)])
     middle, low, high = quantile(spread["drift_off"], 0.5)
     if not math.isfinite(high):
         return saved

@@ -15,7 +15,7 @@ from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
 from validation.measured.measured_files import tdms as tdms_files
-from validation.measured.measured_files.odd import FX, FZ, TIMES, Sweep, read, two_rates, usual, written
+from validation.measured.measured_files.odd import FX, FZ, TIMES, CutSweep, read, two_rates, usual, written
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 
@@ -282,7 +282,7 @@ def test_the_usual_file_is_what_the_truth_says(tmp_path):
 @pytest.mark.full
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_no_cut_at_any_byte_is_silent(tmp_path, extension):
-    sweep = Sweep(extension, 2000 if extension == ".rsp" else 0)  # its samples fill 57,000 bytes
+    sweep = CutSweep(extension, 2000 if extension == ".rsp" else 0)  # its samples fill 57,000 bytes
     assert sweep.silent(tmp_path) == 0
 
 

@@ -183,9 +183,9 @@ def again(result):
     from models.systems.pitch_plane.scene import assemble
 
     scene = build({"title": "t", "vehicle": {"parameters": "itwm_drift"}, "run": {"duration": 1.5}, "effects": ROAD})
-    from models.core.assumptions import judged
+    from models.core.assumptions import with_assumptions
 
-    return judged(result, assumptions(assemble(scene)))
+    return with_assumptions(result, assumptions(assemble(scene)))
 
 
 def test_rows_rest_on_the_runs_before_them_alone(pulling, pressing):

@@ -57,7 +57,7 @@ class Scene:
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping[str, Any]) -> Scene:
     """The checked scene of a table with changes of dotted keys; the table itself stays as it is."""
-    from models.core.scene_file import put
+    from models.core.scene_file import set_key
     from models.core.systems import of_table as checked
     from studies.command.asked import KNOWN
 
@@ -66,7 +66,7 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
     changed = plain(table)
     file = file + CHANGED if changes and not file.endswith(CHANGED) else file
     for key, value in changes.items():
-        put(changed, str(key), plain(value))
+        set_key(changed, str(key), plain(value))
     return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN))
 
 

@@ -169,14 +169,14 @@ def wheel_on_rail(
     track, wheelset = track or Track(), wheelset or Wheelset()
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-    side = WheelAndRail(wheel, laid(rail, track), wheelset)
-    touches = touches_of(side, placed(side, lateral_shift, yaw))
+    side = WheelAndRail(wheel, rail_in_track(rail, track), wheelset)
+    touches = touches_of(side, touching_pose(side, lateral_shift, yaw))
     if not touches:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
     return touches
 
 
-def laid(rail: Profile, track: Track) -> Profile:
+def rail_in_track(rail: Profile, track: Track) -> Profile:
     """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
     inclined = rail.turned(track.inclination) if track.inclination else rail
     y, z = inclined.y, inclined.z - inclined.z.min()
@@ -207,7 +207,7 @@ def _parabola_minimum(gap: Array, k: int) -> float:
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
-def placed(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
+def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
     """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
     other = left or side
 

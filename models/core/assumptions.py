@@ -136,7 +136,7 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     return Broken(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
 
 
-def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
+def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with what it assumes, and what of that it broke; its status says so, too."""
     listed = list(assumptions)
     breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]

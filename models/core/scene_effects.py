@@ -187,7 +187,7 @@ def _names(scene: Any, file: Path) -> bool:
     return _is_in_own_tables(file) and module_of(scene.system, file.stem).named(scene)
 
 
-def absent(scene: Any) -> tuple[str, ...]:
+def absent_effects(scene: Any) -> tuple[str, ...]:
     """Effects of its system that a scene does not name."""
     there = named(scene)
     return tuple(name for name in names_of(scene.system) if name not in there)
@@ -330,7 +330,7 @@ def _depth(name: str, system: str) -> int:
     return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
-def beside(scene: Any, *more: str) -> Any:
+def with_effects(scene: Any, *more: str) -> Any:
     """The scene with these effects at their usual values; raises InputError where one cannot be, or not so."""
     table = own_table(scene)
     for name in more:
@@ -373,4 +373,4 @@ def lines(scene: Any, width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
     said = {name: module_of(scene.system, name).COST for name in named(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
-    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]
+    return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]

@@ -159,7 +159,7 @@ def _apply(table: dict[str, Any], change: str) -> None:
     at[last] = _value(text)
 
 
-def put(table: dict[str, Any], key: str, value: Any) -> None:
+def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     """Set one nested key, as "run.step" or "manoeuvres.0.speed", to a plain value; None takes the key out.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.

@@ -140,7 +140,7 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
     return used[0], used[1:]
 
 
-def ended(path: str | Path) -> bool:
+def has_line_end(path: str | Path) -> bool:
     """Whether the last line of a file has a line end; where not, its last number may lack digits."""
     with Path(path).open("rb") as file:
         size = file.seek(0, io.SEEK_END)

@@ -15,7 +15,16 @@ import numpy as np
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.exudyn_clock import Clock
-from models.engines.exudyn_system import KINDS, counted, items, march_settings, mass_and_force, recorders, solve, start
+from models.engines.exudyn_system import (
+    KINDS,
+    items,
+    march_settings,
+    mass_and_force,
+    recorders,
+    solve,
+    solver_counts,
+    start,
+)
 from models.engines.protocol import balanced, guard, landings_followed
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
@@ -298,7 +307,7 @@ class ExudynModel:
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
         landings_followed("exudyn", self.assembly, self.settings, times, states)
-        counts = counted(self.built.mbs)
+        counts = solver_counts(self.built.mbs)
         if enforced is not None:
             balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
         return Trajectory(times, states, enforced, counts)

@@ -7,9 +7,9 @@ import numpy as np
 
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import KINDS, counted, mass_and_force, quiet_settings, recorders, solve, start
+from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, solver_counts, start
 from models.engines.protocol import timed
-from models.engines.spatial_exudyn_build import RoadTable, assemble
+from models.engines.spatial_exudyn_build import RoadRows, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,
     EngineKinematics,
@@ -32,7 +32,7 @@ class SpatialExudyn:
         self.size = len(vehicle.coordinates())
         per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
         self._flat = np.zeros((1, 2 * len(vehicle.tyres)))
-        self.road = RoadTable(self._flat if road is None else road, per_time)
+        self.road = RoadRows(self._flat if road is None else road, per_time)
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
         places = [self.built.places[place] for place in vehicle.coordinates()]
@@ -119,7 +119,7 @@ class SpatialExudyn:
             self._values_in_exudyn_order(rest if v is None else v),
         )
         note = solve(self.mbs, settings)
-        return sound("exudyn", settings, *self._recorded(settings), note, counted(self.mbs))
+        return sound("exudyn", settings, *self._recorded(settings), note, solver_counts(self.mbs))
 
     def _recorded(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Times (m,) and states (m, 2 n) from the sensors. Steps are counted: Exudyn's sum of them ends 1e-13 early."""

@@ -148,7 +148,7 @@ def _feel_point(joints, m, point, gravity, qdd):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def felt(numbers, every, states, places, own_axes, out):
+def section_answers(numbers, every, states, places, own_axes, out):
     """Write answers (n, all) of states (n, 2 c), ``every`` half steps apart from time 0 on.
 
     places : ``FeltPlaces``; own_axes : whether guides and hubs are given in the axes of what they carry instead of the

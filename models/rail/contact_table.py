@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, placed, touches_of
+from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, touches_of, touching_pose
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
@@ -171,7 +171,7 @@ class Contact:
         """
         quantity("lateral_shift", shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-        pose = placed(self.side, shift, yaw)
+        pose = touching_pose(self.side, shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLLS):
             right, left = wheels = self._both_wheels(pose, rolling)

@@ -36,12 +36,12 @@ from models.rail.wheel_forces import (
     LAWS,
     REPORT,
     Rails,
-    carries,
     patches,
     plain,
     rails_in,
     rails_of,
     room_for,
+    supported_force,
     wheel_forces,
 )
 from models.rail.wheelset import GRAVITY, Wheelset
@@ -233,7 +233,7 @@ class Equations:
         sunk = float(w.ellipse.approach) / w.slant[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
             rails = rails_of(w)
-            sunk = float(brentq(lambda z: carries(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
+            sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
         stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
         held = any(stiffness + damping)
         inertia = w.mass, w.spin_inertia, w.yaw_inertia

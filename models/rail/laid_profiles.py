@@ -12,7 +12,7 @@ from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
-from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, laid, placed
+from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, rail_in_track, touching_pose
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
@@ -65,14 +65,14 @@ class Profiles(Strict):
         rail = _profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _profile(self.wheel, "wheel", self.smoothing),
-            laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
+            rail_in_track(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
     def touching(self, radius: float, shift: float) -> tuple[float, float]:
         """Height z (m) over that in the middle, and roll (rad), at which both wheels just touch; InputError if none."""
         side = self.side(radius)
-        pose = placed(side, shift, 0.0)
+        pose = touching_pose(side, shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
@@ -126,7 +126,7 @@ def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
 def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
     """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
-        pose = placed(side, shift, 0.0)
+        pose = touching_pose(side, shift, 0.0)
     except InputError:
         return None
     points, gap = side.gaps(pose)

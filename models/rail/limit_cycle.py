@@ -109,7 +109,7 @@ class Orbit:
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
-def near(equations: Equations, state: Array, period: float, step: float) -> Orbit:
+def guess_near_state(equations: Equations, state: Array, period: float, step: float) -> Orbit:
     """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
     start = state.copy()
     start[Y_RATE] = 0.0
@@ -131,10 +131,10 @@ def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
-    return solved(near(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
+    return solved(guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
 
 
-def beside(orbit: Orbit, equations: Equations) -> Orbit:
+def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
     """A guess for the same orbit by other equations: everything ASIDE farther from rest."""
     rest = orbit.equations.rest
     return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
@@ -252,7 +252,7 @@ def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -
         tops = maxima(y)
         if tops.size > 2 and np.ptp(y[tops[-2:]]) < STEADY * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
-            return solved(near(equations, path.states[tops[-1]], period, step), "amplitude")
+            return solved(guess_near_state(equations, path.states[tops[-1]], period, step), "amplitude")
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array, quantity
-from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, placed
+from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, touching_pose
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
@@ -142,7 +142,7 @@ def rolling_radii_of(
 
 def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
-    pose = placed(right, shift, 0.0, left)
+    pose = touching_pose(right, shift, 0.0, left)
     return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
 
 

@@ -60,7 +60,7 @@ class VarianceEstimate:
         return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
 
 
-def along(
+def variances_along_drive(
     vehicle: LinearVehicle,
     excitation: Excitation,
     profile: SpeedProfile,

@@ -46,7 +46,7 @@ class FittedRoad:
     spectra: TrackSpectra
 
 
-def fit(
+def fit_road(
     tracks: MeasuredTracks, window_length: float | None = None, low: float | None = None, high: float | None = None
 ) -> FittedRoad:
     """First-order mean and roll process by least squares on the logarithms of the measured densities.

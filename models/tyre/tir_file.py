@@ -54,14 +54,14 @@ def tir_table(path: str | Path) -> TyreTable:
     if not least < most:
         raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
     loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
-    curves = {load: (along(c, load), across(c, load)) for load in loads}
+    curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
     return by_similarity(
         lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
     )
 
 
-def along(c: dict[str, float], load: float) -> Curve:
+def longitudinal_formula(c: dict[str, float], load: float) -> Curve:
     """Magic formula of braking under a load (N) from a file's coefficients."""
     _, off = _load_excess(c, load)
     peak = (c["PDX1"] + c["PDX2"] * off) * c["LMUX"]
@@ -71,7 +71,7 @@ def along(c: dict[str, float], load: float) -> Curve:
     return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def across(c: dict[str, float], load: float) -> Curve:
+def lateral_formula(c: dict[str, float], load: float) -> Curve:
     """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
     nominal, off = _load_excess(c, load)
     peak = abs(c["PDY1"] + c["PDY2"] * off) * c["LMUY"]

@@ -181,7 +181,7 @@ def stacked(tables: Sequence[TyreTable]) -> Tables:
 
 
 @lean
-def place(nodes, value):
+def cell_and_share(nodes, value):
     """Cell at which a value lies, and the share of that cell below it; held at the ends."""
     last = nodes.size - 1
     if last == 0 or value <= nodes[0]:
@@ -199,7 +199,7 @@ def place(nodes, value):
 
 
 @lean
-def across(table, cells, k, w, g, h):
+def lateral_adhesion(table, cells, k, w, g, h):
     """mu_y of one table at a slip angle and a load in these ``cells``, and in cell k of slip with its share w."""
     i, p, j, q = cells
     i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
@@ -213,7 +213,7 @@ def across(table, cells, k, w, g, h):
 
 
 @lean
-def along(table, cells, k, mu_x):
+def longitudinal_adhesion(table, cells, k, mu_x):
     """mu_x of one table at slip node k, at a slip angle and a load in these ``cells``."""
     i, p, j, q = cells
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)

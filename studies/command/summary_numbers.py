@@ -13,7 +13,7 @@ FRAMES = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
 
 
-def numbers(summary: dict[str, Any]) -> dict[str, float]:
+def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
     """Every scalar of a summary: names joined with ", ", the unit in [ ] at the end where the study gives one.
 
     Lists of tables are named by the texts with which each table begins, if that tells them apart, or else counted.

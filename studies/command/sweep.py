@@ -31,9 +31,9 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import Crew
-from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
-from studies.command.summary_numbers import numbers
-from studies.command.sweep_figure import Columns, Swept, draw, moves, there
+from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
+from studies.command.summary_numbers import summary_scalars
+from studies.command.sweep_figure import Columns, Swept, draw, has_several_values, present_numbers
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -68,7 +68,7 @@ class Points:
         scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
-        return scene, engines, ready(scene, engines)
+        return scene, engines, checked_study(scene, engines)
 
     def check(self) -> Any:
         """The scene of the first point that can be run; the InputError of the first one if every point is refused: then
@@ -93,7 +93,7 @@ class Points:
         except (InputError, RunFailed) as error:
             return _failed(error)
         said = told.attributes(summary.get("results", {}))
-        return {"numbers": numbers(summary), "failed": summary.get("failed", {}), "results": said}
+        return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
         """Everything that the points depend on: the scene as written, the files that it names, the code."""
@@ -134,7 +134,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 _RANGE = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
 
 
-def asked(text: str) -> tuple[str, tuple[Any, ...]]:
+def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     """Key and values of KEY=FROM:TO:N, evenly spaced, or of KEY=a,b,c; raises InputError."""
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not key or not rest:
@@ -154,7 +154,7 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
 
 def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
     """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
-    key, values = asked(text)
+    key, values = parse_range(text)
     job = Points(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
     return job
@@ -298,7 +298,7 @@ def _broken(results: told.Results) -> str:
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
-    moving = {name: there(column) for name, column in columns.items() if moves(column)}
+    moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [
         f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "
         f"{min(values):>12.5g} to {max(values):.5g}"

@@ -98,17 +98,19 @@ def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
         first, _, rest = name.partition(", ")
         engine, what = (first, rest) if rest and first in LABELS else ("", name)
         panels.setdefault(what, {})[engine] = column
-    return {what: panel for what, panel in panels.items() if any(moves(column) for column in panel.values())}
+    return {
+        what: panel for what, panel in panels.items() if any(has_several_values(column) for column in panel.values())
+    }
 
 
-def there(column: list[Any]) -> list[Any]:
+def present_numbers(column: list[Any]) -> list[Any]:
     """Numbers of a column without those that are missing."""
     return [value for value in column if value is not None]
 
 
-def moves(column: list[Any]) -> bool:
+def has_several_values(column: list[Any]) -> bool:
     """Whether a column has more than one value."""
-    return len(set(there(column))) > 1
+    return len(set(present_numbers(column))) > 1
 
 
 def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
@@ -148,7 +150,7 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
             label=LABELS[engine] or None,
         )
         _marks(axis, at, np.array(column, float), swept, engine)
-    if all(_wants_log_axis(np.array(there(column), float)) for column in curves.values()):
+    if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)

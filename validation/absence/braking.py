@@ -30,7 +30,7 @@ def write(folder: Path) -> None:
     (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
 
-def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Counts of what is handed to the run of a stop, and its path."""
     from models.systems.braking.march import Braked
     from models.systems.braking.run import run

@@ -92,7 +92,7 @@ def march(engine: str, model: Model) -> MarchCounts:
     return seen
 
 
-def quietest(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
+def leanest_march(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march that took the least memory of some: what a loop allocates shows in every one of them."""
     return min((march(engine, make()) for _ in range(runs)), key=lambda seen: seen.memory)
 

@@ -78,7 +78,7 @@ def write(folder: Path) -> None:
     write_table(folder / "road.csv", {"s": ("m", s), "left": ("m", tracks[0]), "right": ("m", tracks[1])})
 
 
-def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the linear system that a scene makes, and what is found of its outputs."""
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
@@ -117,7 +117,7 @@ print(json.dumps(sorted(sys.modules)))
 """Runs a linear ride by an engine in a process of its own and says what it imported."""
 
 
-def imported(engine: str) -> list[str]:
+def imported_modules(engine: str) -> list[str]:
     """Modules of FOREIGN after a linear ride in a fresh process."""
     command = [sys.executable, "-c", PROBE, engine]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -171,7 +171,7 @@ def rows(quick: bool = False) -> list[Row]:
     bare, curved = (callbacks(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
     told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
-    counted = () if quick else (len(imported("reference")),)
+    counted = () if quick else (len(imported_modules("reference")),)
     return [
         *(Observed("absent.ride.imports", SYSTEM, told, count, "").at_most(0, why, "none") for count in counted),
         behaves(

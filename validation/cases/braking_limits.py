@@ -40,13 +40,13 @@ ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=7
 @allowing("stops at the limits, and random ones: that they end, or say why not, is judged")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: three of the stops, one speed of the slow ones."""
-    ends = [finished(number) for number in range(STOPS[quick])]
+    ends = [ending_text(number) for number in range(STOPS[quick])]
     rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
     return rows + [_refused_row(*each) for each in REFUSED.items()], {"ends": ends}
 
 
-def finished(number: int) -> str:
+def ending_text(number: int) -> str:
     """Phrase on how a random stop ended: "" if the vehicle came to rest."""
     try:
         path = run(build(random_stop(SEED, number))).detail

@@ -8,7 +8,7 @@ from models.advice.choice.choose import Chooser
 from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST
 from models.core.errors import InputError
-from validation.choice.drawn_scenes import drawn
+from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
@@ -41,7 +41,7 @@ def judged(system: str, seed: int) -> JudgedByRuns:
     """The scene of a seed."""
     if system == "ride":
         return judged_ride(drawn_bent(seed))
-    return judged_of(drawn(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
 def judged_ride(asked: Bent) -> JudgedByRuns:

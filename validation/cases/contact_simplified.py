@@ -12,7 +12,7 @@ import numpy as np
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
-from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
+from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, SimplifiedOptions, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
 from models.machine.timing import interleave
@@ -40,7 +40,7 @@ FULL = 36
 WAYS = {
     "elliptic": PLAIN,
     "paper": PAPER,
-    "elliptic, gradient": Options(fit="gradient"),
+    "elliptic, gradient": SimplifiedOptions(fit="gradient"),
     "paper, gradient": replace(PAPER, fit="gradient"),
     "elliptic, one net": replace(PLAIN, separate=False),
 }
@@ -70,7 +70,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + _shape_rows(data["shapes"]) + _grown_rows(data["grown"]) + _time_rows(data["time"]), data
 
 
-def _hertz(ratio: float, options: Options) -> dict[str, float]:
+def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
     """Errors of approach, area and peak on Hertz's ellipse, as shares."""
     exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
     a, b = float(exact.a), float(exact.b)

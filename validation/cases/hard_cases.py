@@ -27,7 +27,7 @@ EVERY = 24
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
-    for family, case in some(known) if quick else known:
+    for family, case in quick_cases(known) if quick else known:
         with TemporaryDirectory() as place:
             outcomes = {name: judge(case, name, Path(place)) for name in case.judged()}
             naive = case.naive(Path(place)) if case.naive else ""
@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def some(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+def quick_cases(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
     """The quick share: the last case of each family, and every EVERY-th before it."""
     families = dict.fromkeys(family for family, _ in known)
     return [pair for name in families for pair in [case for case in known if case[0] == name][::-EVERY]]

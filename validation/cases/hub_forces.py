@@ -15,7 +15,7 @@ from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTER, Comparison, compare
-from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
+from models.systems.hub_forces.measurement import HubForces, model, recorded, true_run, two_tracks
 from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
@@ -188,7 +188,7 @@ def _rough(vehicle: CutVehicle, duration: float) -> HubInputs:
 def _reproduced(vehicle: CutVehicle) -> list[Row]:
     """Hub forces of a road without noise bring the same motion back, but for what lies between samples."""
     duration = 2.0
-    true = truth("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
+    true = true_run("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
     off = {}
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
@@ -324,8 +324,8 @@ def _faults(scene: HubScene) -> list[Row]:
     """
     vehicle, duration = r19(), 5.0
     hub_inputs = _rough(vehicle, duration)
-    clean, angles = recorded(truth("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
-    in_space, _ = recorded(truth("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
+    clean, angles = recorded(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
+    in_space, _ = recorded(true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
     parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.profile_files import read_profile
-from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, laid
+from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, rail_in_track
 from models.rail.contact_table import Placed
 from models.systems.wheel_rail.run import run
 from models.systems.wheel_rail.scene import Positions
@@ -223,7 +223,7 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
         return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
-    rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
+    rail = rail_in_track(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = WheelAndRail(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
     other = replace(contact_of("A-2"), side=side)
     chosen = [(each, other.at(each.shift, each.yaw)) for each in placed if round(1e3 * each.shift, 6) in FILES]

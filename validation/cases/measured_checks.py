@@ -22,10 +22,10 @@ from validation.measured.planted import (
     Ride,
     clipped,
     drifting,
+    drop_samples,
+    errors_and_doubts,
     exchanged,
-    findings,
-    held,
-    lost,
+    hold_sample,
     measurement,
     planted,
     referred,
@@ -47,7 +47,7 @@ LATE = 3e-3
 QUICK = (
     Planted("3 ms late, one force", "shift", "fl_fz", LATE, "s", faults={"delay": {"fl_fz": LATE}}),
     Planted("left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged(("fl", "fr"))),
-    Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", lost("rr_fz", 3.0, 0.5)),
+    Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
 )
 AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
     ("3 ms late, one hub", "shift", "all channels of rr", LATE, "s", "delay", {"rr": LATE}),
@@ -107,8 +107,8 @@ FULL = (
         for name, (lever, hubs) in LEVERS.items()
     ),
     Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", clipped("fl_fz", 0.005)),
-    Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", held("rl_mx", 4.0, 0.3)),
-    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", held("fl_fz", 4.0, 0.06)),
+    Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", hold_sample("rl_mx", 4.0, 0.3)),
+    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", hold_sample("fl_fz", 4.0, 0.06)),
     Planted("spike of one sample", "spikes", "rl_my", 2e3, "N m", spiked("rl_my", 4.0, 2e3)),
     Planted("dead channel", "clipped", "rl_mx", 15.0, "s", times(0.0, "rl_mx")),
 )
@@ -193,7 +193,9 @@ def _clean_recordings(folder: Path) -> list[Row]:
 def _wrong_vehicles(folder: Path) -> list[Row]:
     """A car that is not the one of the file, R19-free: heavier, or with other springs."""
     findings_by_car = {
-        name: findings(replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder)
+        name: errors_and_doubts(
+            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder
+        )
         for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }
     errors = [

@@ -152,6 +152,6 @@ def by_hand(settings: Settings) -> Settings:
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
-def off(computed: Any, wanted: Any) -> float:
+def largest_relative_difference(computed: Any, wanted: Any) -> float:
     """Largest difference by the largest."""
     return float(np.abs(np.asarray(computed) - wanted).max() / np.abs(wanted).max())

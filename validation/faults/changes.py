@@ -13,7 +13,7 @@ from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
 Change = Callable[[Assembly], Assembly]
 
 
-def same(assembly: Assembly) -> Assembly:
+def unchanged(assembly: Assembly) -> Assembly:
     """No change."""
     return assembly
 
@@ -43,7 +43,7 @@ def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
     return vehicle(changed)
 
 
-def moved(place: Callable[[float, float, float], float]) -> Change:
+def with_moved_points(place: Callable[[float, float, float], float]) -> Change:
     """Suspension points and axles at place(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
@@ -124,7 +124,7 @@ class Altered:
     """A signal read ``late`` (s) and passed through ``change``, values (n, channels) -> values."""
 
     signal: Any
-    late: float = 0.0
+    with_late_input: float = 0.0
     change: Values = field(default=lambda values: values)
 
     def __getattr__(self, name: str) -> Any:
@@ -218,7 +218,7 @@ def moment(periods: float, change: Values = lambda values: values) -> Change:
     return changed
 
 
-def late(periods: float, step: float = 1e-3) -> Change:
+def with_late_input(periods: float, step: float = 1e-3) -> Change:
     """Input late by a part of its sampling period, or of a step of 1 ms where it has none."""
     return driven(("road", "force", "pitch"), lambda signal: Altered(signal, periods * (signal.period or step)))
 

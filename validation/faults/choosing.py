@@ -17,7 +17,7 @@ from models.advice.ride_choice.choose import Chooser as LinearChooser
 from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import Asked
-from validation.choice.drawn_scenes import drawn as drawn_run
+from validation.choice.drawn_scenes import draw_scene as drawn_run
 from validation.choice.judged import JudgedByRuns, asked, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import attribute

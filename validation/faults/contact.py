@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import NormalSolution, centres
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -37,7 +37,7 @@ def _ball() -> tuple[float, float, float]:
 def _hertz() -> float:
     """Hertz's ball: radius, approach, greatest pressure."""
     answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
-    return off(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
+    return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
 
 
 def _ellipse() -> float:
@@ -56,7 +56,7 @@ def _normal_solution() -> NormalSolution:
 def _normal() -> float:
     """Ball on cells against the closed form: approach and greatest pressure."""
     answer = _normal_solution()
-    return off(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
+    return largest_relative_difference(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
 
 
 def _published() -> float:
@@ -67,20 +67,20 @@ def _published() -> float:
     answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, motion[0], motion[1], motion[2]), soft)
     c11, c22, c23 = PUBLISHED
     wanted = -shear * a * a * np.array([c11 * 1e-7, c22 * 1e-7, c23 * a * 1e-4])
-    return off(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
+    return largest_relative_difference(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
 
 
 def _against_linear_theory() -> float:
     """Small creepages on an ellipse against the linear theory: all of them, 41 cells."""
     motion = (1e-7, 0.7e-7, 2e-5)
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=41)
-    return off(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
+    return largest_relative_difference(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
 
 
 def _sliding() -> float:
     """Gross sliding against mu N, and its direction."""
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, 0.03, 0.04, 0.0), PAIR)
-    return off(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
+    return largest_relative_difference(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
 
 
 def _theories() -> float:
@@ -101,7 +101,7 @@ def _stuck() -> Array:
 def _exact_linear() -> float:
     """Exact theory under small creepages against the linear one."""
     exact = rolling_problem.solve_rolling(_normal_solution(), MU, 2e-5, 1e-5, 0.0, PAIR)
-    return off(np.array([exact.fx, exact.fy]), _stuck())
+    return largest_relative_difference(np.array([exact.fx, exact.fy]), _stuck())
 
 
 CHECKS = {

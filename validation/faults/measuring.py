@@ -15,7 +15,7 @@ from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import SensorArray, in_space, sensor_array
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -66,12 +66,14 @@ def _damage() -> float:
 def _pairs() -> float:
     """Range pairs of the standard's load by its printed cycles."""
     counts = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
-    return off(counts, np.array([3.5, 3.5, 0.5]))
+    return largest_relative_difference(counts, np.array([3.5, 3.5, 0.5]))
 
 
 def _crossings() -> float:
     """Crossings of the standard's load: through 0, 2 and 4.5, counted by hand."""
-    return off(counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0]))
+    return largest_relative_difference(
+        counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
+    )
 
 
 def _units() -> float:
@@ -103,7 +105,7 @@ def _sections() -> float:
     """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
     forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
     have = np.concatenate([forces[name] for name in score.CHANNELS])
-    return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
+    return largest_relative_difference(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
 
 @cache
@@ -124,7 +126,10 @@ def _motion() -> float:
     array, read, _, heave = _turning()
     moved_body = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
-    return max(off(moved_body.rates[:, 1], rate), off(moved_body.acceleration[:, 2], heave))
+    return max(
+        largest_relative_difference(moved_body.rates[:, 1], rate),
+        largest_relative_difference(moved_body.acceleration[:, 2], heave),
+    )
 
 
 def _rigid() -> float:

@@ -18,7 +18,7 @@ from models.rail.energy import energies, rates_and_powers
 from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.wheelset import CHOSEN
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
@@ -55,12 +55,15 @@ def by_engine() -> Array:
 
 
 def _engine() -> float:
-    return max(off(equations().rates(state), rates) for state, rates in zip(states(), by_engine(), strict=True))
+    return max(
+        largest_relative_difference(equations().rates(state), rates)
+        for state, rates in zip(states(), by_engine(), strict=True)
+    )
 
 
 def _mirror() -> float:
     rates = equations().rates
-    return max(off(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
+    return max(largest_relative_difference(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
 
 
 def _balance() -> float:
@@ -99,7 +102,9 @@ def _linear() -> float:
     report = _report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
-    return max(off(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True))
+    return max(
+        largest_relative_difference(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True)
+    )
 
 
 CHECKS = {

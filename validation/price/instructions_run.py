@@ -100,12 +100,12 @@ def main(given: dict[str, Any]) -> None:
     gc.disable()
     for march in marches:
         march(given["steps"][0])
-    begin()
+    start_counting()
     for _ in range(2):
         copied(marches, given["steps"])
 
 
-def begin() -> None:
+def start_counting() -> None:
     """Have valgrind count from here on: what it does not count, it runs several times as fast."""
     asking = subprocess.Popen(
         ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

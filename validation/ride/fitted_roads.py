@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from models.core.noise import normal
-from models.road.fitted import FittedRoad, fit
+from models.road.fitted import FittedRoad, fit_road
 from models.road.iso8608 import level_of_class
 from models.road.isotropic import isotropic_like
 from models.road.measured_tracks import MeasuredTracks, read_tracks
@@ -33,7 +33,7 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
     noise = normal(SEED, 0, round(length / step), 2)
     mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
     tracks = MeasuredTracks(mean + HALF_TRACK * roll, mean - HALF_TRACK * roll, step, HALF_TRACK, "made")
-    fitted = fit(tracks, min(200.0, length / 4.5))
+    fitted = fit_road(tracks, min(200.0, length / 4.5))
     if fitted.roll is None:
         raise RuntimeError("a roll process that was put in was not found")
     rows = [
@@ -71,7 +71,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
     rows, shown = [], []
     for name, (first, last) in DATA.items():
         tracks = read_tracks(data / name, first=first, last=last)
-        fitted = fit(tracks)
+        fitted = fit_road(tracks)
         if name == "belgian_block.crg":
             rows.append(
                 Observed(

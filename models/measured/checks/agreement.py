@@ -221,7 +221,7 @@ class Agreement:
         power[:, pick] = np.einsum("fkc,fkc->fk", self._expected_times_forces[:, pick], response.conj())
         return cross, power.real
 
-    def lateness(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
+    def delay_of(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
         """Delay (s) of a group, its standard error, infinite if nothing tells, and the fall of chi square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
@@ -234,7 +234,7 @@ class Agreement:
         return late, steep**-0.5 if steep > 0 else float("inf"), fall
 
     def _delay_faults(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        late, error, fall = self.lateness(group, weights)
+        late, error, fall = self.delay_of(group, weights)
         if fall > CERTAIN and abs(late) > max(SMALL_DELAY, 4 * error):
             yield MeasurementFault("late", group.name, self._signals(group), late, error, fall)
 

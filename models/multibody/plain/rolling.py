@@ -10,8 +10,8 @@ import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.road import driven, surface
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
@@ -86,7 +86,7 @@ class PlainRolling:
     def __init__(self, handling: "Handling") -> None:
         self.handling, vehicle = handling, handling.vehicle
         self.bodies = Bodies(vehicle)
-        self.parts = Parts(self.bodies, vehicle, CARRIER)
+        self.parts = PlainParts(self.bodies, vehicle, CARRIER)
         held, self.loads = held_at_rest(vehicle, CARRIER)
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, vehicle)
@@ -155,7 +155,7 @@ class PlainRolling:
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _roll(self, t: float, motion: Motion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+    def _roll(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
         steer, steering = driven(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
@@ -185,7 +185,7 @@ class PlainRolling:
         )
         return force, report, ledger
 
-    def _loads_and_points(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
+    def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
         """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
@@ -205,7 +205,7 @@ class PlainRolling:
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
     def _slide(
-        self, motion: Motion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside what carries them, rad/s.
 
@@ -220,7 +220,7 @@ class PlainRolling:
         on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
         return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
-    def _axles(self, motion: Motion, steer: np.ndarray) -> np.ndarray:
+    def _axles(self, motion: PlainMotion, steer: np.ndarray) -> np.ndarray:
         """Axles (w, 3), to the left of their wheels: steered and leaning beside where the carrier heads, or a towed
         body by its x axis in the road's plane."""
         ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
@@ -238,7 +238,7 @@ class PlainRolling:
         return tyre_forces(patch, slides, of.cells)
 
     def _tyre_forces(
-        self, motion: Motion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
@@ -253,7 +253,7 @@ class PlainRolling:
             total += self._hold(motion, i, about[i] * contact.axle[i])
         return total, moments
 
-    def _hold(self, motion: Motion, i: int, moment: np.ndarray) -> np.ndarray:
+    def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a moment that what carries wheel i takes over from the wheel's body."""
         return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
@@ -267,7 +267,7 @@ class PlainRolling:
         torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
-    def _turn_wheels(self, motion: Motion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
+    def _turn_wheels(self, motion: PlainMotion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of torques on the wheels, and against them on what carries these."""
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
@@ -275,7 +275,7 @@ class PlainRolling:
             total -= self._hold(motion, i, torques[i] * axles[i])
         return total
 
-    def _drag_and_pushes(self, t: float, motion: Motion) -> tuple[np.ndarray, float]:
+    def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
         """Generalised forces (n,) of drag and pushes, and their power (W)."""
         heading = motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0

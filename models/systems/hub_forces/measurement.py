@@ -61,7 +61,7 @@ def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float,
     return HubInputs(np.column_stack([*heights, *rates]), speed=speed)
 
 
-def truth(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
+def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
     """The vehicle on its tyres, its hub forces in a frame."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 

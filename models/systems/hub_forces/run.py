@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -252,4 +252,4 @@ def labelled(
         detail=path,
         method=method,
     )
-    return judged(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))
+    return with_assumptions(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))

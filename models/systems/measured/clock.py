@@ -22,7 +22,7 @@ from models.core.whole_files import write_whole
 from models.measured.channel import BLOCK, Source
 from models.measured.columns import Columns
 from models.measured.gaps import without_absurd
-from models.measured.recording import Progress, Recording, silent
+from models.measured.recording import Progress, Recording, no_progress
 from models.measured.resampling import SAME, onto
 from models.measured.signal import Signal
 from models.measured.timing import EVEN, Timing, timing
@@ -83,14 +83,14 @@ def record(
     signals: Sequence[Signal],
     hubs: Sequence[str],
     folder: Path,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Recording:
     """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
     Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
     """
-    shifts, start, noticed = placed(scene, sources)
+    shifts, start, noticed = file_shifts(scene, sources)
     progress("reading times", 0.0)
     placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
     groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
@@ -144,7 +144,7 @@ def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Fi
     return Finding("clock", "note", "recording", text, rate, "Hz")
 
 
-def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
+def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
     """Shift of each file's times (s), the date at which the common time is 0, and findings on both."""
     offsets = [file.offset for file in scene.files]
     known = [source.start for source in sources if source.start is not None]

@@ -89,8 +89,8 @@ def consequences(
         )
         try:
             if first not in known:
-                known[first] = run(stretch(recording, samples, begun), begun)
-            put_right = run(stretch(recording, samples | corrected, folder / place), folder / place)
+                known[first] = run(samples_as_recording(recording, samples, begun), begun)
+            put_right = run(samples_as_recording(recording, samples | corrected, folder / place), folder / place)
         except (InputError, RunFailed):
             return Consequence(finding)
         return _most_changed_force(finding, known[first], put_right, answers)
@@ -98,17 +98,17 @@ def consequences(
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
-def judged(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
+def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
     """The verdict on a run that is accepted but for what its findings do."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
-    reason = "; ".join(told(consequence for consequence in consequences if consequence.grade == worst))
+    reason = "; ".join(consequence_texts(consequence for consequence in consequences if consequence.grade == worst))
     bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
     return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
-def told(consequences: Iterable[Consequence]) -> list[str]:
+def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
     """A text each; where more than FEW are of one check only the worst, which says of how many."""
     kinds: dict[str, list[Consequence]] = {}
     for consequence in consequences:
@@ -135,7 +135,7 @@ def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
     return first, count
 
 
-def stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
+def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -> Recording:
     """A recording of these samples."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))

@@ -78,7 +78,7 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     folder.mkdir(parents=True)
     scene, said = scene_of(job, folder)
     result = simulate(scene, job.engine, error=error)
-    limited = trusted(scene, job.hold.force)
+    limited = trusted_time(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS, "pitch"):
         limited = replace(limited, unchecked="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
@@ -145,11 +145,11 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     return scene, tuple(said)
 
 
-def trusted(scene: Scene, deviation: float) -> Trust | None:
+def trusted_time(scene: Scene, deviation: float) -> Trust | None:
     """How long a scene's run can be trusted when its forces have noise of this standard deviation (N); None where the
     pitch is held to a measured pitch."""
     assembly = assemble(scene)
-    bounds = drift_trust.trust(assembly)
+    bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
     noise = drift_trust.noise(assembly, deviation).passes(bounds.angle)

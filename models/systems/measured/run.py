@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
@@ -27,13 +27,13 @@ from models.measured.checks import findings
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
 from models.measured.checks.weight import moments
-from models.measured.recording import Progress, Recording, silent
+from models.measured.recording import Progress, Recording, no_progress
 from models.measured.signal import Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record
 from models.systems.measured.consequences import Consequence, consequences
-from models.systems.measured.consequences import judged as judged_by_consequences
+from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
 from models.systems.measured.pitch_plane import PlaneJob
@@ -45,7 +45,7 @@ from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Answer, Sections, points
 from models.systems.measured.trust import Drift, Level, drift
-from models.systems.measured.verdict import Compared, checks, compare, judge, surprised
+from models.systems.measured.verdict import Compared, checks, compare, filter_doubts, judge
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
 from models.systems.pitch_plane.trust import ANGLE, Trust
 from models.vehicles.cut_vehicle import CutVehicle
@@ -129,7 +129,7 @@ class Examination:
         return SectionRun(vehicle, recording, sections, *settings)
 
     def march(
-        self, name: str, folder: Path, progress: Callable[[float, float], None] = silent, error: bool = False
+        self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
     ) -> Outcome:
         """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
         job = self.job(name)
@@ -152,7 +152,7 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
@@ -189,7 +189,7 @@ def _judged_by_assumptions(run: Result, exam: Examination) -> Result:
     """The result with what it assumes and what of that it broke; of the pitch plane beside what its own run says."""
     if exam.outcome is None:
         return run
-    judged(run, assumptions(exam.scene, exam.rig.vehicle, exam))
+    with_assumptions(run, assumptions(exam.scene, exam.rig.vehicle, exam))
     if exam.plane is not None:
         run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
         run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *run_said[key]] for key in run_said})
@@ -229,7 +229,7 @@ def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, 
     return exam
 
 
-def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Recording:
+def read(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
     """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
     sources, rig = opened(scene), scene.rig()
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
@@ -279,7 +279,7 @@ def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) 
     if exam.outcome is not None:
         named = {(finding.check, finding.signals, finding.place) for finding in exam.findings}
         exam.findings += tuple(f for f in exam.outcome.findings if (f.check, f.signals, f.place) not in named)
-        exam.findings += surprised(exam.outcome)
+        exam.findings += filter_doubts(exam.outcome)
     progress("what the findings do", 0.9)
     _with_consequences(exam, folder / WORK)
     lap("what the findings do")

@@ -23,7 +23,7 @@ from models.engines.cut_vehicle import UPRIGHT, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
-from models.measured.recording import Recording, silent
+from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
 from models.systems.measured.sections import Answer, Sections
@@ -159,7 +159,7 @@ def check(job: SectionRun) -> None:
         raise InputError(job.file, "stabilise.method", hold.method, needed)
 
 
-def run(job: SectionRun, folder: Path, progress: Progress = silent, block: float = BLOCK) -> Outcome:
+def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = BLOCK) -> Outcome:
     """Run all of a recording, or what is missing of it in ``folder``; ``progress`` is told seconds done and in all.
 
     ``block`` : s between checkpoints, which changes no bit of the answers. Raises InputError where the folder holds a

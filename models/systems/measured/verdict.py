@@ -190,7 +190,7 @@ def judge(
     return _in_space(verdict)
 
 
-def surprised(run: Outcome) -> tuple[Finding, ...]:
+def filter_doubts(run: Outcome) -> tuple[Finding, ...]:
     """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
     if not run.surprise > SURPRISED:
         return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)

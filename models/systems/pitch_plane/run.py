@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
@@ -65,7 +65,7 @@ def run(
         integrated=json.dumps(STATES),
         **beside,
     )
-    judged(labelled, assumptions(assembly))
+    with_assumptions(labelled, assumptions(assembly))
     return _with_error(labelled, assembly, settings, channels) if error else labelled
 
 

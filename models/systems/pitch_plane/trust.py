@@ -174,7 +174,7 @@ class Trust:
         return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
 
 
-def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
+def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     """How long a scene's run can be trusted, and why; None for a run that is guided, held, or on a road, where no error
     grows."""
     forces = assembly.input

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Series, estimated
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
@@ -33,7 +33,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import InTime, Spectral, few, watching
+from models.systems.ride.watched import InTime, Spectral, few_speeds, watching
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
@@ -129,7 +129,7 @@ def linearised(
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
     motion = _motions_of_parts(vehicle, road, speeds, replaced)
-    judged(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
+    with_assumptions(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
     if not error:
         return labelled
     known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
@@ -188,7 +188,7 @@ def _motions_of_parts(
 ) -> Spectral:
     """Motions of the parts of statistically linearised vehicles, springs about their own means."""
     known = dict(zip(speeds.tolist(), replaced, strict=True))
-    chosen = few(speeds)
+    chosen = few_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
         for name in replaced[0].springs
@@ -233,7 +233,7 @@ def in_engine(
     )
     at, seen = ride.rows, watching(linearise(vehicle, speed), vehicle, speed)
     motion = InTime(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
-    judged(labelled, assumptions(scene, vehicle, motion))
+    with_assumptions(labelled, assumptions(scene, vehicle, motion))
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
 

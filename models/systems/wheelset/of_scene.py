@@ -79,7 +79,7 @@ def _initial_state(
     return equations, state
 
 
-def started(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
+def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
     """Equations at a speed (m/s), and the state (10,) that the scene's paths begin with; kept for further paths."""
     contact, run = scene.contact, scene.run
     return _initial_state(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from models.contact.accuracy import LIKELY, halved
+from models.contact.accuracy import LIKELY, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
@@ -50,7 +50,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     if scene.contact.law == "linear":
         return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
     cells = scene.contact.cells
-    other = halved(cells) if cells >= FEWEST else 2 * cells
+    other = coarser_cells(cells) if cells >= FEWEST else 2 * cells
     try:
         coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:

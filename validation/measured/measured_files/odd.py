@@ -213,7 +213,7 @@ def called(extension: str, name: str) -> Make:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class CutSweep:
     """A file of one format cut off at many places: refused, or the rest read right and named.
 
     cuts : number of places, spread evenly over the file; 0 for every byte.

@@ -15,7 +15,7 @@ from scipy.integrate import OdeSolution, solve_ivp
 
 from models.advice.price.problem import Setting
 from models.advice.price.systems.pitch_plane import engine_settings
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
@@ -104,7 +104,7 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
     channels = outputs(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     times = {"time": Channel("time", run.times, "s")}
-    return judged(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
+    return with_assumptions(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:

@@ -22,9 +22,9 @@ def _omissions_of_sort(sort: str) -> Callable[[Any], bool]:
     """Whether a scene's vehicle and road hold omissions of a sort."""
 
     def there(scene: Any) -> bool:
-        from models.systems.ride.omissions import has
+        from models.systems.ride.omissions import has_omissions
 
-        return has(scene, sort)
+        return has_omissions(scene, sort)
 
     return there
 
