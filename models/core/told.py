@@ -115,7 +115,7 @@ def as_json(results: Results) -> dict[str, Any]:
 
 
 def summarised(summary: dict[str, Any]) -> dict[str, Any]:
-    """A study's summary with the errors and assumptions of the "results" that it hands over, told at its end."""
+    """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
     results = summary.pop("results", {})
     return summary | as_json(results) | {"table": [*summary.get("table", []), *lines(results)]}
 

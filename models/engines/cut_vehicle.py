@@ -264,7 +264,7 @@ def _check(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -
 
 
 def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
-    """Refused where fixed steps are too long, or where the engine has no such integrator."""
+    """Raise Refused if fixed steps are too long, or if the engine does not have the integrator."""
     adaptive = ADAPTIVE.get("reference" if engine == PLAIN else engine, ())
     if settings.integrator == FIXED:
         check_step(engine, vehicle, settings.step, settings.duration)

@@ -100,8 +100,11 @@ class LineSpring:
 
 @dataclass(frozen=True)
 class Division:
-    """native : the engine's own; shared : elements with what the compiled forces have of their laws; reasons : of
-    these, by name."""
+    """How the elements of a vehicle are divided between an engine and the compiled forces.
+
+    native : elements that the engine itself computes; shared : the rest of each law, which the compiled forces add;
+    reasons : why an element is shared, by its name.
+    """
 
     native: tuple[NativePart, ...]
     shared: tuple[Element, ...]
@@ -109,7 +112,7 @@ class Division:
 
 
 def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
-    """Elements of a vehicle's tree between "exudyn" or "mujoco" and the compiled forces."""
+    """Divide the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
     for element in elements:
         travel = travel_of(tree, element)
@@ -147,7 +150,7 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 
 def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
-    """The joint elements of a vehicle that have a force, as every engine has them; their inertia is left to it."""
+    """Joint elements with a spring, damper or friction, as native parts; each engine adds their inertia itself."""
     return tuple(
         NativePart(_joint_force(element), CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors))
         for element in vehicle.joint_elements

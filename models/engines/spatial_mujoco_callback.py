@@ -54,7 +54,7 @@ Acting = tuple[str | None, Vector, Vector]
 
 
 class Parts(NamedTuple):
-    """Counts and numbers of a vehicle's parts in the model's numeric data; all but counts are pointers to doubles."""
+    """Where a callback reads a vehicle's parts in MuJoCo's numeric data: counts, and pointers to doubles."""
 
     body_count: int
     bodies: Any

@@ -40,7 +40,7 @@ IN_FILE: dict[Wrong, str] = {
 
 
 def check(axles: AxleForces) -> list[Finding]:
-    """All findings; what an earlier one explains, a later one does not name again."""
+    """Findings on the forces of the axles; a fault that one finding explains is not named by another."""
     largest = float(np.abs(axles.forces).max())
     if largest > IMPOSSIBLE * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."

@@ -234,7 +234,7 @@ def harmonic_linearised_conicity(
 
 @dataclass(frozen=True)
 class ConicityRow:
-    """Both conicities at an amplitude (m): the standard's with the wave's centre (m), the first harmonic about it.
+    """Equivalent conicity at one amplitude (m), by the standard and by the first harmonic, and the wave's centre (m).
 
     spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
     such wave.

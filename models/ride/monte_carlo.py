@@ -201,7 +201,10 @@ def _legendre() -> np.ndarray:
 
 
 def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
-    """Coefficients (channels, copies) of cell after cell; cells share a block of noise if copies are few."""
+    """Yield the random coefficients (channels, copies) of each cell in turn.
+
+    Several cells are drawn from the same block of noise if there are few copies.
+    """
     together, path = max(1, BLOCK // copies), 0
     while True:
         yield from normal(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT

@@ -244,7 +244,7 @@ def _unit(job: Points) -> str:
 
 
 def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
-    """Records of all points; InputError if none of them has a number although none failed."""
+    """Compute the records of all points; InputError if no point failed and yet none has a number to show."""
 
     def tell(finished: Done) -> None:
         progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)

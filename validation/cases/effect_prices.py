@@ -203,7 +203,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
 
 
 def _stops(quick: bool) -> list[Row]:
-    """A truck that brakes in a turn on snow by the reference, against one that was written for that alone.
+    """Rows: a truck brakes in a turn on snow, by the reference and by code written for this stop alone.
 
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
@@ -250,7 +250,7 @@ def _contact(quick: bool) -> list[Row]:
 
 
 def _choice() -> Row:
-    """The choice of effects of a linear car, by the answer itself."""
+    """Row: time of choosing the effects of a linear car, divided by the time of its full covariance."""
     (ratio, low, high), told = price_of_choice()
     return Observed(
         "effect_prices.choice",

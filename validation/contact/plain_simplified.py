@@ -30,7 +30,7 @@ def hermite(nodes: Array, padded: Array) -> CubicHermiteSpline:
 
 
 def continued(rows: Array) -> Array:
-    """Rows with one more before and after, on the parabola through the three nearest."""
+    """Rows with an extra row at each end, extrapolated by the parabola through the three outermost."""
     return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
 
 

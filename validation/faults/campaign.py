@@ -19,7 +19,7 @@ SYSTEM: System = "hard-cases"
 
 @dataclass(frozen=True)
 class Check:
-    """measure() -> size; what exceeds ``tolerance`` is seen."""
+    """A check by which faults are looked for: it sees a fault if ``measure()`` exceeds ``tolerance``."""
 
     title: str
     unit: str

@@ -67,7 +67,7 @@ class Layout:
 
 
 def narrow(data: bytes, unit: np.dtype) -> bytes:
-    """Text with one byte per character; a character that needs two becomes one that is never part of a number."""
+    """Recode text to one byte per character; a wide character becomes a byte that no number can contain."""
     if unit.itemsize == 1:
         return data
     codes = np.frombuffer(data[: len(data) // unit.itemsize * unit.itemsize], unit)

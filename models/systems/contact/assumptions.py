@@ -64,7 +64,10 @@ def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
 
 
 def _by_radii(scene: ContactScene, body: Contact) -> Callable[[Result], Watched]:
-    """Semi-axes by the radii of curvature that are known: of both bodies, or of the undeformed distance."""
+    """Return the watch function of the semi-axes divided by the known radii of curvature.
+
+    The radii are those of both bodies, or else of the distance between the undeformed surfaces.
+    """
     shares: dict[str, np.ndarray] = {}
     if isinstance(body, OnEllipse):
         axes = {"x": body.a, "y": body.b}

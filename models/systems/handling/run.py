@@ -184,7 +184,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreRerun:
-    """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
+    """Reruns of a drive in an engine, from a speed (m/s), with other steps or another mesh of the tyre's patch."""
 
     engine: str
     drive: Drive

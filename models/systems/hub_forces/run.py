@@ -70,7 +70,10 @@ class Measurement:
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
-        """Inputs of so many steps (s), roll and pitch held by a method; raises InputError."""
+        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` guides roll and pitch.
+
+        Raises InputError.
+        """
         scene, free = self.scene, self.forces.hub_inputs(step, steps, self.scene.forces.interpolation)
         if method == "kalman":
             from models.systems.hub_forces.tilt_filter import pulled

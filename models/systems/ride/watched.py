@@ -115,7 +115,7 @@ class Along:
     apart: Spectral
 
     def of(self, name: str) -> Gaussian:
-        """Gaussian statistics of a part's motion at every instant, or at some speeds."""
+        """Gaussian statistics of the motion of a part, by name: at every instant of a drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
