@@ -221,7 +221,7 @@ def _activity(axis: Any, watts: dict[str, float]) -> None:
 
 
 def percent(value: float) -> str:
-    """A relative change in words."""
+    """A relative change as text, in per cent."""
     digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 

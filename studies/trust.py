@@ -195,7 +195,7 @@ def _rows(
 def _text(
     rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """The table as lines of text, and what a longer run would take."""
+    """Lines for the terminal: the table of trust, and what it would take to trust a longer run."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
         *(f"  {NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured(row):>10}" for row in rows),

@@ -15,7 +15,7 @@ from models.vehicles.spatial_linear import UNIT, End, preloads
 
 @dataclass
 class Motion:
-    """A body: its centre, rotation, and the rows (3, n) of centre and turning velocity with their rates' parts (3,)."""
+    """Motion of a body: centre, rotation, Jacobians (3, n) of both, and accelerations (3,) without q''."""
 
     centre: np.ndarray
     rotation: np.ndarray

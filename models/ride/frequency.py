@@ -102,7 +102,9 @@ def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np
 def quadrature(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
 ) -> Quadrature:
-    """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
+    """Variances of the outputs as integrals over all frequencies; inf where an integral diverges.
+
+    Outputs with a weighting are replaced by their weighted ones.
 
     The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
     largest stiffness of each motion changes: that is much for places of a vehicle that is free to drive away. Raises

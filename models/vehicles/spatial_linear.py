@@ -92,7 +92,7 @@ class Kinematics:
         return np.zeros((3, self.size)) if frame is None else np.cross(self.turn(frame), axis, axisa=0).T
 
     def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
-        """(n, n): second derivatives of axis . (point two - point one), the axis fixed in a body or in the space."""
+        """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
         ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
         total = np.tensordot(axis, second, 1)
         if frame is None:

@@ -124,7 +124,7 @@ def _cubic() -> Row:
 
 
 def _refused() -> Row:
-    """Tables without a wave."""
+    """Row: tables of rolling radii that have no periodic wave are refused."""
     refused = 0
     for y, dr, amplitude in ((Y, -Y, 3.0), (Y, 0.1 * Y + 1.0, 3.0), (Y, 0.1 * Y, 8.1), (Y, 0.1 * (Y + 6.0), 3.0)):
         try:

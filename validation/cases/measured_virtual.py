@@ -120,7 +120,7 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
 
 
 def held(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
-    """The run of a recording, to be made."""
+    """Set up the run of a recording, with the vehicle held as ``hold`` says; the run is not yet marched."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 

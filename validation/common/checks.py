@@ -27,7 +27,7 @@ SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 
 
 def engine(name: str) -> Make:
-    """The unchanged engine by its name."""
+    """Return a function that builds an assembly in the engine of this name, without any planted fault."""
     return partial(build, name)
 
 

@@ -74,7 +74,7 @@ def _variances() -> float:
 
 
 def _reported_change() -> float:
-    """Change by frequency of what is reported as kept, by the tolerance that was asked for."""
+    """Largest change of the quantities reported as within tolerance, by frequency, divided by the tolerance."""
     choice, by_frequency, _ = _by_frequency()
     return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear().tolerance
 

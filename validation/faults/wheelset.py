@@ -67,7 +67,10 @@ def _mirror() -> float:
 
 
 def _balance() -> float:
-    """Change of the energies of motion, springs and weight, by differences along the motion, less the powers."""
+    """Largest error of the balance of energy, divided by the largest power.
+
+    The change of kinetic, spring and potential energy is taken by central differences along the motion.
+    """
     written, there = equations(), states()
     rates, powers = rates_and_powers(written, there)
     ahead, behind = (np.sum(energies(written, there + part * TINY * rates), axis=0) for part in (1.0, -1.0))

@@ -242,7 +242,7 @@ def _who(failed: list[Point], status: str) -> str:
 
 
 def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
-    """A handle per curve, then what is not a curve."""
+    """Handles of the legend: those of the curves first, then those of the other marks."""
     names = sorted(styles, key=named)
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))

@@ -1,4 +1,4 @@
-"""Marches whose instructions ``instructions`` counts, by themselves in a process: no kernel that would be compiled.
+"""A process that only marches, so that valgrind counts the instructions of a march without any compilation.
 
 The linear pitch-plane vehicle with all forces from one Python function, in both engines, method after method. Once
 everything is loaded, two copies of the process march, one after the other: to load it all twice would take most of the

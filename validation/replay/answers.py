@@ -132,7 +132,7 @@ def _netcdf(path: Path) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _csv(path: Path) -> Iterator[tuple[str, np.ndarray]]:
-    """Columns of a table with one line of names, as they are written."""
+    """Yield name and values of each column of a CSV file, whose first line holds the names."""
     with path.open(newline="") as file:
         lines = [line for line in csv.reader(file) if line]
     if lines:
