@@ -10,7 +10,7 @@ import numpy as np
 from models.drawing.figures import LABELS
 from studies.pictures.page import Page, difference, eight_bits
 from studies.pictures.scene import PictureScene
-from studies.pictures.video import missing, still, write
+from studies.pictures.video import missing_extra, write, write_png
 
 SYSTEM = "pictures"
 Progress = Callable[[str, float], None]
@@ -22,20 +22,20 @@ RUN = 0.2
 
 def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Run the vehicle in each engine and draw it; saves ``page.png``, a still of each engine and ``film.mp4``."""
-    from studies.pictures.drawing import drawn
+    from studies.pictures.drawing import draw_frame
 
     progress(f"{scene.vehicle} in {', '.join(LABELS[engine] for engine in engines)}", 0.0)
     film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
     stage, motions = vehicle.filmed(film.duration, film.times(), engines)
     page = Page(stage, motions)
     best = page.tallest()
-    written = [still(folder / "page.png", page.frame(best))]
+    written = [write_png(folder / "page.png", page.frame(best))]
     for motion in motions:
-        image = eight_bits(drawn(motion, stage, best, *SIZE))
-        written.append(still(folder / f"{motion.engine}.png", image))
-    said = missing(film.format)
+        image = eight_bits(draw_frame(motion, stage, best, *SIZE))
+        written.append(write_png(folder / f"{motion.engine}.png", image))
+    said = missing_extra(film.format)
     if film.format != "png" and not said:
-        frames = _told(page.frames(), film.frames, progress)
+        frames = _with_progress(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
     table = [difference(motions), ", ".join(path.name for path in written), said]
     return {
@@ -48,7 +48,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _told(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
+def _with_progress(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
     """The frames, each of which moves the progress bar."""
     for k, frame in enumerate(frames):
         progress(f"frame {k + 1} of {count}", RUN + (1.0 - RUN) * k / count)

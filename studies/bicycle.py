@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.core.result import Result, joined
+from models.core.result import Result, join_results
 from models.core.tables import write_table
 from models.drawing.figures import BLUE, COLOURS, LABELS, VERMILION, heading, panels, save
 from models.systems.bicycle.run import run as run_scene
@@ -35,7 +35,7 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
         progress("figure", 1.0)
         step = min(len(result.times) for result in runs.values())
         alike = {e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()}
-        joined(alike, "engine").save(folder / "runs.nc")
+        join_results(alike, "engine").save(folder / "runs.nc")
         figure(scene, speeds, values, runs, folder / "bicycle.png")
     return {
         "scene": scene.title,

@@ -78,7 +78,7 @@ def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[
     for name, (ratio, chance) in choice.calls.items():
         if name not in NEUTRAL:
             told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
-    for one, other, correlation in apart(choice):
+    for one, other, correlation in correlated_suspects(choice):
         told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
     told += ["", "predicted without their own speed, in standard deviations:"]
     for speed, (mean, gap) in answer.predictions.items():
@@ -90,7 +90,7 @@ def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[
     return told
 
 
-def apart(choice: Choice, bound: float = 0.9) -> list[tuple[str, str, float]]:
+def correlated_suspects(choice: Choice, bound: float = 0.9) -> list[tuple[str, str, float]]:
     """Pairs of suspects whose estimates in the fullest subset correlate by more than a bound."""
     fullest = max(choice.fits, key=lambda fit: len(fit.names))
     size = np.sqrt(np.diag(fullest.covariance))

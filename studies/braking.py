@@ -68,26 +68,26 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             failed[f"{name}, figures of merit"] = str(error)
         train = stop.of_hitch() if scene.trailer is not None else {}
         remarks += [f"    {key:<40}{value:>10.2f}" for key, value in train.items()]
-        wheels = stop.of_wheels() | beside(measured, stop, rims)
+        wheels = stop.of_wheels() | rim_speed_differences(measured, stop, rims)
         answer[name] = {
             **stop.of_vehicle(),
             **{key: value.tolist() for key, value in wheels.items()},
             **figures,
             **train,
         }
-        table += lines(name, stop, figures, wheels) + remarks + ended(measured, stop) + compared(results)
+        table += lines(name, stop, figures, wheels) + remarks + measurement_end_line(measured, stop) + compared(results)
     told = {"failed": failed, "results": every, "answer": answer, "table": table}
     return {"scene": scene.title, "folder": str(folder), **told}
 
 
-def beside(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:
+def rim_speed_differences(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:
     """Differences by which the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
     if measured is None or measured.speeds is None:
         return {}
     return {"rim less measured, rms [m/s]": measured.rms(stop.times, rims)}
 
 
-def ended(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
+def measurement_end_line(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
     """A line if the run lasts longer than its measured pressures."""
     if measured is None or measured.times[-1] > stop.times[-2]:
         return []

@@ -60,7 +60,7 @@ def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
     return {
-        (surface, name, controller + " + trailer" * (train.trailer is not None)): _alone(
+        (surface, name, controller + " + trailer" * (train.trailer is not None)): _single_procedure(
             train, surface, right, name, table
         )
         for surface, right in options.surfaces.items()
@@ -70,7 +70,9 @@ def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
     }
 
 
-def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
+def _single_procedure(
+    scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable
+) -> BrakingScene:
     """The scene with one procedure on one surface under one controller."""
     procedure = scene.procedures[name]
     if procedure.kind == "split":

@@ -75,17 +75,17 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
     """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
     check(scene, engines)
     beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
-    return told([scene, *beside], engines, folder, progress)
+    return save_choices([scene, *beside], engines, folder, progress)
 
 
-def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choices of scenes, the first by one of these engines, saved and drawn."""
     scene, choices = scenes[0], list[SceneChoice]()
     for i, each in enumerate(scenes):
         progress(each.title, i / len(scenes))
         linear, asked = has_closed_form(each), engines if each is scene else ()
         plan_of(each).check(each, () if linear else (engine_of(each, asked),))
-        said = partial(_spent, progress, f"{each.title}, of at most {RUNS} runs", i, len(scenes))
+        said = partial(_pass_progress, progress, f"{each.title}, of at most {RUNS} runs", i, len(scenes))
         choices.append(_linear(each) if linear else chosen(each, asked, said))
         _save(choices[-1], folder / f"{i + 1}_{each.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
@@ -114,7 +114,7 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
     }
 
 
-def _spent(progress: Progress, title: str, completed: int, of: int, share: float) -> None:
+def _pass_progress(progress: Progress, title: str, completed: int, of: int, share: float) -> None:
     """Pass on what is spent of a scene's search, after some of so many scenes."""
     progress(title, (completed + share) / of)
 
@@ -245,11 +245,11 @@ def percent(value: float) -> str:
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
-def _between(change: float, beside: float) -> str:
+def _change_text(change: float, beside: float) -> str:
     return percent(change) + (f" +- {percent(beside)}" if beside else "")
 
 
-def _stays(change: float, scene_choice: SceneChoice) -> str:
+def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
     """Why an effect stays whose going would change quantities by so much, with all that went."""
     if change > BUDGET * scene_choice.scene.tolerance or scene_choice.watts or scene_choice.choice.ended:
         return f"would matter no more at a tolerance above {percent(change)}"
@@ -267,8 +267,8 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
     for i, name in enumerate(scene.quantities):
         kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
         rows.append(
-            f"    {name}: {_between(choice.predicted[i], choice.remainder[i])} predicted, "
-            f"{_between(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
+            f"    {name}: {_change_text(choice.predicted[i], choice.remainder[i])} predicted, "
+            f"{_change_text(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
             f"{100 * scene.tolerance:g} %: {kept}"
         )
     before, step, after = choice.calls
@@ -282,7 +282,7 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
             f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
-        f"    {name} {_stays(change, scene_choice)}"
+        f"    {name} {_why_it_stays(change, scene_choice)}"
         for name, change in sorted(scene_choice.further.items(), key=lambda item: item[1])
     ]
     rows += [
@@ -294,12 +294,12 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
         rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
-    rows += misled(scene_choice)
+    rows += misleading_activities(scene_choice)
     worst = float((choice.confirmed + choice.chance).max())
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
 
 
-def misled(choice_of: SceneChoice) -> list[str]:
+def misleading_activities(choice_of: SceneChoice) -> list[str]:
     """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
     total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
     for effect in choice_of.alone:

@@ -19,10 +19,19 @@ from models.core.errors import InputError, RunFailed
 from models.core.whole_files import reason_of
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plain_arrays, plan_of, ready
+from studies.command.asked import (
+    SCENES,
+    causes,
+    checked_study,
+    engines_of,
+    findings_of,
+    load_scene,
+    plain_arrays,
+    plan_of,
+)
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import given_crew
-from studies.command.finishing import end, finish, folder_of, untold, watched
+from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
 from studies.command.waiting import waiting
 
 app = typer.Typer(
@@ -85,15 +94,17 @@ def main() -> None:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
     except TyperException as error:  # what was typed does not fit the command's options
         command = getattr(getattr(error, "ctx", None), "command_path", "twinrig")
-        end(f"{error.format_message().rstrip('.')}; see `{command} --help`", 2)
+        exit_with_message(f"{error.format_message().rstrip('.')}; see `{command} --help`", 2)
     except InputError as error:
-        end(str(error), 2)
+        exit_with_message(str(error), 2)
     except RunFailed as error:
-        end(f"the run failed: {error}", 1)
+        exit_with_message(f"the run failed: {error}", 1)
     except MemoryError:
-        end("the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1)
+        exit_with_message(
+            "the run failed: it does not fit into the memory of this machine; use a longer step or shorten it", 1
+        )
     except OSError as error:
-        end(f"the results could not be written: {reason_of(error)}", 1)
+        exit_with_message(f"the results could not be written: {reason_of(error)}", 1)
 
 
 @app.command("list")
@@ -145,7 +156,7 @@ def show(
     loaded = load_scene(scene, changes)
     if not price:
         plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *untold(findings_of(loaded), plan), *_search(loaded)]))
+        return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search(loaded)]))
     _say_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
@@ -186,7 +197,7 @@ def run_scene(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    telling = watched(profile)
+    telling = profile_lines(profile)
     if sweep is not None:
         from studies.command.crew import crew_of
         from studies.command.sweep import RECORDS, points
@@ -202,7 +213,7 @@ def run_scene(
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
         with waiting("checking the scene", loaded.system):
-            module = ready(loaded, engines)
+            module = checked_study(loaded, engines)
         if plain_arrays(loaded, engines, module):
             leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
@@ -303,7 +314,7 @@ def identify(
         raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
     loaded = loaded.model_copy(update=given_crew(workers, cluster))
     engines = engines_of(engine, loaded.system)
-    ready(loaded, engines)
+    checked_study(loaded, engines)
     if not measurement.is_file():
         raise InputError(measurement, "--from", None, "no such file")
     folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
@@ -409,7 +420,7 @@ def validate(
         command = " ".join(["twinrig", *sys.argv[1:]])
         failed = run_all(folder, quick, command, earlier, resume is not None, Crew.given(**crew))
     except KeyboardInterrupt:
-        end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
+        exit_with_message(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)
 
 

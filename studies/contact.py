@@ -71,7 +71,7 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
     lines = [
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
-        *_places(scene),
+        *_lines_of_touches(scene),
         f"  pressed in {duration(rolls.pressing)} once, rolled in {cost(rolls.rolling)} at each creepage"
         + ", errors included" * bool(rolls.errors),
         f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
@@ -114,7 +114,7 @@ def _percent(error: float, limit: float) -> str:
     return f"{100 * error / limit:.2f}" if limit > 0 else "0"
 
 
-def _places(scene: ContactScene) -> list[str]:
+def _lines_of_touches(scene: ContactScene) -> list[str]:
     """Where profiles touch, a line each."""
     if scene.profiles is None:
         return []

@@ -38,11 +38,11 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         "answer": json.loads(rows.data.attrs["sizes"]),
         "results": {"forces": rows},
         "seconds": rows.seconds,
-        "table": told(counts["rows"], counts["wrong"], scene.cases_file().name, rows.seconds, scene.error),
+        "table": summary_lines(counts["rows"], counts["wrong"], scene.cases_file().name, rows.seconds, scene.error),
     }
 
 
-def told(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
+def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
     """Printed lines on ``rows`` rows, of which some are wrong, from the file ``name``."""
     if rows == 0:
         return [f"  no rows in {name}"]

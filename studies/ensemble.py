@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import Watched, judged
+from models.core.assumptions import Watched, with_assumptions
 from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -110,7 +110,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     rows = _rows(options, times, statistics)
     channels, axes = _channels(times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _told(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
+    _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
     table = text(options, scene, rows, statistics, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
@@ -156,7 +156,7 @@ def _channels(
     return channels, axes
 
 
-def _told(
+def _with_errors(
     saved: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
     """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
@@ -169,7 +169,9 @@ def _told(
     }
     assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(statistics))]
     return of_chance(
-        judged(saved, assumed), {f"deviation of {name}": breach for name, breach in worst.items()}, options.paths
+        with_assumptions(saved, assumed),
+        {f"deviation of {name}": breach for name, breach in worst.items()},
+        options.paths,
     )
 
 

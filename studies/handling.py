@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.core.result import Result, joined
+from models.core.result import Result, join_results
 from models.systems.handling.run import run as run_scene
 from models.systems.handling.scene import HandlingScene
 
@@ -30,7 +30,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
             except RunFailed as error:
                 failed[f"{name}, {engine}"] = str(error)
         if runs:
-            joined(runs, "engine").save(folder / f"{name}.nc")
+            join_results(runs, "engine").save(folder / f"{name}.nc")
             manoeuvre_figure(runs, name.replace("_", " "), folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
             answer[name] = _answer(runs)

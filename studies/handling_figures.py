@@ -34,7 +34,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
         (moments, drive["mz"], "moment [N m]", "Aligning moments"),
     ):
         for i, tyre in enumerate(drive.handling.vehicle.tyres):
-            axis.plot(drive.run.times, values[:, i], label=tyre.name, **_looks(i))
+            axis.plot(drive.run.times, values[:, i], label=tyre.name, **_tyre_style(i))
         axis.set(ylabel=label, title=name)
     for axis in over_time:
         axis.set_xlabel("time [s]")
@@ -45,7 +45,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     return save(figure, path)
 
 
-def _looks(i: int) -> dict[str, Any]:
+def _tyre_style(i: int) -> dict[str, Any]:
     """Colour and line of a tyre by its number."""
     return {"color": TYRES[i % 4], "linestyle": LINES[i // 4 % 4]}
 
@@ -67,7 +67,7 @@ def _circle(axis: Axes, drive: Drive) -> None:
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
     for i, (side, ahead) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
-        axis.plot(side, ahead, **_looks(i), lw=0.9)
+        axis.plot(side, ahead, **_tyre_style(i), lw=0.9)
     axis.set(
         xlabel="side force / μN [-]",
         ylabel="force ahead / μN [-]",

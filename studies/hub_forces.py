@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.result import joined
+from models.core.result import join_results
 from models.core.strict import Strict, read
 from models.core.time_series import write_time_series
 from models.systems.hub_forces.comparison import METHODS, Comparison, Progress, compare
@@ -91,7 +91,7 @@ def save(comparison: Comparison, folder: Path) -> None:
         for channel in channels
     }
     write_time_series(folder / "runs.csv", columns, float(next(iter(comparison.runs.values())).times[1]))
-    joined(runs, "run").save(folder / "runs.nc")
+    join_results(runs, "run").save(folder / "runs.nc")
 
 
 def _write(path: Path, names: list[tuple[str, str]], measured: Any) -> None:

@@ -25,7 +25,7 @@ TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
 LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
 
 
-def _shown(comparison: Comparison) -> list[tuple[str, str, str]]:
+def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
     """Names, labels and colours of the runs that are drawn: of the free ones, which are alike, the last."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
     rest = [(name, label) for name, label in LABELS.items() if name in comparison.runs]
@@ -38,7 +38,7 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
     panels = [(name, name, 1e3, "mrad") for name in ("roll", "pitch", "heading")]
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
     for axis, (name, channel, factor, unit) in zip(axes.flat, panels, strict=True):
-        for run, label, colour in _shown(comparison):
+        for run, label, colour in _drawn_runs(comparison):
             drawn = comparison.runs[run]
             axis.plot(drawn.times, factor * drawn[channel], color=colour, label=label)
         if true := comparison.truth:
@@ -55,7 +55,7 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
 def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     """Damage of every section force, divided by the true one's, or without a truth by that of the filter's run."""
     figure, axis = subplots(figsize=(WIDE, 4.6))
-    shown, values = _shown(comparison), list[float]()
+    shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
         ratios = comparison.damages(comparison.runs[run]["section_force"])
         places = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26

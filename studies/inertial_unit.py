@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
-from models.core.assumptions import Assumption, judged
+from models.core.assumptions import Assumption, with_assumptions
 from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result
@@ -138,7 +138,9 @@ def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline)
     }
     units = labelled(scene, channels, {"grade": Channel("grade", options.grades, "deg/h")})
     says, remedy = "the angle errors are small ones", "take finer grades, or shorter drives"
-    judged(units, [Assumption("small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST)])
+    with_assumptions(
+        units, [Assumption("small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST)]
+    )
     chances = {
         f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
         for grade, (middle, low, high) in zip(options.grades, kept, strict=True)

@@ -65,9 +65,9 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "folder": str(folder),
         "failed": failed,
         "answer": {
-            "branch": [_numbers(orbit, *ORBIT) for orbit in orbits],
+            "branch": [_numbers_of_orbit(orbit, *ORBIT) for orbit in orbits],
             "cycles": {
-                engine: _numbers(orbit, *(name for name in ORBIT if name != "multiplier"))
+                engine: _numbers_of_orbit(orbit, *(name for name in ORBIT if name != "multiplier"))
                 for engine, orbit in by_engine.items()
             },
         },
@@ -76,7 +76,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _numbers(orbit: Orbit, *names: str) -> dict[str, float]:
+def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
     """Plain numbers in SI."""
     return {name: float(getattr(orbit, name)) for name in names}
 

@@ -13,7 +13,7 @@ from models.machine.seconds import cost
 from models.rail.contact_table import Placed
 from models.systems.wheel_rail import run as system
 from models.systems.wheel_rail.plan import case_text
-from models.systems.wheel_rail.run import PATCH, POSITION, WHEELS, numbers, patches
+from models.systems.wheel_rail.run import PATCH, POSITION, WHEELS, patches, position_quantities
 from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
@@ -53,7 +53,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, progress=partial(_told, progress, scene, k), error=scene.error
+            scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
@@ -63,7 +63,9 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
             _save(name, result, folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placed}:
         _figure(scene, drawn, folder / "manchester.png")
-    answer = {name: [numbers(placed) for placed in result.detail.placed] for name, result in results.items()}
+    answer = {
+        name: [position_quantities(placed) for placed in result.detail.placed] for name, result in results.items()
+    }
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -74,7 +76,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     }
 
 
-def _told(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
+def _report_progress(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
     progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
 
 
@@ -83,7 +85,7 @@ def _save(name: str, result: Result, folder: Path) -> None:
     result.save(folder / f"{name}.nc")
     result.save_table(folder / f"{name}.csv", *POSITION)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH.items()}}
-    positions = [numbers(placed) for placed in result.detail.placed]
+    positions = [position_quantities(placed) for placed in result.detail.placed]
     for wheel in WHEELS:
         rows = [
             {"shift": position["shift"], "patch": k, **patch}
@@ -136,7 +138,7 @@ def _table(placed: list[Placed]) -> list[str]:
     each = [(position, wheel) for position in placed for wheel in WHEELS]
     several = [f"{1e3 * laid.shift:g} ({wheel})" for laid, wheel in each if len(getattr(laid, wheel)) > 1]
     flange = [laid.shift for laid, wheel in each if patches(laid, wheel)[0].angle < -FLANGE]
-    lines = [heads, *(line for position in map(numbers, placed) for line in _lines(position))]
+    lines = [heads, *(line for position in map(position_quantities, placed) for line in _lines(position))]
     if several:
         lines.append(f"    several patches on one wheel at, in mm: {', '.join(several)}")
     if flange:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
@@ -112,7 +112,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "results": results,
         "table": table,
-        "rows": [_numbers(source) for source in sources],
+        "rows": [_numbers_of_ways(source) for source in sources],
     }
 
 
@@ -216,7 +216,7 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
     saved = result(scene, channels, axes, engine=source.name)
     assert source.quality is not None
     record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
-    judged(saved, assumptions(record, source.ways["integrated"]))
+    with_assumptions(saved, assumptions(record, source.ways["integrated"]))
     if scene.error:
         beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
         not_estimated(saved, f"noise and mounts err most, and {beside}")
@@ -224,7 +224,7 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
     return saved
 
 
-def _numbers(source: Source) -> dict[str, Any]:
+def _numbers_of_ways(source: Source) -> dict[str, Any]:
     """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
     assert source.quality is not None
     ways = {}
@@ -238,7 +238,7 @@ def _numbers(source: Source) -> dict[str, Any]:
 def _lines(source: Source, p: Parameters) -> list[str]:
     """Lines: the verdict on the readings, then one for each method."""
     assert source.quality is not None
-    numbers, kind = _numbers(source), "error" if source.truth else "size"
+    numbers, kind = _numbers_of_ways(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
     lines = [
         f"  {source.name}",

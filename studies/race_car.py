@@ -150,13 +150,13 @@ def simpler(
 
 
 def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
-    from models.core.scene_file import put
+    from models.core.scene_file import set_key
 
     table = scene.table()
     for axle in ("front", "rear"):
-        put(table, f"{axle}.sharpness", 2.0)
+        set_key(table, f"{axle}.sharpness", 2.0)
     for key, value in holds.items():
-        put(table, key, value)
+        set_key(table, key, value)
     return build(table, scene.file, Path(scene.folder))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from models.core.finding import gathered, queries
 from models.core.strict import Strict, read
 from models.drift.score import rms
-from models.systems.measured.consequences import told
+from models.systems.measured.consequences import consequence_texts
 from models.systems.measured.run import WORK, Examination
 from models.systems.measured.run import run as run_scene
 from models.systems.measured.scene import MeasuredScene
@@ -44,7 +44,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
         "findings": queries(finding for finding in exam.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in exam.findings),
         "channels": _sizes(exam),
-        "table": [*_told(exam), f"  the page: {page}"],
+        "table": [*_lines_of_findings(exam), f"  the page: {page}"],
     }
 
 
@@ -67,7 +67,7 @@ def _sizes(exam: Examination) -> dict[str, Any]:
     return sizes
 
 
-def _told(exam: Examination) -> list[str]:
+def _lines_of_findings(exam: Examination) -> list[str]:
     """Lines for the terminal: findings that matter, and how the runs ended."""
     lines = [f"  {finding.weight}: {finding.text}" for finding in gathered(exam.findings) if finding.weight != "note"]
     notes = sum(finding.weight == "note" for finding in exam.findings)
@@ -76,7 +76,7 @@ def _told(exam: Examination) -> list[str]:
     for name, outcome in exam.runs.items():
         end = exam.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
-    lines += [f"  effect of {text}" for text in told(exam.consequences)]
+    lines += [f"  effect of {text}" for text in consequence_texts(exam.consequences)]
     lines += [
         f"  verdict on the {name} run: {verdict.word} ({verdict.reason})" for name, verdict in exam.verdicts.items()
     ]

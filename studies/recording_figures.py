@@ -159,7 +159,7 @@ def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
 
 
 def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
-    """Power density of signals beside the noise that is stated."""
+    """Draw the power density of signals beside their stated noise."""
     from scipy.signal import welch
 
     recording = evidence.recording

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.result import Result, joined
+from models.core.result import Result, join_results
 from models.core.strict import Strict, quantity, read
 from models.core.told import inherited
 from models.core.whole_files import write_whole
@@ -25,7 +25,7 @@ from models.systems.ride.of_scene import (
     road_of,
     vehicle_of,
 )
-from models.systems.ride.plan import doubts, met
+from models.systems.ride.plan import doubts, noise_sharing_text
 from models.systems.ride.readings import isotropic_change, largest_gap, static_loads
 from models.systems.ride.run import AS_WRITTEN, SweepPoints
 from models.systems.ride.scene import RideScene
@@ -87,7 +87,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     top = Heading(scene.title, results)
     _save(results, folder)
     _save_system(scene, linear, speed, folder)
-    if along := _along(vehicle):
+    if along := _with_points_along_body(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
         at = run_scene(plain, "reference", vehicle=along, points=SweepPoints([speed], roads)).detail
         places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
@@ -99,7 +99,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     fitted = fitted_road(scene) if scene.road.file else None
     road, y = road_of(scene, there), half_track_of(scene, there)
     road_figure(road, y, fitted, top, folder / "road.png")
-    texts = (road.label(y), *met(scene, there), *(fitted.notes if fitted else ()))
+    texts = (road.label(y), *noise_sharing_text(scene, there), *(fitted.notes if fitted else ()))
     notes = [*(f"  question: {text}" for text in doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {
         "scene": scene.title,
@@ -122,7 +122,7 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
     }
 
 
-def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
+def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     """The vehicle with the vertical acceleration of points along its heaviest body that pitches, if there is one."""
     bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
     if not bodies or len(vehicle.axles) < 2:
@@ -136,7 +136,7 @@ def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 
 def _save(results: Mapping[str, Result], folder: Path) -> None:
     """Deviations of every engine over case, speed and output; the last speed is that of the tables."""
-    whole = joined(results, "engine")
+    whole = join_results(results, "engine")
     saved = inherited(Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices")
     saved.save(folder / "deviations.nc")
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())

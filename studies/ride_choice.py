@@ -21,7 +21,7 @@ from models.systems import run as run_scene
 from models.systems.ride.of_scene import goes_in_time, told_by
 from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
 from models.systems.ride.scene import RideScene
-from studies.choice import told
+from studies.choice import save_choices
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -65,14 +65,14 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     """Choose, by runs for bent springs; saves ``choice.nc``, two CSV of it, a figure, files of what is left."""
     check(scene, engines)
     if goes_in_time(scene):
-        return told([scene], engines, folder, progress)
+        return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
     with told_by(scene):
         chooser = Chooser.of(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.further(frozenset(choice.left_out))
-        alone = [_alone(chooser, effect) for effect in chooser.effects]
+        alone = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
@@ -99,7 +99,7 @@ def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     return results
 
 
-def _alone(chooser: Chooser, effect: Effect) -> Alone:
+def _effect_alone(chooser: Chooser, effect: Effect) -> Alone:
     single = frozenset([effect])
     return Alone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
 
@@ -221,7 +221,7 @@ def _activity(axis: Any, watts: dict[str, float]) -> None:
 
 
 def percent(value: float) -> str:
-    """A relative change in words."""
+    """A relative change as text, in per cent."""
     digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 

@@ -52,7 +52,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     """Refuse a varying speed and vehicles that share no output with the scene's."""
     if scene.speeds is None:
         raise InputError(scene.file, "study", scene.study, "runs at constant speeds; with a drive use ride_drive")
-    full, simpler = vehicle_of(scene), _simpler(scene)
+    full, simpler = vehicle_of(scene), _simpler_vehicles(scene)
     for vehicle in (full, *simpler):
         check_linear(scene, vehicle)
     names = {output.name for output in full.outputs}
@@ -68,7 +68,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
     check(scene, engines)
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
-    models, results = _named([*_simpler(scene), full]), dict[str, Result]()
+    models, results = _named([*_simpler_vehicles(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
         roads = {road: ROADS[road] for road in _roads(vehicle)}
@@ -106,7 +106,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _simpler(scene: RideScene) -> list[SpatialVehicle]:
+def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
     names = enumerate(_options(scene).simpler)
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in names]
 

@@ -56,7 +56,7 @@ def along_figure(
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
     figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.0))
-    name = _middle(vehicle)
+    name = _middle_acceleration(vehicle)
     for i, case in enumerate(at.cases):
         left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
         if name:
@@ -72,7 +72,7 @@ def along_figure(
     _save(figure, above, ": which correlations of the road matter where", path)
 
 
-def _middle(vehicle: SpatialVehicle) -> str:
+def _middle_acceleration(vehicle: SpatialVehicle) -> str:
     """The vertical acceleration nearest to the middle of the axles."""
     middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
     points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
@@ -112,13 +112,13 @@ def _say_where_none(axis: Axes) -> None:
         axis.set_yticks([])
 
 
-def _written(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     return unit.replace("^2", "²")
 
 
 def _shown_unit(unit: str) -> tuple[str, float]:
     """A unit as it is drawn, and the factor of what is drawn in it."""
-    return ("mm", 1e3) if unit == "m" else (_written(unit), 1.0)
+    return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
 
 
 def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -227,7 +227,7 @@ def drive_figure(
                 continue
             (line,) = axis.plot(varied.time, exact, label=label)
             axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
-        axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
+        axis.set(ylabel=f"standard deviation [{_unit_text(unit)}]", title=kind.capitalize(), ylim=(0, None))
         _name_below(axis, 0.03)
     axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
@@ -241,7 +241,7 @@ MOST = 12
 def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
     """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
     outputs = answer.shown.vehicle.outputs
-    figure, axes = _few(min(len(outputs), MOST))
+    figure, axes = _few_panels(min(len(outputs), MOST))
     left = answer.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
@@ -278,7 +278,7 @@ def engine_spectra_figure(
     expected = one_sided(linear, road, speed, frequency)
     first = next(iter(runs.values()))
     shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST]
-    figure, axes = _few(len(shown))
+    figure, axes = _few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
         for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
             f, density = run.densities(frequency[-1])
@@ -286,13 +286,13 @@ def engine_spectra_figure(
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
         output, top = linear.outputs[i], expected[:, i].max()
-        unit = f"one-sided density [({_written(output.unit)})²/Hz]"
+        unit = f"one-sided density [({_unit_text(output.unit)})²/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
     _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
 
 
-def _few(count: int) -> tuple[Figure, list[Axes]]:
+def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
     """Two or three small panels beside each other."""
     figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend

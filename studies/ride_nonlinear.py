@@ -79,7 +79,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "failed": failed,
         "results": results,
         "answer": _answer(answer),
-        "table": _table(answer, speed) + _lifted(vehicle, answer, runs) + _time_table(runs, answer, road, speed),
+        "table": _table(answer, speed)
+        + _lift_off_shares(vehicle, answer, runs)
+        + _time_table(runs, answer, road, speed),
     }
 
 
@@ -121,11 +123,11 @@ def _table(answer: Nonlinear, speed: float) -> list[str]:
         for i, name in enumerate(copies.names):
             deviation = f"{copies.deviation[i]:>10.4g} ± {50 * copies.error[i] / copies.variance[i]:.1f} %"
             mean = f"mean {copies.mean[i]:+.3g} ± {copies.mean_error[i]:.1g}, {copies.kurtosis[i]:.1f}"
-            lines.append(f"    {name:<{width}}{deviation}{_off(answer, beside, i)}   {mean}")
+            lines.append(f"    {name:<{width}}{deviation}{_errors_at_speed(answer, beside, i)}   {mean}")
     return lines
 
 
-def _off(answer: Nonlinear, speed: float, i: int) -> str:
+def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
     """Errors of small motion and of statistical linearisation where the speed is among those of the sweep."""
     at = np.flatnonzero(np.isclose(answer.speeds, speed))
     if not len(at):
@@ -135,7 +137,7 @@ def _off(answer: Nonlinear, speed: float, i: int) -> str:
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 
-def _lifted(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str, Ride]) -> list[str]:
+def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str, Ride]) -> list[str]:
     """Share of time for which each tyre would pull by its Gaussian law, and for which it is in the air in the engines'
     runs; nothing where no tyre lifts.
     """

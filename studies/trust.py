@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -85,7 +85,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    saved = _told(_saved(scene, rows, spread), quiet, spread, options)
+    saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
     saved.save(folder / "trust.nc")
     results = {"forces without noise": quiet, "growth": saved} | ({} if measured is None else {"measurement": measured})
     progress("figure", 0.9)
@@ -143,10 +143,10 @@ def _ensemble(
     return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _told(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+def _with_errors(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
     """The result with the error of the steps, of the run without noise, and the standard error of the median."""
     saved.data.attrs["error"] = quiet.data.attrs["error"]
-    judged(saved, [small_errors(options.angle)])
+    with_assumptions(saved, [small_errors(options.angle)])
     middle, low, high = quantile(spread["drift_off"], 0.5)
     if not math.isfinite(high):
         return saved
@@ -154,7 +154,7 @@ def _told(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: 
     return of_chance(saved, {"median drift-off by noise": error}, options.paths)
 
 
-def _saved(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
+def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
     """Drift-off by source, and the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
@@ -195,10 +195,10 @@ def _rows(
 def _text(
     rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """The table as lines of text, and what a longer run would take."""
+    """Lines for the terminal: the table of trust, and what it would take to trust a longer run."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
-        *(f"  {NAMES[row['source']]:<28} {_when(row['predicted']):>14} {_measured(row):>10}" for row in rows),
+        *(f"  {NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured(row):>10}" for row in rows),
     ]
     limits = [row["predicted"] for row in rows if row["predicted"] is not None]
     until = f"until about {min(limits):.3g} s" if limits else "to its end"
@@ -210,7 +210,7 @@ def _text(
     return lines + _remedies(options, deviation, rate, base, curves)
 
 
-def _when(time: float | None) -> str:
+def _drift_off_text(time: float | None) -> str:
     return "beyond the run" if time is None else f"{time:.2f}"
 
 
@@ -218,9 +218,9 @@ def _measured(row: Row) -> str:
     if row["source"] == "rounding":
         return "-"
     if row["quartiles"]:
-        ends = " to ".join(_when(time) for time in row["quartiles"])
-        return f"{_when(row['measured']):>10}   (median; half of all paths {ends})"
-    return _when(row["measured"])
+        ends = " to ".join(_drift_off_text(time) for time in row["quartiles"])
+        return f"{_drift_off_text(row['measured']):>10}   (median; half of all paths {ends})"
+    return _drift_off_text(row["measured"])
 
 
 def _remedies(
@@ -231,7 +231,7 @@ def _remedies(
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
     for name in ("noise", "interpolation", "inertia"):
-        excess = _excess(curves[name], options, rate)
+        excess = _size_at_time(curves[name], options, rate)
         order = ORDERS[base.effects["wheel_forces"].interpolation]
         takes = {
             "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
@@ -244,7 +244,7 @@ def _remedies(
     return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
 
 
-def _excess(curve: GrowthCurve, options: Options, rate: float) -> float:
+def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
     """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end on by the law of noise.
 
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is

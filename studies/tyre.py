@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -79,7 +79,7 @@ def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) ->
     channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}
     nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", table.slips, "-")}
     read_off = result(scene, channels, nodes, load=options.load)
-    judged(read_off, assumptions(table, options.load))
+    with_assumptions(read_off, assumptions(table, options.load))
     not_estimated(read_off, "a table has no steps: it is read at its nodes, and linear between").save(
         path.with_suffix(".nc")
     )

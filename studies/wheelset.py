@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.core.result import Result, joined
+from models.core.result import Result, join_results
 from models.core.tables import write_table
 from models.core.told import gathered
 from models.rail.energy import ledger
@@ -44,7 +44,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
             failed[engine] = str(error)
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
     if linear:
-        gathered(joined(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
+        gathered(join_results(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
         _save_table(linear, folder)
         stability_figure(eigenvalues, wheelset, scene.title, folder / "stability.png")
     if paths:

@@ -14,7 +14,15 @@ from models.core.systems import DEFAULT
 from models.systems.pitch_plane.scene import assemble
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
-from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, registered, user_functions
+from validation.absence.probes import (
+    belongs_to_effects,
+    installed,
+    leanest_march,
+    march,
+    probe,
+    registered,
+    user_functions,
+)
 from validation.cases import absent, effect_prices
 from validation.cases.absent import EFFECTS, ENGINES, FORCES, added_to, change, declared, model, scene
 from validation.cases.effect_prices import hand_built
@@ -69,7 +77,7 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
     """
     for _ in range(2):  # wrappers cache on their first calls
         march(engine, model(scene({}, 20, folder), engine))
-    short, long = (quietest(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
+    short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     assert long.frames == short.frames <= 50
     assert abs(long.memory - short.memory) < 2000
     assert short.callbacks == long.callbacks == 0
@@ -196,4 +204,4 @@ def test_a_ride_has_no_more_than_it_names():
 @pytest.mark.full
 def test_a_ride_by_an_engine_imports_that_one_alone():
     """Positive control of the modules that must be absent above."""
-    assert ride.imported("mujoco") == ["mujoco", "numba", "models.engines"]
+    assert ride.imported_modules("mujoco") == ["mujoco", "numba", "models.engines"]

@@ -6,8 +6,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.scene_effects import (
-    absent,
-    beside,
+    absent_effects,
     check,
     listing,
     module_of,
@@ -15,6 +14,7 @@ from models.core.scene_effects import (
     names_of,
     own_table,
     rebuilt,
+    with_effects,
     without,
 )
 from models.core.systems import DEFAULT, SYSTEMS, load
@@ -23,7 +23,7 @@ from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
 from studies.command.asked import SCENES, plan_of
 from validation.absence import of_systems
-from validation.absence.of_systems import FILES, added, bare, controlled, declared, file_of, seen
+from validation.absence.of_systems import FILES, added, bare, controlled, counts_and_paths, declared, file_of
 
 CHEAP = [(system, name) for system in ("contact", "braking") for name in controlled(system)]
 ALL = [(system, name) for system in FILES for name in controlled(system)]
@@ -49,7 +49,7 @@ def test_no_file_of_an_effect_is_needed_where_it_is_not_named():
 
 def test_a_bare_scene_names_nothing():
     for system in ("contact", "braking", "handling"):
-        assert named(bare(system)) == () and absent(bare(system)) == names_of(system)
+        assert named(bare(system)) == () and absent_effects(bare(system)) == names_of(system)
 
 
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
@@ -71,7 +71,7 @@ def test_a_scene_is_the_same_from_its_own_table_and_can_do_without_what_it_names
 
 
 def test_what_needs_another_leaves_before_it():
-    full = beside(bare("braking"), "pressure_dynamics", "valve_delay", "port", "teeth")
+    full = with_effects(bare("braking"), "pressure_dynamics", "valve_delay", "port", "teeth")
     assert named(without(full, "pressure_dynamics", "valve_delay", "teeth", "port")) == ()
 
 
@@ -84,7 +84,7 @@ def test_effects_that_cannot_be_together_are_told_with_the_remedy():
     ):
         build(on_springs, "s.toml")
     with pytest.raises(InputError, match="falling_friction: needs the effect 'saturation': name it too"):
-        without(beside(bare("contact"), "saturation", "falling_friction"), "saturation")
+        without(with_effects(bare("contact"), "saturation", "falling_friction"), "saturation")
     with pytest.raises(InputError, match=r"effects.trailer: has another place in a scene: trailer"):
         build({**file_of("braking").BARE, "effects": {"trailer": {}}}, "s.toml")
 
@@ -102,9 +102,9 @@ def test_a_remedy_that_would_break_another_law_says_so():
 
 def test_what_cannot_be_put_in_is_refused():
     with pytest.raises(InputError, match="'delay' cannot be in this scene"):
-        beside(load(SCENES / "ride_nonlinear.toml"), "delay")
+        with_effects(load(SCENES / "ride_nonlinear.toml"), "delay")
     with pytest.raises(InputError, match="there are no usual values"):
-        beside(bare("braking"), "measured_pressures")
+        with_effects(bare("braking"), "measured_pressures")
 
 
 @pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if own.effects])
@@ -127,6 +127,6 @@ def test_a_plan_lists_effects_and_what_is_absent():
 
 def test_a_path_is_the_same_whatever_ran_before():
     scene = bare("contact")
-    before = seen("contact", scene)
-    seen("contact", beside(scene, "saturation", "falling_friction"))
-    assert seen("contact", scene) == before
+    before = counts_and_paths("contact", scene)
+    counts_and_paths("contact", with_effects(scene, "saturation", "falling_friction"))
+    assert counts_and_paths("contact", scene) == before

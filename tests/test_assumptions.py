@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core import told
-from models.core.assumptions import Assumption, assumption_lines, broken_of, judged
+from models.core.assumptions import Assumption, assumption_lines, broken_of, with_assumptions
 from models.core.result import load
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
@@ -53,14 +53,14 @@ def test_shares_times_and_worst_values_are_those_of_the_channel(lifted):
     reference = lifted["reference"]
     values = np.zeros(len(reference.times))
     values[10:20], values[50] = -3.0, 2.5
-    (one,) = broken_of(judged(reference, [watched(values)]))
+    (one,) = broken_of(with_assumptions(reference, [watched(values)]))
     assert one.share == pytest.approx(11 / len(values)) and one.first == reference.times[10] and one.worst == -3.0
     assert "(allowed from -1 to 2 m); slow down" in one.line()
 
 
 @pytest.mark.parametrize("value", [-1.0, 2.0])
 def test_the_edges_are_allowed(lifted, value):
-    kept = judged(lifted["mujoco"], [watched(np.full(len(lifted["mujoco"].times), value))])
+    kept = with_assumptions(lifted["mujoco"], [watched(np.full(len(lifted["mujoco"].times), value))])
     assert broken_of(kept) == [] and json.loads(kept.data.attrs["assumptions"])["assumed"]
 
 

@@ -55,7 +55,7 @@ def test_a_stop_at_the_edge_of_locking_finishes():
 
 @pytest.mark.full
 def test_random_legal_stops_finish():
-    ends = [rows.finished(number) for number in range(rows.STOPS[False])]
+    ends = [rows.ending_text(number) for number in range(rows.STOPS[False])]
     assert [end for end in ends if end and not any(limit in end for limit in rows.LIMITS)] == []
 
 

@@ -32,7 +32,7 @@ def test_every_scheme_comes_to_the_reference(short, method, bound):
 def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatch):
     assert short.uncertainty["stopping distance"] < 1e-6
     monkeypatch.setattr(short, "change", 0.31)
-    moved = abs(short._by("DOP853", 1e-8) - short.true)
+    moved = abs(short._distance_by_scipy("DOP853", 1e-8) - short.true)
     assert moved > 1e-5, "ten times the bound of the exact wheel: that test sees a change that is 1 cm off"
 
 
@@ -52,7 +52,7 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
         engine=Carried(engine, FRONT.plane),
     )
     path = stop.run(Played(short.valves), 2.0)
-    assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._ours(2).distance, abs=1e-12)
+    assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._stop_by_twinrig(2).distance, abs=1e-12)
 
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):

@@ -4,7 +4,7 @@ import pytest
 
 from models.brake.port.sensors import Conversion
 from models.core.errors import InputError
-from models.core.scene_effects import beside, legal, named, without
+from models.core.scene_effects import legal, named, with_effects, without
 from validation.absence.of_systems import bare
 
 SENSORS = tuple(f"{what}_{how}" for what in ("signal", "pressure") for how in ("noise", "quantisation", "calibration"))
@@ -12,7 +12,7 @@ SENSORS = tuple(f"{what}_{how}" for what in ("signal", "pressure") for how in ("
 
 @pytest.fixture(scope="module")
 def full():
-    return beside(bare("braking"), "port", *SENSORS)
+    return with_effects(bare("braking"), "port", *SENSORS)
 
 
 @pytest.mark.parametrize("name", SENSORS)

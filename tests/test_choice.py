@@ -16,8 +16,8 @@ from models.advice.price.effects import price_list
 from models.advice.price.effects_text import as_dict, lines
 from models.core.errors import InputError
 from studies import choice as study
-from studies.command.asked import KNOWN, ready
-from validation.choice.drawn_scenes import drawn
+from studies.command.asked import KNOWN, checked_study
+from validation.choice.drawn_scenes import draw_scene
 
 ROAD = {"source": "study", "speed": 20.0}
 
@@ -175,7 +175,7 @@ def test_a_part_of_a_run_has_a_length_that_the_scene_may_have():
 def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.choice.choice_figure", lambda found, path: None)
     scene = hub_forces(run={"duration": 0.04, "step": 1e-3})
-    ready(scene, ("exudyn", "mujoco"))
+    checked_study(scene, ("exudyn", "mujoco"))
     (found,) = study.run(scene, ("exudyn", "mujoco"), tmp_path, lambda said, share: None)["answer"]
     assert found["implementation"] == "mujoco" and found["kept"]
 
@@ -190,7 +190,7 @@ def test_what_only_rounds_does_not_move():
 
 
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
-    asked = drawn("pitch-plane", 3)
+    asked = draw_scene("pitch-plane", 3)
     choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
     assert choice.within_tolerance and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
 
@@ -238,7 +238,7 @@ def test_auto_alone_names_the_study():
 
 def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
     """A clock that runs wild changes the seconds that are reported, and nothing else of the choice."""
-    asked, draw, found = drawn("pitch-plane", 4), np.random.default_rng(1), []
+    asked, draw, found = draw_scene("pitch-plane", 4), np.random.default_rng(1), []
     for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
         monkeypatch.setattr("time.process_time", clock)
         found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())

@@ -21,8 +21,8 @@ from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, HEADER, answer
 from models.systems.contact.run import Built, contact
 from models.systems.contact.scene import Method, build
-from models.systems.contact.work_precision import TheoryPoint, cheapest, exact
-from studies.contact_table import told
+from models.systems.contact.work_precision import TheoryPoint, cheapest, with_exact_forces
+from studies.contact_table import summary_lines
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
 from validation.price.problems import contact_alone
@@ -288,8 +288,8 @@ def test_a_table_is_found_in_the_folder_of_the_command(twinrig, capsys):
 
 
 def test_rows_are_counted_in_words_that_fit():
-    assert told(0, 0, "a.csv", 0.6) == ["  no rows in a.csv"]
-    one, many = told(1, 0, "a.csv", 0.6), told(3, 1, "a.csv", 0.6)
+    assert summary_lines(0, 0, "a.csv", 0.6) == ["  no rows in a.csv"]
+    one, many = summary_lines(1, 0, "a.csv", 0.6), summary_lines(3, 1, "a.csv", 0.6)
     assert one[0] == "  1 row of a.csv, sound" and "a row" not in one[1]
     assert many[0] == "  3 rows of a.csv; 1 of them wrong, see their status" and "200 ms a row" in many[1]
 
@@ -312,7 +312,7 @@ def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
     assert len(unseen) == 300 and max(case.error for case in unseen) < 0.006
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
     for one in (case, unseen[4]):
-        assert np.linalg.norm(exact(one, (20,)).force - one.force) < 0.01
+        assert np.linalg.norm(with_exact_forces(one, (20,)).force - one.force) < 0.01
     assert case.limit == FRICTION * LOAD
 
 

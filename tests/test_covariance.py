@@ -10,7 +10,7 @@ from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_ha
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.marginal import Unstable, parts
+from models.ride.marginal import Unstable, split_marginal
 from models.ride.sweep import ASKED, sweep
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
@@ -193,7 +193,7 @@ def free():
 def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     plain, _, road = free
     one = excited(plain, road, 20.0)
-    split = parts(one.A)
+    split = split_marginal(one.A)
     assert (split.marginal, split.zeros) == (3, 3)
     assert np.linalg.matrix_rank(split.M, 1e-6) == 1  # y and yaw are one Jordan pair
     found = stationary(one)

@@ -16,7 +16,7 @@ from models.systems.pitch_plane.plan import describe, trust_line
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.tangent import TangentPath, covariance, path_of, swing, tilted
-from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
+from models.systems.pitch_plane.trust import growth, interpolation, model, noise, predict_trust
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from studies.command.asked import SCENES
 from studies.trust import run as run_study
@@ -133,13 +133,13 @@ def test_held_run_has_no_path(folder):
     held = pitch_spring.extend(assembly, pitch_spring.Parameters(stiffness=100.0))
     with pytest.raises(ValueError, match="held"):
         path_of(held)
-    assert trust(held) is None and trust_line(held) == []
+    assert predict_trust(held) is None and trust_line(held) == []
 
 
 def test_trust_names_what_comes_first(folder):
     """Noise of 300 N drifts off in seconds; without it and at 1 kHz six seconds are not limited by anything."""
     noisy = force_scene(folder, duration=6.0, effects={"force_noise": {"deviation": 300.0}})
-    name, time = trust(assemble(noisy)).until
+    name, time = predict_trust(assemble(noisy)).until
     assert "300 N at 1000 Hz" in name and 1.0 < time < 4.0
     assert "trusted until about" in describe(noisy)
     assert "nothing known limits" in describe(force_scene(folder, duration=6.0))

@@ -34,7 +34,7 @@ from validation.hard_cases import (
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
 
 ALL = tuple(case for _, case in cases_by_family())
-QUICK = {case.name for _, case in hard_cases.some(cases_by_family())}
+QUICK = {case.name for _, case in hard_cases.quick_cases(cases_by_family())}
 JUDGED = [
     pytest.param(case, name, id=f"{case.name}-{name}", marks=[] if case.name in QUICK else [pytest.mark.full])
     for case in ALL
@@ -194,7 +194,7 @@ def test_every_file_of_the_folder_is_a_family_in_the_table():
 
 def test_the_quick_share_has_cases_of_every_family():
     known = cases_by_family()
-    own = hard_cases.some(known)
+    own = hard_cases.quick_cases(known)
     assert {family for family, _ in own} == set(FAMILIES) and all(pair in known for pair in own)
     assert len(own) <= len(FAMILIES) + len(known) / hard_cases.EVERY
 

@@ -12,7 +12,7 @@ from models.engines.cut_vehicle import build
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.systems.hub_forces.measurement import Angles, HubForces, recorded, true_run, two_tracks
 from models.systems.hub_forces.run import run, with_angles
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate, pulled
@@ -60,7 +60,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
 def measured():
     car, step = r19(), 2e-3
     hub_inputs = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
-    true = truth("mujoco", car, hub_inputs, "hub", step, 1.0)
+    true = true_run("mujoco", car, hub_inputs, "hub", step, 1.0)
     return car, true, *recorded(true, "hub", 1)
 
 

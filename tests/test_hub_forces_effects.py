@@ -8,7 +8,7 @@ import pytest
 
 from models.advice.choice.systems.hub_forces import computed_quantities
 from models.core.errors import InputError
-from models.core.scene_effects import beside, legal, named, without
+from models.core.scene_effects import legal, named, with_effects, without
 from models.systems.hub_forces.comparison import planned_runs
 from models.systems.hub_forces.measurement import recorded
 from models.systems.hub_forces.run import measure
@@ -52,8 +52,8 @@ def test_what_is_stated_stays_without_noise():
 def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():
     held = scene(stabilise={"method": "kalman"})
     assert without(held, "kalman_filter").stabilise.method == "none"
-    assert beside(held, "prescribed_angles").stabilise.method == "prescribed"
-    assert without(beside(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
+    assert with_effects(held, "prescribed_angles").stabilise.method == "prescribed"
+    assert without(with_effects(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.tables import ended
+from models.core.tables import has_line_end
 from models.core.time_series import read_time_series, write_time_series
 from models.measured.axle_forces import IN_FILE, AxleForces, check
 from models.measured.signal import Signal
@@ -290,7 +290,7 @@ def test_a_whole_row_without_a_line_end_is_read_and_remarked_on(tmp_path):
     own = scene(tmp_path, forces)
     path = tmp_path / "f.csv"
     path.write_text(path.read_text().rstrip("\n"))
-    assert not ended(path)
+    assert not has_line_end(path)
     values, _ = read_time_series(path, {"front": {"N": 1.0}, "rear": {"N": 1.0}})
     np.testing.assert_array_equal(values, forces)
     notes = [finding for finding in findings_of(own) if finding.check == "file"]

@@ -18,7 +18,7 @@ from models.ride.nonlinear_copies import CopiesMarch, copies_in_time
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import statistically_linear
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.hub_forces.scene import build as build_hubs
 from models.systems.pitch_plane.effects import lift_off
 from models.systems.pitch_plane.run import run as simulate
@@ -328,14 +328,14 @@ def hubs(road_class="E", **effects):
 def test_hub_forces_of_wheels_in_the_air_are_none_in_every_engine():
     car, roads = hubs(lift_off={}), [iso8608_road("E", seed) for seed in (1, 2)]
     drive = two_tracks(car, *roads, 20.0, 1e-3, 2000)
-    runs = {engine: truth(engine, car, drive, "inertial", 1e-3, 2.0) for engine in ENGINES}
+    runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, 2.0) for engine in ENGINES}
     for engine in ENGINES[1:]:
         assert np.abs(runs[engine].states - runs["reference"].states).max() < 1e-12
     wrenches = runs["reference"].wrenches
     air = wrenches[:, :, 2] == 0.0
     assert wrenches[:, :, 2].min() == 0.0 and 0.02 < air.mean() < 0.3
     assert np.abs(wrenches[air]).max() == 0.0  # neither along nor across, and no moment
-    linear = truth("reference", hubs(), drive, "inertial", 1e-3, 2.0).wrenches
+    linear = true_run("reference", hubs(), drive, "inertial", 1e-3, 2.0).wrenches
     assert linear[:, :, 2].min() < -1000.0
 
 

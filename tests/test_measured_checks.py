@@ -14,14 +14,14 @@ from models.measured.checks.response import SensorResponse
 from models.measured.checks.spectra import mean
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
-from models.measured.ratios import wrong
+from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal, TransducerPlace
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
-from models.systems.measured.consequences import CORRECTIONS, Consequence, told
+from models.systems.measured.consequences import CORRECTIONS, Consequence, consequence_texts
 from models.systems.measured.inputs import Inputs
 from models.systems.measured.section_run import Outcome
-from models.systems.measured.verdict import surprised
+from models.systems.measured.verdict import filter_doubts
 from models.systems.measured.virtual import VirtualMeasurement, recording
 from models.vehicles.cut_vehicle import rigid
 from validation.cases import measured_checks as case
@@ -65,11 +65,11 @@ def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_pat
     samples = ridden.samples(Faults(noise=bench.NOISE), 3)[: round(seconds / PERIOD)]
     turning_alone = [i for i, s in enumerate(ridden.signals) if s.quantity != "acceleration"]
     few = replace(ridden, signals=tuple(ridden.signals[i] for i in turning_alone))
-    assert not bench.findings(few, samples[:, turning_alone], tmp_path)
+    assert not bench.errors_and_doubts(few, samples[:, turning_alone], tmp_path)
     hubs = [i for i in turning_alone if ridden.signals[i].at in ridden.vehicle.hubs]
     others = samples[::-1, turning_alone].copy()  # the motion backwards: by these forces nobody moves so
     others[:, : len(hubs)] = samples[:, hubs]
-    said = bench.findings(few, others, tmp_path)
+    said = bench.errors_and_doubts(few, others, tmp_path)
     assert seconds < 2.0 or any(one.check in ("swapped", "shift", "sign") for one in said)
 
 
@@ -82,7 +82,7 @@ def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
 
 
 def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
-    assert not bench.findings(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path)
+    assert not bench.errors_and_doubts(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
 )
 def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, tmp_path):
     # the mean moment of the hub forces is what the gyros say that it must be
-    (found,) = bench.findings(ridden, ridden.samples(Faults(noise=bench.NOISE, **fault), 5), tmp_path)
+    (found,) = bench.errors_and_doubts(ridden, ridden.samples(Faults(noise=bench.NOISE, **fault), 5), tmp_path)
     assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
 
 
@@ -103,7 +103,7 @@ def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE), 5)
     one, other = bench.columns(ridden, *pair)
     samples[:, [one, other]] = samples[:, [other, one]]
-    found = bench.findings(ridden, samples, tmp_path)
+    found = bench.errors_and_doubts(ridden, samples, tmp_path)
     assert [(f.check, set(f.signals)) for f in found if f.check in ("exchanged", "sign", "shift", "swapped")] == [
         ("exchanged", set(pair))
     ]
@@ -148,7 +148,9 @@ def test_many_findings_of_one_kind_are_one_line_with_the_worst():
     ]
     assert gathered(gap[:3]) == gap[:3] and len(queries(gap)) == 20
     effects = [Consequence(one, "s F", 1e-3 * one.size, 1.0) for one in gap]
-    assert len(told(effects[:3])) == 3 and told(effects) == [f"{effects[19]}, the worst of 20"]
+    assert len(consequence_texts(effects[:3])) == 3 and consequence_texts(effects) == [
+        f"{effects[19]}, the worst of 20"
+    ]
 
 
 def test_the_slope_of_delays_and_its_error_by_their_scatter():
@@ -251,7 +253,7 @@ def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE), 5)
     samples[1000, bench.columns(ridden, "rr_fz")] += 5e4
     samples[:, bench.columns(ridden, "rr_fz")] *= 1e-3
-    assert {(one.check, one.weight) for one in bench.findings(ridden, samples, tmp_path)} >= {
+    assert {(one.check, one.weight) for one in bench.errors_and_doubts(ridden, samples, tmp_path)} >= {
         ("spikes", "doubt"),
         ("unit", "error"),
     }
@@ -307,8 +309,8 @@ def test_the_mean_of_a_windowed_record_is_as_good_as_it_says():
 @pytest.mark.parametrize(("ratio", "kind"), [(1.02, "gain"), (1e3, "unit"), (-1.0, "sign"), (0.5, "size")])
 def test_a_ratio_says_what_is_wrong(ratio, kind):
     own = Signal("fz", "", "fz", "force", "fl", "z", "hub", 1, "kN", 1e3)
-    assert wrong(ratio, own)[0] == kind
-    assert kind != "unit" or wrong(ratio, own)[1] == "N taken for kN"
+    assert probable_mistake(ratio, own)[0] == kind
+    assert kind != "unit" or probable_mistake(ratio, own)[1] == "N taken for kN"
 
 
 def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp_path):
@@ -337,7 +339,7 @@ def test_without_a_vehicle_every_check_says_what_it_would_need(tmp_path):
 def test_a_filter_that_is_surprised_by_its_measurements_is_a_doubt(tmp_path):
     """NaN is a run without a filter."""
     columns = made(tmp_path, force_z=white()).columns
-    told = [surprised(Outcome(columns, (), PERIOD, 2, surprise, ())) for surprise in (1.2, np.nan, 2.5)]
+    told = [filter_doubts(Outcome(columns, (), PERIOD, 2, surprise, ())) for surprise in (1.2, np.nan, 2.5)]
     assert told[:2] == [(), ()]
     assert [(one.weight, one.size) for one in told[2]] == [("doubt", 2.5)]
 
@@ -355,7 +357,7 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
 def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
     bench.referred(lever, *hubs)(ridden, samples)
-    said = bench.findings(ridden, samples, tmp_path)
+    said = bench.errors_and_doubts(ridden, samples, tmp_path)
     assert [one.check for one in said] == ["lever"]
     # the fit has a standard error of 0.01 m here, and the vehicle is not linear
     assert said[0].size == pytest.approx(lever, abs=0.04)

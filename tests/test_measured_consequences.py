@@ -12,7 +12,7 @@ from models.drift.score import Verdict, rms
 from models.fatigue.damage import SLOPE, damage_ratio
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
-from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, consequences, judged
+from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, consequences, verdict_with_consequences
 from models.systems.measured.section_run import Hold, Outcome, SectionRun, run
 from models.systems.measured.sections import Sections
 from models.systems.measured.virtual import VirtualMeasurement, recording
@@ -91,6 +91,9 @@ def test_words_follow_the_bounds():
         replace(one, force=2 * FORCE[1]),
         Consequence(finding),
     )
-    words = [judged(good, [each]).word for each in several]
+    words = [verdict_with_consequences(good, [each]).word for each in several]
     assert words == ["accepted", "accepted with doubt", "rejected", "rejected", "accepted with doubt"]
-    assert judged(good, []) is good and judged(Verdict("stabilise", ""), [one]).word == "stabilise"
+    assert (
+        verdict_with_consequences(good, []) is good
+        and verdict_with_consequences(Verdict("stabilise", ""), [one]).word == "stabilise"
+    )

@@ -10,7 +10,7 @@ from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
 from models.core.result import load as load_result
-from models.core.scene_effects import absent, beside, named, without
+from models.core.scene_effects import absent_effects, named, with_effects, without
 from models.core.systems import load
 from models.measured.columns import Columns
 from models.systems import run
@@ -22,8 +22,8 @@ from validation.absence.of_systems import bare
 
 def test_each_fault_of_transducers_comes_and_goes_alone():
     scene = load(SCENES / "recording.toml")
-    assert "sensor_noise" in named(scene) and {*FAULTS} - {"sensor_noise"} <= {*absent(scene)}
-    full = beside(scene, *(name for name in FAULTS if name != "sensor_noise"))
+    assert "sensor_noise" in named(scene) and {*FAULTS} - {"sensor_noise"} <= {*absent_effects(scene)}
+    full = with_effects(scene, *(name for name in FAULTS if name != "sensor_noise"))
     for name in FAULTS:
         assert {*named(full)} - {*named(without(full, name))} == {name}
     assert without(full, *FAULTS).virtual.faults == type(full.virtual.faults)()  # nothing of any is left
@@ -32,7 +32,7 @@ def test_each_fault_of_transducers_comes_and_goes_alone():
 @pytest.mark.parametrize("name", FAULTS)
 def test_files_have_the_faults_that_they_have(name):
     with pytest.raises(InputError, match=r"virtual.faults.* needs a table \[virtual\], for files have the faults"):
-        beside(bare("measured"), name)
+        with_effects(bare("measured"), name)
 
 
 def short(**more):
@@ -50,7 +50,7 @@ def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
     noisy = short()
     told = [
         measured.computed_quantities(own, "mujoco")
-        for own in (noisy, without(noisy, "sensor_noise"), beside(noisy, "offsets"))
+        for own in (noisy, without(noisy, "sensor_noise"), with_effects(noisy, "offsets"))
     ]
     seats = [one.quantities["left seat F"].cases[0] for one in told]
     assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
@@ -117,4 +117,4 @@ def test_auto_leaves_out_what_the_question_does_not_see():
 
 def test_a_stabiliser_leaves_for_none_as_the_other_one_costs_more():
     for name in ("kalman_filter", "prescribed_angles"):
-        assert without(beside(short(), name), name).stabilise.method == "none"
+        assert without(with_effects(short(), name), name).stabilise.method == "none"

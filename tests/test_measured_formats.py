@@ -15,7 +15,7 @@ from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
 from validation.measured.measured_files import tdms as tdms_files
-from validation.measured.measured_files.odd import FX, FZ, TIMES, Sweep, read, two_rates, usual, written
+from validation.measured.measured_files.odd import FX, FZ, TIMES, CutSweep, read, two_rates, usual, written
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 
@@ -252,7 +252,7 @@ def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):
 
 
 def test_without_the_count_of_columns_a_short_row_is_filled_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_rows, "_even", lambda *_: None)
+    monkeypatch.setattr(csv_rows, "_refuse_uneven_row", lambda *_: None)
     assert odd(csv_files, "CSV with a short row").error(tmp_path) == np.inf
 
 
@@ -268,7 +268,7 @@ def test_without_the_walk_over_segments_a_cut_is_silent(tmp_path, monkeypatch):
 
 
 def test_without_the_announced_rows_a_cut_at_a_line_end_is_silent(tmp_path, monkeypatch):
-    monkeypatch.setattr(csv_format, "_ends", lambda *_: [])
+    monkeypatch.setattr(csv_format, "_findings_on_end", lambda *_: [])
     assert odd(csv_files, "CSV cut at a line end").error(tmp_path) == np.inf
 
 
@@ -282,7 +282,7 @@ def test_the_usual_file_is_what_the_truth_says(tmp_path):
 @pytest.mark.full
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_no_cut_at_any_byte_is_silent(tmp_path, extension):
-    sweep = Sweep(extension, 2000 if extension == ".rsp" else 0)  # its samples fill 57,000 bytes
+    sweep = CutSweep(extension, 2000 if extension == ".rsp" else 0)  # its samples fill 57,000 bytes
     assert sweep.silent(tmp_path) == 0
 
 

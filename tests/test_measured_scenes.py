@@ -20,7 +20,7 @@ from models.systems.measured.clock import record
 from models.systems.measured.listing import describe, guess
 from models.systems.measured.plan import check
 from models.systems.measured.scene import build
-from studies.command.summary_numbers import numbers
+from studies.command.summary_numbers import summary_scalars
 from studies.recording import run
 
 HUBS = ("fl", "fr")
@@ -389,7 +389,7 @@ def test_from_the_road_to_the_page(tmp_path):
     assert saved["section_force"].values.tolist() == list(summary["channels"]) and saved.attrs["system"] == "measured"
     assert saved["greatest"].values[0] == block.values.max() and saved["damage"].shape == (7, 1)
     assert np.array_equal(saved["front left F"].values, block.values[:, 0]) and saved.attrs["run"] == "kalman"
-    assert numbers(summary)["front left F, max [N]"] == np.abs(block.values).max()  # what a sweep draws
+    assert summary_scalars(summary)["front left F, max [N]"] == np.abs(block.values).max()  # what a sweep draws
 
 
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

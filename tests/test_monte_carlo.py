@@ -6,7 +6,7 @@ from scipy.linalg import block_diag, expm
 
 from models.core.errors import InputError
 from models.ride.covariance import stationary
-from models.ride.monte_carlo import MODES, _Cells, along, at_constant_speed, path_cell
+from models.ride.monte_carlo import MODES, _Cells, at_constant_speed, path_cell, variances_along_drive
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
@@ -44,11 +44,11 @@ def test_a_cell_fits_all_distances():
 def test_copies_along_a_drive_agree_with_the_covariance():
     vehicle, road = ride("half_car")
     brake = SpeedProfile((0.0, 1.0), (16.0, 8.0))
-    found = along(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
+    found = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
     exact = varying_speed(vehicle, road, brake, instants=found.time).at(found.time)
     assert np.abs(found.z(exact)).max() < 4.0  # sixteen values: one run in a thousand would fail
     assert found.error / found.variance == pytest.approx(np.full((2, 8), (2.0 / 1000) ** 0.5), rel=0.15)
-    again = along(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
+    again = variances_along_drive(vehicle, road, brake, (0.5, 0.9), copies=1000, seed=SEED)
     assert np.array_equal(found.variance, again.variance)
 
 
@@ -71,4 +71,4 @@ def test_outputs_with_white_noise_have_no_variance_and_no_z():
 
 def test_a_standstill_is_refused():
     with pytest.raises(InputError, match="steps along the road"):
-        along(*ride("half_car"), SpeedProfile((0.0, 1.0), (3.0, 0.0)), (0.5,))
+        variances_along_drive(*ride("half_car"), SpeedProfile((0.0, 1.0), (3.0, 0.0)), (0.5,))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_effects import beside, extended, names_of, own_table, rebuilt
+from models.core.scene_effects import extended, names_of, own_table, rebuilt, with_effects
 from models.core.systems import DEFAULT, SYSTEMS
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
@@ -67,7 +67,7 @@ def test_a_new_effect_of_the_pitch_plane(new_file, tmp_path, capsys):
     assert "anchor" in names_of(DEFAULT)
     list_scenes()
     assert "A rope that draws the chassis level" in capsys.readouterr().out
-    scene = beside(absent.scene({}, 20, tmp_path), "anchor")
+    scene = with_effects(absent.scene({}, 20, tmp_path), "anchor")
     assert "effect     anchor: one native spring" in describe(scene) and "rope" in describe(scene)
     runs = {engine: simulate(scene, engine) for engine in absent.ENGINES}
     for engine, run in runs.items():
@@ -82,7 +82,7 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     assert "Chambers that are clogged" in capsys.readouterr().out
     found = added("braking", "slow_chambers", quick=True)
     assert found == declared("braking", "slow_chambers", ["reference"])
-    scene = beside(bare("braking"), "slow_chambers")
+    scene = with_effects(bare("braking"), "slow_chambers")
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)
 
 

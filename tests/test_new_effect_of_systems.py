@@ -12,7 +12,7 @@ from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import Changed, price_list
 from models.advice.ride_choice.reduced import FullScene
 from models.core.errors import InputError
-from models.core.scene_effects import beside, listing, own_table, rebuilt, without
+from models.core.scene_effects import listing, own_table, rebuilt, with_effects, without
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
@@ -32,7 +32,7 @@ from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies.command.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
-from validation.absence.of_systems import added, bare, declared, seen
+from validation.absence.of_systems import added, bare, counts_and_paths, declared
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class New:
     counts: str
     extend: str
     apart: float = 1e-12
-    beside: tuple[str, ...] = ()
+    with_effects: tuple[str, ...] = ()
 
     @property
     def text(self):
@@ -165,17 +165,20 @@ NEW = {
 @pytest.mark.parametrize("system", NEW)
 def test_a_new_effect_is_one_file(system, new_file):
     new, scene = NEW[system], bare(system)
-    before, table = seen(system, scene), own_table(scene) | {"effects": {NEW[system].name: {}}}
+    before, table = counts_and_paths(system, scene), own_table(scene) | {"effects": {NEW[system].name: {}}}
     with pytest.raises(InputError, match="no such effect"):
         rebuilt(table, scene)
     new_file(system, new.name, new.text)
     assert listing(system)[new.name] == f"New: {new.name}"
     assert added(system, new.name, quick=True) == declared(system, new.name, [next(iter(before))])
-    own = beside(scene, new.name)
+    own = with_effects(scene, new.name)
     assert f" {new.name}: what {new.name} costs" in import_module(SYSTEMS[system].plan).describe(own)
-    _judged(before, seen(system, own), new.apart)
+    _judged(before, counts_and_paths(system, own), new.apart)
     assert without(own, new.name) == scene  # and the very path that it had before there was a file:
-    assert all(before[engine] == found for engine, found in seen(system, without(own, new.name), quick=True).items())
+    assert all(
+        before[engine] == found
+        for engine, found in counts_and_paths(system, without(own, new.name), quick=True).items()
+    )
     with pytest.raises(InputError, match=rf"effects.{new.name}.{new.parameter} = -1"):
         rebuilt(table | {"effects": {new.name: {new.parameter: -1.0}}}, scene)
 
@@ -231,7 +234,7 @@ def test_a_new_effect_of_ride_is_in_every_linear_vehicle_and_in_both_engines(new
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace("second_corner", "measured_road"))
     scene = build_ride(HALF_CAR)
-    own = beside(scene, "dampers", "tread")
+    own = with_effects(scene, "dampers", "tread")
     vehicle, road = vehicle_of(own), excitation_of(own, wheels(vehicle_of(own)))
     by = {engine: linear_vehicle(vehicle, engine)(20.0).damping for engine in SYSTEMS["ride"].engines}
     bare_one = linear_vehicle(vehicle_of(scene))(20.0).damping
@@ -249,7 +252,7 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace("COST", 'NEEDS = ("delay", "dampers")\nCOST', 1))
     scene = load(SCENES / "ride_choice.toml")
-    held = ReducedScene.complete(own := beside(scene, "dampers", "tread"))
+    held = ReducedScene.complete(own := with_effects(scene, "dampers", "tread"))
     there = {effect.name: effect for effect in effects_of(held)}
     assert {"dampers", "tread"} <= there.keys() and there["delay front to rear"].needs == ("tread",)
     assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([there["dampers"]])
@@ -259,7 +262,7 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     known = FullScene(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
     monkeypatch.setattr(effects_of_ride, "STEPS", 20)
-    monkeypatch.setattr(effects_of_ride, "absent", lambda scene: ("gravity_and_preload", "drag", "weighting"))
+    monkeypatch.setattr(effects_of_ride, "absent_effects", lambda scene: ("gravity_and_preload", "drag", "weighting"))
     prices = {price.name: price for price in price_list(own).prices}
     assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
     assert prices["tread"].changes[0].relative > 0.01 and prices["tread"].changes[0].unit == "m/s^2"
@@ -326,7 +329,7 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
         ).text,
     )
     scene = build_contact(CONTACT | {"ellipse": None, "profiles": {}, "method": {"name": "simplified"}})
-    assert contact(beside(scene, "ground")).pressing.area < contact(scene).pressing.area
+    assert contact(with_effects(scene, "ground")).pressing.area < contact(scene).pressing.area
     new_file(
         "contact",
         "worn_in",
@@ -344,7 +347,7 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
         ).text,
     )
     with pytest.raises(InputError, match=r"'simplified': has constant friction, .*: use fastsim"):
-        contact(beside(scene, "worn_in"))
+        contact(with_effects(scene, "worn_in"))
 
 
 @pytest.mark.parametrize("system", [name for name in NEW if name != "measured"])
@@ -352,7 +355,7 @@ def test_a_new_effect_cannot_stand_beside_what_it_excludes(system, new_file):
     new = NEW[system]
     new_file(system, new.name, new.text)
     with pytest.raises(InputError, match=f"cannot stand beside '{new.excludes}', which it would be twice: drop one"):
-        beside(bare(system), *new.beside, new.excludes, new.name)
+        with_effects(bare(system), *new.beside, new.excludes, new.name)
 
 
 @pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if not own.effects])
@@ -367,14 +370,14 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     new_file(system, NEW[system].name, NEW[system].text)
     scene = bare(system)
     runs = system_of(scene)
-    less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, beside(scene, NEW[system].name)))
+    less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, with_effects(scene, NEW[system].name)))
     assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
 
 
 def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
     monkeypatch.setattr(effects, "ROUNDS", 3)
     new_file("contact", NEW["contact"].name, NEW["contact"].text)
-    for scene in (bare("contact"), beside(bare("contact"), "soft_bodies")):
+    for scene in (bare("contact"), with_effects(bare("contact"), "soft_bodies")):
         price = next(price for price in price_list(scene).prices if price.name == "soft_bodies")
         assert (price.why, price.there) == ("", bool(scene.effects)) and np.isfinite(price.micros[0])
         assert 0.1 < price.changes[0].relative < 1.1  # half the modulus halves the forces on a given ellipse

@@ -50,7 +50,7 @@ def drawn(seed, count, widest=30.0):
         c11, c22, c23, _ = plain.coefficients(ratio, PAIR.nu)
         most = 10.0 ** draw.uniform(-1.5, 1.0) * mu * load / (PAIR.G * size**2)
         motion = most * draw.normal(size=3) / (c11, c22, c23 * size)
-        ellipses.append(plain.Ellipse(a, b, load, mu, *motion, plain.flexibilities(a, b, PAIR.G, PAIR.nu)))
+        ellipses.append(plain.PlainEllipse(a, b, load, mu, *motion, plain.flexibilities(a, b, PAIR.G, PAIR.nu)))
     return ellipses
 
 
@@ -169,7 +169,7 @@ def test_the_kernel_from_curvatures_to_forces(cells):
         flexible = plain.flexibilities(a, b, PAIR.G, PAIR.nu)
         grown = (ellipse.a * ellipse.b / (a * b)) ** 0.5
         motion = ellipse.xi_x * grown**2, ellipse.xi_y * grown**2, ellipse.spin * grown**3
-        ellipse = plain.Ellipse(a, b, ellipse.load, ellipse.mu, *motion, flexible)
+        ellipse = plain.PlainEllipse(a, b, ellipse.load, ellipse.mu, *motion, flexible)
         expected = plain.fastsim(ellipse, plain.Program(cells))[0] if cells else linear(ellipse)
         unit = units(ellipse) * max(1.0, np.abs(expected[:3] / units(ellipse)).max())
         shapes = (A, B, ellipse.load), (A, B, approach), (a, b, ellipse.load), (a, b, approach)

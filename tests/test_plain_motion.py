@@ -11,7 +11,7 @@ from models.engines.spatial_reference import SpatialReference
 from models.multibody import plain
 from models.multibody.plain.march import march
 from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import mass, preloads
@@ -26,7 +26,7 @@ ROUNDING = 1e-12
 def acceleration(vehicle: SpatialVehicle, gravity: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Accelerations of bodies under their weights, springs and bars without preloads, axes fixed in space."""
     bodies = Bodies(vehicle)
-    motion, parts = bodies.move(q, v), Parts(bodies, vehicle, None)
+    motion, parts = bodies.move(q, v), PlainParts(bodies, vehicle, None)
     matrix, force = bodies.inertia(motion, np.array([0.0, 0.0, -gravity]))
     travels = parts.travels(motion, q, v)
     spring, other = parts.forces(travels, np.zeros(len(parts.names)))

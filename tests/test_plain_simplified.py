@@ -16,7 +16,7 @@ from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import FineNet, covariances, drag, gather, push, slope_products
-from models.contact.simplified_theory import Options, press, roll
+from models.contact.simplified_theory import SimplifiedOptions, press, roll
 from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
 
@@ -34,7 +34,7 @@ HEIGHTS = {
         (0.0, 0.0),
     ),
 }
-OPTIONS = (Options(), Options(net=9, shape="parabolic", fit="gradient"))
+OPTIONS = (SimplifiedOptions(), SimplifiedOptions(net=9, shape="parabolic", fit="gradient"))
 
 
 @cache
@@ -42,7 +42,7 @@ def bodies(name):
     """The package's distance and the plain one."""
     height, bottom = HEIGHTS[name]
     heights = height(X[None, :], Y[:, None])
-    return from_arrays(X, Y, heights), plain.Bodies(X, Y, heights, bottom)
+    return from_arrays(X, Y, heights), plain.PlainBodies(X, Y, heights, bottom)
 
 
 @cache

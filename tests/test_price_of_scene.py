@@ -13,7 +13,7 @@ from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import priced_scene
 from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import at
-from models.core.assumptions import Assumption, judged
+from models.core.assumptions import Assumption, with_assumptions
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.engines import outside
@@ -105,7 +105,7 @@ class Lifting(Planted):
     def solve(self, setting, duration):
         force = 5.0 if setting.value <= 0.02 and not self.always else -5.0
         run = Result(xr.Dataset(attrs={"status": "complete"}))
-        judged(
+        with_assumptions(
             run, [Assumption("press", "tyres press", "name lift_off", lambda run: {"t": np.array([force])}, "N", 0.0)]
         )
         return super().solve(setting, duration)

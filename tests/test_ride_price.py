@@ -23,6 +23,6 @@ def test_a_route_that_loses_digits_fails_its_row(measured):
     lossy = [
         ride.RoutePoint(**{**vars(p), "errors": {"tyre forces": 1e-8}}) if "Lyapunov" in p.name else p for p in points
     ]
-    known = ride.Ride(None, {}, None, 1e-12)
+    known = ride.PricedRide(None, {}, None, 1e-12)
     failed = [row.id for row in ride.judged(known, lossy) if row.status == "failed"]
     assert failed == ["price.ride.error.Lyapunov"]

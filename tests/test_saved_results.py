@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from models.core.result import load
-from studies.command.asked import SCENES, engines_of, load_scene, ready
+from studies.command.asked import SCENES, checked_study, engines_of, load_scene
 from validation.replay.jobs import SHORTER
 
 LESS = tomllib.loads(SHORTER.read_text())
@@ -21,7 +21,7 @@ OTHERS = ("animation", "choice", "choice_hub_forces", "choice_road", "choice_whe
 def test_every_netcdf_is_a_result_of_its_scene(name: str, tmp_path: Path):
     scene = load_scene(name, LESS.get(name, []))
     engines = engines_of(getattr(getattr(scene, "run", None), "engine", None), scene.system)
-    ready(scene, engines).run(scene, engines, tmp_path, lambda text, part: None)
+    checked_study(scene, engines).run(scene, engines, tmp_path, lambda text, part: None)
     saved = sorted(tmp_path.rglob("*.nc"))
     assert saved, "a study leaves at least one result"
     for path in saved:

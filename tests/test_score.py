@@ -257,5 +257,5 @@ def test_forces_scored_without_their_pitch_are_found(monkeypatch, tmp_path):
 
     case = next(case for case in drift.CASES if case.name == "drifted run scored by its vertical forces")
     monkeypatch.setattr(score, "TUMBLED", np.inf)
-    monkeypatch.setattr(score, "_beyond", lambda found, limits: [])
+    monkeypatch.setattr(score, "_exceeded_limits", lambda found, limits: [])
     assert judge(case, "reference", tmp_path).word == "SILENT"

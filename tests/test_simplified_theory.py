@@ -11,7 +11,7 @@ from models.contact.hertz import by_load
 from models.contact.material import Pair
 from models.contact.patches import separate
 from models.contact.simplified_kernels import FineNet, displacement, drag, march, step_on
-from models.contact.simplified_theory import PAPER, Options, press, roll
+from models.contact.simplified_theory import PAPER, SimplifiedOptions, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
 from models.core.errors import InputError
 from validation.cases.contact_simplified import largest_jump
@@ -42,7 +42,7 @@ def pressed():
     return press(ELLIPSE, PAIR, load=1e5)
 
 
-@pytest.mark.parametrize("options", [Options(), PAPER])
+@pytest.mark.parametrize("options", [SimplifiedOptions(), PAPER])
 def test_hertz_is_met(options):
     found = press(ELLIPSE, PAIR, load=1e5, options=options)
     assert found.load == pytest.approx(1e5, rel=1e-12)
@@ -257,9 +257,9 @@ BAD = {
     "several creepages": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, [1e-3, 2e-3], 0.0, 0.0), "not an array"),
     "cells of a half": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=45.0), "whole number"),
     "no cells": (lambda: roll(press(ELLIPSE, PAIR, load=1e3), 0.3, 0.0, 0.0, 0.0, cells=0), "from 3 to"),
-    "net": (lambda: Options(net=2), "3 to 100"),
-    "net of a half": (lambda: Options(net=4.5), "whole number"),  # type: ignore[arg-type]
-    "shape": (lambda: Options(shape="eliptic"), "did you mean 'elliptic'"),
+    "net": (lambda: SimplifiedOptions(net=2), "3 to 100"),
+    "net of a half": (lambda: SimplifiedOptions(net=4.5), "whole number"),  # type: ignore[arg-type]
+    "shape": (lambda: SimplifiedOptions(shape="eliptic"), "did you mean 'elliptic'"),
     "millimetres": (lambda: quadratic(A, A, 20.0, 20.0), "places in m"),
     "shape of height": (
         lambda: from_arrays(np.arange(5) / 9, np.arange(6) / 9, np.zeros((5, 6))),

@@ -5,8 +5,8 @@ import pytest
 from models.core.errors import InputError
 from models.core.scene_file import changed
 from models.ensemble.store import named_files
-from studies.command.summary_numbers import numbers
-from studies.command.sweep import asked
+from studies.command.summary_numbers import summary_scalars
+from studies.command.sweep import parse_range
 
 CONTACT = """
 title = "A contact"
@@ -36,7 +36,7 @@ method = { name = "linear" }
     ids=str,
 )
 def test_values_are_read_as_a_scene_would(text, values):
-    key, found = asked(text)
+    key, found = parse_range(text)
     assert key == text.partition("=")[0].strip() and found == values
     assert [type(one) for one in found] == [type(one) for one in values]
 
@@ -63,7 +63,7 @@ def test_values_are_read_as_a_scene_would(text, values):
 )
 def test_what_is_no_sweep_is_refused(text):
     with pytest.raises(InputError, match="--sweep"):
-        asked(text)
+        parse_range(text)
 
 
 def test_numbers_of_a_summary_have_names_and_units():
@@ -76,7 +76,7 @@ def test_numbers_of_a_summary_have_names_and_units():
         "curve": [3.0, -4.0] * 5,
         "branch": [{"v": float(i)} for i in range(10)],
     }
-    assert numbers(summary) == {
+    assert summary_scalars(summary) == {
         "pitch, max [rad]": 0.5,
         "free, x": 1,
         "held, x": 2,

@@ -95,7 +95,7 @@ def test_the_error_of_cells_is_that_against_ten_times_as_many():
 
 def test_an_estimate_by_a_grid_that_is_hardly_coarser_would_be_caught(monkeypatch):
     """Planted fault: a grid with one cell less tells next to nothing."""
-    monkeypatch.setattr("models.contact.accuracy.halved", lambda cells: cells - 1)
+    monkeypatch.setattr("models.contact.accuracy.coarser_cells", lambda cells: cells - 1)
     ratios = np.array([sample.ratio for sample in samples(12, 8)])
     assert (ratios > 3.0).mean() > 0.1
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core import told
-from models.core.assumptions import assumed_of, broken_of, judged
+from models.core.assumptions import assumed_of, broken_of, with_assumptions
 from models.core.discretisation import errors_of
 from models.core.systems import load
 from models.core.time_series import write_time_series
@@ -172,7 +172,7 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
     assert broken_of(results["ice"]) == [] and "a table has no steps" in told.lines(results)[0]
     whole = table_of(own, "ice")
     short = whole.refined(whole.angles[:3], whole.slips, np.array([5e3, 2e4]))
-    beyond = {one.name: one for one in broken_of(judged(results["ice"], of_table(short, 3e4)))}
+    beyond = {one.name: one for one in broken_of(with_assumptions(results["ice"], of_table(short, 3e4)))}
     assert set(beyond) == {"slip angles in the table", "loads in the table"}
     assert all("tyres.files" in one.remedy for one in beyond.values())
 

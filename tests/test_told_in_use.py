@@ -183,9 +183,9 @@ def again(result):
     from models.systems.pitch_plane.scene import assemble
 
     scene = build({"title": "t", "vehicle": {"parameters": "itwm_drift"}, "run": {"duration": 1.5}, "effects": ROAD})
-    from models.core.assumptions import judged
+    from models.core.assumptions import with_assumptions
 
-    return judged(result, assumptions(assemble(scene)))
+    return with_assumptions(result, assumptions(assemble(scene)))
 
 
 def test_rows_rest_on_the_runs_before_them_alone(pulling, pressing):
@@ -243,7 +243,7 @@ def sample(ratio, share=1e-3, cost=0.5, told=True):
 
 
 def rows_of(*drawn):
-    found = [stated_errors._saved("ride", one) for one in drawn]
+    found = [stated_errors._sample_as_table("ride", one) for one in drawn]
     return {row.id.removeprefix("stated_errors."): row for row in stated_errors._rows(found, False)}
 
 

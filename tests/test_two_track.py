@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.signal import csd
 
 from models.core.errors import InputError
-from models.road.fitted import fit
+from models.road.fitted import fit_road
 from models.road.iso8608 import CLASSES, level_of_class
 from models.road.isotropic import IsotropicRoad, Part
 from models.road.measured_tracks import MeasuredTracks, read_tracks, spectra
@@ -127,7 +127,7 @@ def test_measured_tracks_are_heights_up_and_keep_their_sides(tmp_path):
 
 def test_what_a_road_cannot_tell_is_said():
     walk = np.random.default_rng(4).standard_normal(2000).cumsum() * 1e-3
-    same = fit(MeasuredTracks(walk, walk, 0.1, 0.7, "same"))
+    same = fit_road(MeasuredTracks(walk, walk, 0.1, 0.7, "same"))
     assert same.roll is None and same.road.roll.intensity == 0.0
     assert any("same heights" in note for note in same.notes)
     assert not same.mean.resolved and any("corner of the mean process is not told" in note for note in same.notes)
@@ -145,7 +145,7 @@ WRONG = {
     "track": (lambda: road_of_level(0.0), "half_track"),
     "waviness": (lambda: Part(1e-5, 0.1, 1.0), "above 1"),
     "short": (lambda: spectra(MeasuredTracks(np.zeros(30), np.zeros(30), 0.1, 0.7, "x")), "two windows or more"),
-    "flat": (lambda: fit(MeasuredTracks(np.zeros(3000), np.zeros(3000), 0.1, 0.7, "x")), "there is no road"),
+    "flat": (lambda: fit_road(MeasuredTracks(np.zeros(3000), np.zeros(3000), 0.1, 0.7, "x")), "there is no road"),
     "class": (lambda: level_of_class("I"), "class of ISO 8608"),
     "file": (lambda: read_tracks("road.txt"), "OpenCRG"),
 }

@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError
 from models.tyre.magic_formula import PACEJKA, SURFACES, Burckhardt, Curve, by_similarity, factors, graded, surface
 from models.tyre.tyre_source import named
-from models.tyre.tyre_table import Cells, TyreTable, across, along, place, stacked
+from models.tyre.tyre_table import Cells, TyreTable, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
 
 
 def small(peak=0.8):
@@ -29,10 +29,10 @@ def small(peak=0.8):
 
 def at(tables, number, angle, load, slip):
     """mu_x and mu_y by the compiled functions."""
-    cells = Cells(*place(tables.angles, angle), *place(tables.loads, load))
-    k, w = place(tables.slips, slip)
-    mu = [along(number, cells, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
-    return (1 - w) * mu[0] + w * mu[1], across(number, cells, k, w, tables.g, tables.h)
+    cells = Cells(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load))
+    k, w = cell_and_share(tables.slips, slip)
+    mu = [longitudinal_adhesion(number, cells, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
+    return (1 - w) * mu[0] + w * mu[1], lateral_adhesion(number, cells, k, w, tables.g, tables.h)
 
 
 @pytest.mark.grounds("closed form")

@@ -138,7 +138,7 @@ def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     assert share == pytest.approx(2.0 / COMPILING["pitch-plane"])
     now[0] += 2.0 * COMPILING["pitch-plane"]
     assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILING['pitch-plane']:.0f} s so far")
-    shown.kernels._end()
+    shown.kernels._end_compilation()
     assert shown.state() == ("six runs", 0.25, "30 s left")
     with marching(lambda: 0.5):
         shown.state()

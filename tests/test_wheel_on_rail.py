@@ -10,7 +10,7 @@ from models.contact.profile_files import read_profile
 from models.contact.profiles import Profile, profile
 from models.contact.simplified_theory import press
 from models.contact.standard_profiles import built_in, s1002, s1002_height, uic60
-from models.contact.wheel_on_rail import Track, Wheelset, laid, wheel_on_rail
+from models.contact.wheel_on_rail import Track, Wheelset, rail_in_track, wheel_on_rail
 from models.core.errors import InputError
 from validation.cases.contact_profiles import NEAR, RAIL_FILE, WHEEL_FILE, rail_off, wheel_off
 from validation.common.scenes import data_folder
@@ -50,7 +50,7 @@ def test_inclination_moves_the_top_outwards():
 
 
 def test_gauge_is_where_it_is_measured():
-    rail = laid(uic60(), Track(inclination=0.05))
+    rail = rail_in_track(uic60(), Track(inclination=0.05))
     inner = rail.y < rail.y[np.argmin(rail.z)]
     face = np.interp(-0.014, -rail.z[inner], rail.y[inner])
     assert face == pytest.approx(0.7175, abs=1e-12)  # between points; at the point below it, 9 um would be missing
@@ -221,7 +221,7 @@ BAD_PLACES = {
     "gauge": (lambda: wheel_on_rail(s1002(), uic60(), track=Track(gauge=1.0)), "lateral_shift"),
     "wheelset": (lambda: wheel_on_rail(s1002(), uic60(), wheelset=Wheelset(back_to_back=1.0)), "lateral_shift"),
     "shallow rail": (
-        lambda: laid(Profile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
+        lambda: rail_in_track(Profile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
         "the gauge is measured at 0.014 m",
     ),
 }

@@ -17,7 +17,7 @@ from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import build, run
 from studies.command.asked import SCENES, engines_of
-from validation.faults.campaign import seen
+from validation.faults.campaign import seeing_checks
 from validation.faults.written import CAMPAIGN
 from validation.spatial.cars import static
 from validation.spatial.written_equations import (
@@ -139,4 +139,4 @@ def test_a_cut_car_rests_on_its_static_loads():
 def test_faults_in_what_engines_share_are_seen(name):
     fault = next(fault for fault in CAMPAIGN.faults if fault.name == name)
     clean, planted = replace(CAMPAIGN, faults=(fault,)).measure()
-    assert seen(clean) == [] and seen(planted) != []
+    assert seeing_checks(clean) == [] and seeing_checks(planted) != []

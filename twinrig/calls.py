@@ -238,14 +238,14 @@ def choose(
     from tempfile import TemporaryDirectory
 
     from models.core.told import summarised
-    from studies.command.asked import engines_of, ready
+    from studies.command.asked import checked_study, engines_of
     from studies.command.waiting import waiting
     from twinrig.report import Report
 
     loaded = _choosing(load(scene, set), quantities, tolerance).checked
     engines = engines_of(engine, loaded.system, "engine")
     with _as_library(loaded), TemporaryDirectory() as temporary:
-        study = ready(loaded, engines)
+        study = checked_study(loaded, engines)
         kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
         with waiting(loaded.title, loaded.system) as progress:
             summary = summarised(study.run(loaded, engines, kept, progress))

@@ -58,7 +58,7 @@ class Result(saved.Result):
     def _label(self) -> str:
         return str(self.data.attrs.get("engine") or self.data.attrs.get("system", "result"))
 
-    def _said(self) -> list[str]:
+    def _state_lines(self) -> list[str]:
         """Status, counts, doubts about the run and its input, error and broken assumptions."""
         said = self.data.attrs
         counts = ", ".join(f"{count} {name}" for name, count in json.loads(said.get("counts", "{}")).items())
@@ -89,11 +89,11 @@ class Result(saved.Result):
         table = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows[: SHOWN + 1]]
         more = [row[0] for row in rows[SHOWN + 1 :]]
         rest = [f"  and {len(more)} more: {', '.join(more)}"] if more else []
-        return "\n".join([str(self.data.attrs.get("title", "")), *self._said(), *table, *rest])
+        return "\n".join([str(self.data.attrs.get("title", "")), *self._state_lines(), *table, *rest])
 
     def _repr_html_(self) -> str:
         title = escape(str(self.data.attrs.get("title", "")))
-        said = "<br>".join(escape(line.strip()) for line in self._said())
+        said = "<br>".join(escape(line.strip()) for line in self._state_lines())
         heads = "".join(f"<th>{head}</th>" for head in ("channel", "unit", "axes", "least", "largest", "meaning"))
         rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self._rows())
         return f"<p><b>{title}</b><br>{said}</p><table><tr>{heads}</tr>{rows}</table>"

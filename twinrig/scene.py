@@ -50,12 +50,14 @@ class Scene:
 
     def __repr__(self) -> str:
         head = f"{self.title}\n  system {self.system}, scene {self.file}"
-        return "\n".join([head, *(f"  {key} = {value!r}" for key, value in _leaves(self.table) if key != "title")])
+        return "\n".join(
+            [head, *(f"  {key} = {value!r}" for key, value in _dotted_values(self.table) if key != "title")]
+        )
 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping[str, Any]) -> Scene:
     """The checked scene of a table with changes of dotted keys; the table itself stays as it is."""
-    from models.core.scene_file import put
+    from models.core.scene_file import set_key
     from models.core.systems import of_table as checked
     from studies.command.asked import KNOWN
 
@@ -64,7 +66,7 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
     changed = plain(table)
     file = file + CHANGED if changes and not file.endswith(CHANGED) else file
     for key, value in changes.items():
-        put(changed, str(key), plain(value))
+        set_key(changed, str(key), plain(value))
     return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN))
 
 
@@ -79,10 +81,10 @@ def plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def _dotted_values(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys with their values."""
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
-            yield from _leaves(value, f"{before}{key}.")
+            yield from _dotted_values(value, f"{before}{key}.")
         else:
             yield f"{before}{key}", value

@@ -57,7 +57,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
     """
     register(name)
     with TemporaryDirectory() as cases_folder:
-        rows = list(_told(_rows(name, Path(cases_folder))))
+        rows = list(_printed_rows(_rows(name, Path(cases_folder))))
     (folder / "data").mkdir(exist_ok=True)
     save(
         folder,
@@ -76,7 +76,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
     return say(rows, None, write(folder))
 
 
-def _told(rows: Iterator[Row]) -> Iterator[Row]:
+def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
     """The rows, each printed as soon as it is there: a slow engine takes minutes."""
     for row in rows:
         print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}", flush=True)
@@ -90,14 +90,14 @@ def _value(row: Row) -> str:
 def _rows(name: str, folder: Path) -> Iterator[Row]:
     second: Independence = "shared kernel" if hasattr(OUTSIDE[name], "integrate") else "native"
     for id, quantity, unit, bound, why, error in _checks(name, folder):
-        yield _judged(f"conformity.{id}", quantity, unit, bound, why, error, second)
+        yield _error_row(f"conformity.{id}", quantity, unit, bound, why, error, second)
     yield _order(name, second)
     yield _guards(name, folder)
     yield from _hard_cases(name, folder)
     yield not_run("conformity.others", SYSTEM, "wheelset, contact, ride, handling, hub forces, braking", OTHERS)
 
 
-def _judged(
+def _error_row(
     id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float], second: Independence
 ) -> Row:
     """Row of an error; a check that cannot be carried out is failed, with what was raised."""
@@ -152,7 +152,7 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
             "m, rad, m/s, rad/s",
             _bound(name),
             f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
-            partial(_off, name, assemble(scene), settings),
+            partial(_state_error, name, assemble(scene), settings),
         )
     yield (
         "momentum",
@@ -194,12 +194,12 @@ def _paths(folder: Path) -> dict[str, Any]:
     }
 
 
-def _truth(assembly: Assembly, step: float = STEP) -> Any:
+def _reference_run(assembly: Assembly, step: float = STEP) -> Any:
     return checks.engine("reference")(assembly, Settings("DOP853", step, DURATION, 1e-13)).run()
 
 
-def _off(name: str, assembly: Assembly, settings: Settings) -> float:
-    return checks.state_gap(_run(name, assembly, settings), _truth(assembly))
+def _state_error(name: str, assembly: Assembly, settings: Settings) -> float:
+    return checks.state_gap(_run(name, assembly, settings), _reference_run(assembly))
 
 
 def _at_rest(name: str, settings: Settings) -> float:
@@ -219,7 +219,7 @@ def _order(name: str, second: Independence) -> Row:
     """Observed order of a method of fixed steps, or that a tighter tolerance gives a smaller error."""
     road = assemble(road_scene(duration=DURATION))
     if _adaptive(name):
-        return _judged(
+        return _error_row(
             "conformity.tolerance",
             "error at a tolerance of 1e-9 by that at 1e-5",
             "ratio",
@@ -231,16 +231,18 @@ def _order(name: str, second: Independence) -> Row:
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
 
     def gap() -> float:
-        truth = _truth(road, HALVED[-1])
+        truth = _reference_run(road, HALVED[-1])
         errors = [checks.state_gap(_run(name, road, _settings(name, step)), truth) for step in HALVED]
         return 0.0 if errors[0] < EXACT else abs(float(np.log2(errors[0] / errors[1])) - declared)
 
-    return _judged("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
+    return _error_row("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
 
 
 def _tightened(name: str, road: Assembly) -> float:
     loose = Settings(name, STEP, DURATION, 1e-5)
-    errors = [checks.state_gap(_run(name, road, settings), _truth(road)) for settings in (loose, _settings(name))]
+    errors = [
+        checks.state_gap(_run(name, road, settings), _reference_run(road)) for settings in (loose, _settings(name))
+    ]
     return errors[1] / errors[0] if errors[0] > EXACT else 0.0
 
 

@@ -151,10 +151,10 @@ def validate(
         save(
             folder,
             rows,
-            {**source, "seeds": _in(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
+            {**source, "seeds": _value_from_pool(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
             earlier,
         )
-        path = _written(pool, folder)
+        path = _write_report(pool, folder)
     return say(rows, time.perf_counter() - start, path)
 
 
@@ -173,7 +173,7 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
     from rich.progress import Progress
 
     alone = ALONE[quick]
-    together = tuple(sorted((name for name in CASES if name not in alone), key=_lasting, reverse=True))
+    together = tuple(sorted((name for name in CASES if name not in alone), key=_last_duration, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
         here = folder.resolve()
@@ -183,12 +183,12 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
         )
 
 
-def _lasting(name: str) -> float:
+def _last_duration(name: str) -> float:
     """Seconds of a case in the last full report; what lasts, or is not known, is begun first."""
     return float(full()[name]["seconds"]) if name in full() else math.inf
 
 
-def _in(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
+def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
     """Value of a function that a prepared process of the pool runs; this process runs it once a process of the pool
     died."""
     if pool is None:
@@ -199,7 +199,7 @@ def _in(pool: Executor | None, function: Callable[..., Any], *arguments: Any) ->
         return function(*arguments)
 
 
-def _written(pool: Executor | None, folder: Path) -> Path:
+def _write_report(pool: Executor | None, folder: Path) -> Path:
     """The report, its figures drawn by the pool; by this process, once one of the pool's died."""
     from validation.report.page import write
 

@@ -23,7 +23,7 @@ from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
-from models.tyre.tyre_table import Cells, across, place
+from models.tyre.tyre_table import Cells, cell_and_share, lateral_adhesion
 
 CLOSE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
@@ -99,7 +99,7 @@ def slide(i, u, v, regular, lag, angles, wheels):
         v = lag[i] * max(forwards, regular)
     angle = math.atan2(abs(v), max(forwards, regular))
     wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), v, angle
-    wheels.cell[i], wheels.share[i] = place(angles, angle)
+    wheels.cell[i], wheels.share[i] = cell_and_share(angles, angle)
 
 
 @inlined
@@ -108,7 +108,7 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     v, along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
-    j, q = place(tables.loads, load)
+    j, q = cell_and_share(tables.loads, load)
     cells = Cells(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
         StepInput(
@@ -117,10 +117,10 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
         Wheel(wheel.radius, wheel.inertia, sign * wheel.turning),
         Grip(first, second, share, cells, load, tables.slips, tables.mu_x),
     )
-    k, part = place(tables.slips, abs(slip))
-    side = across(first, cells, k, part, tables.g, tables.h)
+    k, part = cell_and_share(tables.slips, abs(slip))
+    side = lateral_adhesion(first, cells, k, part, tables.g, tables.h)
     if share > 0.0:
-        side += share * (across(second, cells, k, part, tables.g, tables.h) - side)
+        side += share * (lateral_adhesion(second, cells, k, part, tables.g, tables.h) - side)
     side *= load
     if slip > NEARLY and (along > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
         total, speed = math.hypot(force, side), math.hypot(along, v)

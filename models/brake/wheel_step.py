@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.machine.compiled import lean
-from models.tyre.tyre_table import Cells, along, place
+from models.tyre.tyre_table import Cells, cell_and_share, longitudinal_adhesion
 
 SLOWEST = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
@@ -98,9 +98,9 @@ def node(k, slips):
 @lean
 def node_force(k, grip):
     """Force (N) of a ``Grip`` at slip node k, at -k the opposite one."""
-    mu = along(grip.first, grip.cells, abs(k), grip.mu_x)
+    mu = longitudinal_adhesion(grip.first, grip.cells, abs(k), grip.mu_x)
     if grip.share > 0.0:
-        mu += grip.share * (along(grip.second, grip.cells, abs(k), grip.mu_x) - mu)
+        mu += grip.share * (longitudinal_adhesion(grip.second, grip.cells, abs(k), grip.mu_x) - mu)
     return grip.load * mu if k >= 0 else -grip.load * mu
 
 
@@ -113,7 +113,7 @@ def roll(slip, remaining, kappa, fade, held, grip):
     """
     slips = grip.slips
     last, used, area, turned = slips.size - 1, 0.0, 0.0, 0
-    cell = place(slips, abs(slip))[0]
+    cell = cell_and_share(slips, abs(slip))[0]
     if slip < 0.0:
         cell = -cell - 1
     low, high = node_force(cell, grip), node_force(cell + 1, grip)

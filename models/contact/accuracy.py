@@ -87,15 +87,18 @@ def rolled(contact: Contact, motion: Motion, cells: int, *, fields: bool = False
     if isinstance(contact, Linear):
         force, moment = _of_linear(contact, motion, fine)
         return fine, Error(0.0, force, 0.0, moment)
-    coarse = contact.roll(motion, halved(cells))
-    (force, moment), (likely, turning) = _most(contact, cells, fine, coarse), _likely(contact, cells, fine, coarse)
+    coarse = contact.roll(motion, coarser_cells(cells))
+    (force, moment), (likely, turning) = (
+        _largest_errors(contact, cells, fine, coarse),
+        _likely_errors(contact, cells, fine, coarse),
+    )
     theory, moment_theory = _of_theory(contact, motion, fine)
     return fine, Error(force, theory, moment, moment_theory, likely, turning)
 
 
-def left(contact: Contact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
+def remaining_errors(contact: Contact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
     """Errors of force (N) and moment (N m) that the cells leave at most."""
-    return _most(contact, cells, fine, contact.roll(motion, halved(cells)))
+    return _largest_errors(contact, cells, fine, contact.roll(motion, coarser_cells(cells)))
 
 
 def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
@@ -104,7 +107,7 @@ def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
 
-def _most(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _largest_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -113,7 +116,7 @@ def _most(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[f
     return error, contact.lever * error
 
 
-def _likely(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _likely_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     """Force and moment each by its own difference, LIKELY of it, with small shares of what two grids miss together."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
@@ -128,7 +131,7 @@ def _likely(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple
     return limit * (told[0] + unseen), limit * contact.lever * (told[1] + unseen * moment)
 
 
-def halved(cells: int) -> int:
+def coarser_cells(cells: int) -> int:
     """Cells of the coarser grid."""
     return (cells + 1) // 2
 
@@ -139,7 +142,7 @@ def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
     fine, coarse : (3, ...) fx and fy by mu N, mz by mu N times the lever, on ``cells`` and half of them. order : of the
     theory in the size of a cell.
     """
-    used, gained = np.linalg.norm(fine, axis=0), (cells / halved(cells)) ** order - 1.0
+    used, gained = np.linalg.norm(fine, axis=0), (cells / coarser_cells(cells)) ** order - 1.0
     unseen = UNSEEN * used**2 * np.clip(2.0 - used * cells / 3.0, 0.0, 1.0)
     return SAFETY * np.linalg.norm(fine - coarse, axis=0) / gained + used / cells**2 + unseen
 

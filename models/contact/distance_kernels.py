@@ -73,7 +73,7 @@ def row_at(padded, v):
 
 
 @njit(cache=True)
-def along(row, u):
+def value_along_row(row, u):
     """Value of a padded row at u spacings."""
     i, t = segment(u, row.size - 3)
     w, _ = weights(t)

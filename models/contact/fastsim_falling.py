@@ -46,12 +46,12 @@ def friction_left(contact, strips, s, cells, law, left):
     along = contact.xi_x - contact.spin * contact.b * strips.y[s]
     across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
     for i in range(cells.centre.size):
-        left[0, i] = _left(along, across + turn * cells.centre[i], law)
-        left[1, i] = _left(along, across + turn * cells.middle[i], law)
+        left[0, i] = _friction_share(along, across + turn * cells.centre[i], law)
+        left[1, i] = _friction_share(along, across + turn * cells.middle[i], law)
 
 
 @compiled
-def _left(along, across, law):
+def _friction_share(along, across, law):
     """Share of the friction that is left at a slip."""
     floor, decay = law
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

@@ -172,7 +172,7 @@ def aspect(curvatures: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def integrals(g: float) -> tuple[float, float]:
-    """B and D of the module's head at g = sqrt(1 - e^2), above 0 and up to 1, to rounding."""
+    """Elliptic integrals B and D (head of this module) at g = sqrt(1 - e^2), 0 < g <= 1, exact to rounding."""
     other, mean = g, 1.0
     a_b, b_b, a_d, b_d = 1.0, 0.0, 0.0, 1.0  # the integrands as (a cos^2 + b sin^2) / sqrt(...)
     while True:

@@ -28,7 +28,7 @@ from models.contact.simplified_kernels import (
     tangential,
     tangential_fit,
 )
-from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
+from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, SimplifiedOptions
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
@@ -64,7 +64,7 @@ SETTLED = 1e-12
 TRIES = 100
 
 
-def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Array:
+def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAIN) -> Array:
     """Table for an undeformed distance of one valley; its first number is below zero. Not to be changed.
 
     cells : strips of the fine net, and cells in each, 3 to 200. Raises InputError, also for several valleys.

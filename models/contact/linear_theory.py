@@ -70,7 +70,7 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
     ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    answer = _each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    answer = _coefficients_of_each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
     return Coefficients(*(values[()] for values in answer))
 
 
@@ -114,7 +114,7 @@ def _axes(a: Any, b: Any) -> tuple[Array, ...]:
 
 
 @njit(cache=True)
-def _each(ratio: Array, nu: Array) -> Array:
+def _coefficients_of_each(ratio: Array, nu: Array) -> Array:
     answer = np.empty((4, ratio.size))
     for i in range(ratio.size):
         for kind in range(4):
@@ -156,10 +156,10 @@ def coefficient_at(kind: int, ratio: float, nu: float) -> float:
     if inner == ratio:
         return answer
     if ratio < 1.0:
-        excess = answer / _narrow(kind, inner, nu) - 1.0
-        return _narrow(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = answer / _long(kind, inner, nu) - 1.0
-    return _long(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
+        excess = answer / _narrow_limit(kind, inner, nu) - 1.0
+        return _narrow_limit(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
+    excess = answer / _long_limit(kind, inner, nu) - 1.0
+    return _long_limit(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
 
 
 @njit(cache=True)
@@ -187,7 +187,7 @@ def _parabola(nu: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def _narrow(kind: int, ratio: float, nu: float) -> float:
+def _narrow_limit(kind: int, ratio: float, nu: float) -> float:
     """Coefficient of a patch across the direction of rolling, a/b = g to 0 (Kalker 1990, table E.3, first row)."""
     if kind == 0:
         return math.pi**2 / (4.0 * (1.0 - nu))
@@ -199,7 +199,7 @@ def _narrow(kind: int, ratio: float, nu: float) -> float:
 
 
 @njit(cache=True)
-def _long(kind: int, ratio: float, nu: float) -> float:
+def _long_limit(kind: int, ratio: float, nu: float) -> float:
     """Coefficient of a patch along the direction of rolling, b/a = g to 0 (the same table, last row)."""
     wide = 2.0 * math.log(4.0 * ratio)
     divisor, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu

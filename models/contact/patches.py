@@ -119,7 +119,7 @@ def separate(distance: Distance) -> list[Patch]:
     return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
 
 
-def whole(distance: Distance) -> list[Patch]:
+def as_single_patch(distance: Distance) -> list[Patch]:
     """The distance as one patch, whatever its valleys."""
     return [Patch(distance)]
 

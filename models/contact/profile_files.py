@@ -53,7 +53,7 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
     y, z = reader(lines, path)
     if y.size < 10:
         raise InputError(path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
-    y, z = _laid(y, z, kind)
+    y, z = _upright_points(y, z, kind)
     read = profile(-y if mirror else y, z, smoothing, path)
     if kind == "wheel":
         _check_taping(read, path)
@@ -81,7 +81,7 @@ def _lines(path: Path) -> list[str]:
         raise InputError(path, "", None, f"{reason[0].lower()}{reason[1:]}{similar_file(path)}") from None
 
 
-def _numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
+def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
     """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
     if DECIMAL_COMMA.search(text.strip()):
         raise InputError(path, f"line {number}", text.strip()[:SHOWN], "has decimal commas: write decimal points")
@@ -101,7 +101,7 @@ def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
 def _columns(lines: list[str], path: Path) -> Points:
     """Two columns of text, in m."""
     plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
-    rows = [(k, _numbers(line, k, path)) for k, line in plain if line.strip()]
+    rows = [(k, _parse_numbers(line, k, path)) for k, line in plain if line.strip()]
     for k, row in rows:
         if len(row) > 2:
             raise InputError(
@@ -128,7 +128,7 @@ def _miniprof(lines: list[str], path: Path) -> Points:
                 )
             heading = bool(line.strip())
         elif line.strip():
-            rows.append(_numbers(line, k, path))
+            rows.append(_parse_numbers(line, k, path))
     if not {"X", "Y"} <= set(columns[:2]):
         raise InputError(path, "ColumnDef", ",".join(columns), "must begin with X,Y or Y,X")
     x, y = _points(rows, columns.index("X"), columns.index("Y"))
@@ -147,7 +147,7 @@ def _simpack(lines: list[str], path: Path) -> Points:
         elif text == "point.end":
             inside, ended = False, True
         elif inside and text:
-            rows.append(_numbers(text, k, path))
+            rows.append(_parse_numbers(text, k, path))
         elif "=" in text:
             name, _, value = text.partition("=")
             keys[name.strip()] = (value.strip(), k)
@@ -175,7 +175,7 @@ DEFAULTS = {
 
 def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
     text, line = keys.get(name, (str(DEFAULTS[name]), 0))
-    value = _numbers(text, line, path, 1)[0]
+    value = _parse_numbers(text, line, path, 1)[0]
     if name.startswith("units") and value <= 0.0:
         raise InputError(path, f"line {line}: {name}", value, "must be above 0 (units of the file by m or rad)")
     return value
@@ -195,7 +195,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
     return y[order] / key["units.len.f"], z[order] / key["units.len.f"]
 
 
-def _laid(y: Array, z: Array, kind: Kind) -> Points:
+def _upright_points(y: Array, z: Array, kind: Kind) -> Points:
     """The points with the rail's top up, or the wheel's flange down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])

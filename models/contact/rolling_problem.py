@@ -190,23 +190,23 @@ def _solve(cells: _Cells, rigid: RigidSlip, pair: Pair, weights: tuple[float, ..
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST:
-        return _settled(nothing)
+        return _solve_tractions(nothing)
     coarse = cells.coarser()
     known = _solve(coarse, rigid, pair, weights)[0].traction
-    relative = _between(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
+    relative = _at_quarter_cells(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
     state = nothing.moved(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):
         if state.residual <= TOLERANCE:
             return state, step
-        state = _turned(state)
-    return _settled(_nearest(state, nothing))
+        state = _after_newton_step(state)
+    return _solve_tractions(_nearest(state, nothing))
 
 
 def _nearest(*states: _State) -> _State:
     return min(states, key=lambda state: state.residual)
 
 
-def _between(values: Array) -> Array:
+def _at_quarter_cells(values: Array) -> Array:
     """Values (2 ny, 2 nx, 2) in the quarters of cells, linear between the cells' centres, from values (ny, nx, 2)."""
     for axis in (0, 1):
         ends = np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
@@ -216,7 +216,7 @@ def _between(values: Array) -> Array:
     return values
 
 
-def _settled(state: _State) -> tuple[_State, int]:
+def _solve_tractions(state: _State) -> tuple[_State, int]:
     """Tractions that meet all conditions, by sweeps and Newton's steps in turn, and the rounds taken."""
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
@@ -229,13 +229,13 @@ def _settled(state: _State) -> tuple[_State, int]:
         for _ in range(SWEEPS):
             sweep(traction, motion, state.operator.reversed, state.bound, relaxation)
         swept = state.moved(np.moveaxis(traction, 0, -1))
-        nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _turned(swept))
+        nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
         relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
         state, done = nearest, done + 1
     return state, done
 
 
-def _turned(state: _State) -> _State:
+def _after_newton_step(state: _State) -> _State:
     """The state after Newton's step; the same where the step is lost in rounding."""
     try:
         return state.moved(_newton(state))

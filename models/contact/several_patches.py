@@ -82,10 +82,12 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     return Net(x, y, height, pressure, cover, (dx, dy), volume)
 
 
-def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array) -> tuple[Array, Array]:
+def solve_common_approach(
+    nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array
+) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
-    pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
+    pushed = {(k, m): _displacement_by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
         whole = np.sum([pushed[k, m] for m in loaded], axis=0)
@@ -103,7 +105,7 @@ def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Ar
     return stiffness, np.array(approach)
 
 
-def _by(source: Net, target: Net, pair: Pair) -> Array:
+def _displacement_by(source: Net, target: Net, pair: Pair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
         return displacement(source.pressure, *source.step, pair.modulus)
@@ -118,7 +120,7 @@ def _product(net: Net, first: Array, second: Array, kind: int) -> float:
     return float(covariances(first, second, net.cover)[1])
 
 
-def settled(
+def solve_depths(
     patches: Sequence[Patch], start: Array, load: float | None, pair: Pair, options: tuple[int, int, int]
 ) -> tuple[Array, Array, Array]:
     """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
@@ -133,7 +135,7 @@ def settled(
     def state(over: Array) -> tuple[Array, Array, Array, Array]:
         *depths, approach = answer = zero + unit * over
         nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
-        stiffness, reached = together(nets, pair, kind, lows, answer[:-1])
+        stiffness, reached = solve_common_approach(nets, pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), answer, stiffness, loads

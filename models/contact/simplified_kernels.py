@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.contact.distance_kernels import along, row_at, value_and_slopes
+from models.contact.distance_kernels import row_at, value_along_row, value_and_slopes
 from models.contact.inputs import Array
 from models.machine.compiled import compiled
 
@@ -88,7 +88,7 @@ def resultant(surface, points, shape):
     for j in range(points):
         row = row_at(padded, (box[2] + (j + 0.5) * dy - origin[1]) / step[1])
         for i in range(points):
-            height = along(row, (box[0] + (i + 0.5) * dx - origin[0]) / step[0])
+            height = value_along_row(row, (box[0] + (i + 0.5) * dx - origin[0]) / step[0])
             total += overlap_pressure(surface, height, shape)
     return total * dx * dy
 
@@ -277,10 +277,10 @@ def strips(surface, rows, cells, shape):
     for k in range(rows):
         centre = box[2] + (k + 0.5) * width
         row = row_at(padded, (centre - origin[1]) / step[1])
-        inside = along(row, first / looks) < depth
+        inside = value_along_row(row, first / looks) < depth
         start = first / looks
         for m in range(first + 1, last + 1):
-            now = along(row, m / looks) < depth
+            now = value_along_row(row, m / looks) < depth
             if now and not inside:
                 start = crossing(row, depth, m / looks, (m - 1) / looks)
             if inside and (not now or m == last):
@@ -293,7 +293,7 @@ def strips(surface, rows, cells, shape):
         row = row_at(padded, (y[s] - origin[1]) / step[1])
         length = (high_x[s] - low_x[s]) / cells
         for i in range(cells):
-            h = along(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
+            h = value_along_row(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
             pressure[s, i] = overlap_pressure(surface, h, shape)
     return FineNet(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
 
@@ -301,11 +301,11 @@ def strips(surface, rows, cells, shape):
 @compiled
 def crossing(row, depth, inner, outer):
     """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
-    at_inner, at_outer = along(row, inner) - depth, along(row, outer) - depth
+    at_inner, at_outer = value_along_row(row, inner) - depth, value_along_row(row, outer) - depth
     middle, kept = outer, 0
     for _ in range(30):
         middle = inner - at_inner * (outer - inner) / (at_outer - at_inner)
-        height = along(row, middle) - depth
+        height = value_along_row(row, middle) - depth
         if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer - inner) < 1e-12:
             break
         if height < 0.0:

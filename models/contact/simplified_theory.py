@@ -39,8 +39,8 @@ from scipy.optimize import brentq
 from models.contact.fields import Fields
 from models.contact.inputs import Array, creepages, number, whole_number
 from models.contact.material import Pair
-from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, whole
-from models.contact.several_patches import crude, dragged, settled
+from models.contact.patches import NO_DEPTH, Box, Patch, as_single_patch, no_bottom, separate
+from models.contact.several_patches import crude, dragged, solve_depths
 from models.contact.simplified_kernels import (
     DISPLACEMENT,
     ELLIPTIC,
@@ -69,7 +69,7 @@ FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 
 @dataclass(frozen=True)
-class Options:
+class SimplifiedOptions:
     """Options of the simplified theory: net, shape, fit, patches together or apart.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
@@ -96,8 +96,8 @@ class Options:
         return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
-PLAIN = Options()
-PAPER = Options(shape="parabolic")
+PLAIN = SimplifiedOptions()
+PAPER = SimplifiedOptions(shape="parabolic")
 """The theory to the letter."""
 
 
@@ -131,7 +131,7 @@ class NormalContact:
     peak: float
     patches: tuple[PatchPressure, ...]
     pair: Pair
-    options: Options
+    options: SimplifiedOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def press(
     *,
     load: float | None = None,
     approach: float | None = None,
-    options: Options = PLAIN,
+    options: SimplifiedOptions = PLAIN,
 ) -> NormalContact:
     """Area, pressure and approach of two bodies, by a load (N) or by a rigid approach (m).
 
@@ -171,7 +171,7 @@ def press(
     if (load is None) == (approach is None):
         raise InputError("", "load", load, "give either the load in N or the approach in m")
     if isinstance(bodies, Distance):
-        bodies = separate(bodies) if options.separate else whole(bodies)
+        bodies = separate(bodies) if options.separate else as_single_patch(bodies)
     patches = list(bodies)
     if not patches:
         raise InputError("", "bodies", bodies, "must be an undeformed distance, or one patch at least")
@@ -187,7 +187,7 @@ def press(
     return _shared(patches, reached, None, pair, options)
 
 
-def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLAIN) -> PatchPressure:
+def load_at_depth(patch: Patch, depth: float, pair: Pair, options: SimplifiedOptions = PLAIN) -> PatchPressure:
     """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
@@ -198,11 +198,13 @@ def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLA
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
 
 
-def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: Options) -> NormalContact:
+def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: SimplifiedOptions) -> NormalContact:
     """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
-        depth = _found(lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge)
+        depth = _depth_for_load(
+            lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge
+        )
         alone = load_at_depth(patch, depth, pair, options)
         return _gathered(alone.approach / along, (alone,), pair, options)
 
@@ -210,10 +212,10 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
         depths = zip(patches, _shallow(patches, reached), strict=True)
         return _total([load_at_depth(patch, depth, pair, options) for patch, depth in depths])
 
-    return _shared(patches, _found(alone_at, load, lowest, np.inf), load, pair, options)
+    return _shared(patches, _depth_for_load(alone_at, load, lowest, np.inf), load, pair, options)
 
 
-def _found(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
+def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
     """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until it is, then Brent's method."""
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()
@@ -241,10 +243,12 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
     return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
 
 
-def _shared(patches: list[Patch], approach: float, load: float | None, pair: Pair, options: Options) -> NormalContact:
+def _shared(
+    patches: list[Patch], approach: float, load: float | None, pair: Pair, options: SimplifiedOptions
+) -> NormalContact:
     """The patches at their common approach (m), or near it where a load (N) is given."""
     start = np.array([*_shallow(patches, approach), approach])
-    (*depths, reached), stiffnesses, loads = settled(patches, start, load, pair, options.numbers)
+    (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, pair, options.numbers)
     parts = []
     for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
         if carried > 0.0:
@@ -253,7 +257,9 @@ def _shared(patches: list[Patch], approach: float, load: float | None, pair: Pai
     return _gathered(float(reached), tuple(parts), pair, options)
 
 
-def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: Options) -> NormalContact:
+def _gathered(
+    approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: SimplifiedOptions
+) -> NormalContact:
     """The sum of the patches; area and peak from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
@@ -299,7 +305,7 @@ def roll(
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine(patch: PatchPressure, options: Options, cells: int) -> FineNet:
+def _fine(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
     """Strips of a patch as ``march`` takes them."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells

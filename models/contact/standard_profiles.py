@@ -76,14 +76,14 @@ def s1002_height(y: Array) -> Array:
 def s1002() -> Profile:
     """The wheel profile S1002 from 0.5 mm inside its flange's back to 60 mm outside the taping line."""
     y = np.linspace(-69.5, 60.0, 20001)
-    return _even(y, s1002_height(y))
+    return _evenly_spaced(y, s1002_height(y))
 
 
 @cache
 def uic60() -> Profile:
     """The head of an upright UIC 60 rail, to 37 mm below its top."""
     y, z = _half_head()
-    return _even(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
+    return _evenly_spaced(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
 
 
 def _half_head() -> tuple[Array, Array]:
@@ -101,7 +101,7 @@ def _half_head() -> tuple[Array, Array]:
     return np.concatenate(y), np.concatenate([*z, depth])
 
 
-def _even(y: Array, z: Array) -> Profile:
+def _evenly_spaced(y: Array, z: Array) -> Profile:
     """Points (mm) at even distances along the contour, in m."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)

@@ -128,7 +128,7 @@ class ExactOnEllipse(OnEllipse):
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about the ellipse."""
-        return _exact([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
+        return _exact_sum([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
 
 
 class OnPatches(Contact):
@@ -177,11 +177,11 @@ class Exact(OnPatches):
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about each patch."""
         grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
-        forces = _exact(grids, motion, self.friction, self.pair)
+        forces = _exact_sum(grids, motion, self.friction, self.pair)
         return replace(forces, fields=self.placed(forces.fields))
 
 
-def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
+def _exact_sum(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
     """The sum over patches that do not feel each other's tractions."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
     for grid in grids:

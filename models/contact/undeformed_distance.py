@@ -56,7 +56,7 @@ class Distance:
 
     @cached_property
     def padded(self) -> Array:
-        """Heights with one more node on every side, continued by the parabola through the last three."""
+        """Heights with an extra node on every side, extrapolated by the parabola through the three outermost."""
         return _continued(_continued(self.height).T).T.copy()
 
     def at(self, x: Array, y: Array) -> Array:

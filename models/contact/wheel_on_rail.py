@@ -169,14 +169,14 @@ def wheel_on_rail(
     track, wheelset = track or Track(), wheelset or Wheelset()
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-    side = WheelAndRail(wheel, laid(rail, track), wheelset)
-    touches = touches_of(side, placed(side, lateral_shift, yaw))
+    side = WheelAndRail(wheel, rail_in_track(rail, track), wheelset)
+    touches = touches_of(side, touching_pose(side, lateral_shift, yaw))
     if not touches:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
     return touches
 
 
-def laid(rail: Profile, track: Track) -> Profile:
+def rail_in_track(rail: Profile, track: Track) -> Profile:
     """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
     inclined = rail.turned(track.inclination) if track.inclination else rail
     y, z = inclined.y, inclined.z - inclined.z.min()
@@ -197,17 +197,17 @@ def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
     """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
     points, gap = side.gaps(pose)
     k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
-    share = _share(gap, k)
+    share = _parabola_minimum(gap, k)
     return points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
 
 
-def _share(gap: Array, k: int) -> float:
+def _parabola_minimum(gap: Array, k: int) -> float:
     """Where the parabola through three gaps is least, in steps from the one in the middle."""
     rise, bend = _parabola(gap, k)
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
-def placed(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
+def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
     """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
     other = left or side
 
@@ -227,14 +227,14 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
     for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
         if gap[k] < DEEP and 0 < k < gap.size - 1:
-            touches.append(_touch(side, pose, points, gap, (first, k, last)))
+            touches.append(_touching_place(side, pose, points, gap, (first, k, last)))
     return sorted(touches, key=lambda touch: touch.gap)
 
 
-def _touch(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
+def _touching_place(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
     """One touching place, where the parabola through three gaps is least, and the distance around it."""
     first, k, last = at
-    share = _share(gap, k)
+    share = _parabola_minimum(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))

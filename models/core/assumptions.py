@@ -98,7 +98,7 @@ class Broken:
 def broken(run: Result, assumption: Assumption) -> Broken | None:
     """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
     judged = [
-        _rarely(run, assumption, where, values)
+        _longest_exceedance(run, assumption, where, values)
         if isinstance(values, Gaussian)
         else _broken(run, assumption, where, np.asarray(values, float))
         for where, values in assumption.watched(run).items()
@@ -117,7 +117,7 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
     return Broken(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
 
 
-def _rarely(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
+def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
     """Where a Gaussian lies beyond a limit for more than RARE of the time, by the row where that is for longest."""
     from scipy.special import ndtr
 
@@ -136,7 +136,7 @@ def _rarely(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken 
     return Broken(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
 
 
-def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
+def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with what it assumes, and what of that it broke; its status says so, too."""
     listed = list(assumptions)
     breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]

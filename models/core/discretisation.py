@@ -222,10 +222,10 @@ def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
     being that of the run."""
     share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL) ** (1.0 / estimate.order) if share < math.inf else 1.0
-    return replace(estimate, share=share, step=step / _parts(wanted))
+    return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
-def _parts(wanted: float) -> int:
+def _whole_divisor(wanted: float) -> int:
     """Least whole number from ``wanted`` on whose part of a step is a short decimal, so that it divides what the step
     divides."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))

@@ -30,14 +30,14 @@ class InputError(ValueError):
         self.choices = choices
         where = ": ".join(part for part in (str(file), place) if part)
         name = value if isinstance(value, str) else place.rpartition(".")[2]
-        super().__init__(f"{where}{_shown(value)}: {allowed}{nearest(name, choices)}")
+        super().__init__(f"{where}{_value_text(value)}: {allowed}{nearest(name, choices)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Parts from which the error is made again in another process."""
         return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Return `` = value`` as a scene file would hold it, cut to a readable length."""
     if value is None:
         return ""

@@ -48,10 +48,10 @@ def gathered(findings: Iterable[Finding]) -> list[Finding]:
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)
-    return [f for alike in kinds.values() for f in (alike if len(alike) <= FEW else [_worst(alike)])]
+    return [f for alike in kinds.values() for f in (alike if len(alike) <= FEW else [_largest_of_alike(alike)])]
 
 
-def _worst(alike: list[Finding]) -> Finding:
+def _largest_of_alike(alike: list[Finding]) -> Finding:
     """The one of the largest size, with the number of channels or places."""
     worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
     names = {name for finding in alike for name in finding.signals or (finding.place,)}

@@ -16,7 +16,7 @@ STILL, ROUNDING = 1e-6, 1e-9
 """m/s of the largest mass, and share of the velocities at the start, below which a motion is none."""
 
 
-def missing(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
+def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
     """Largest share of the velocities that two-step ways miss within a second, and the row where that second begins.
 
     positions, rates (m, n) at every step (s); mass (n, n) or its diagonal (n,) weighs one coordinate against another.
@@ -40,7 +40,7 @@ def check_resolved(engine: str, times: np.ndarray, positions: np.ndarray, rates:
     if len(times) < 3:
         return
     step = float(times[1] - times[0])
-    share, row = missing(positions, rates, step, mass)
+    share, row = missed_velocity_share(positions, rates, step, mass)
     if not share <= ALLOWED:
         raise RunFailed(
             engine,

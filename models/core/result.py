@@ -141,7 +141,7 @@ def result(
     return Result(data, detail)
 
 
-def joined(results: Mapping[str, Result], axis: str) -> Result:
+def join_results(results: Mapping[str, Result], axis: str) -> Result:
     """Results with the same channels as one, along a new first axis whose places have the mapping's names.
 
     The attributes are those of the first; counts, seconds, errors and assumptions stand by name.

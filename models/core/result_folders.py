@@ -22,13 +22,13 @@ def new_folder(wanted: Path | None, name: str) -> Path:
     get the same folder: it is made, or its first file is, in one step that only one of them can take.
     """
     if wanted is None:
-        return next(path for path in _candidates(name) if _made(path))
+        return next(path for path in _candidates(name) if _make_folder(path))
     try:
         if wanted.exists() and not wanted.is_dir():
             raise InputError("--out", "", str(wanted), "is a file: name a folder")
-        free = _made(wanted) or not any(wanted.iterdir())
+        free = _make_folder(wanted) or not any(wanted.iterdir())
     except OSError as error:
-        raise _unusable(wanted, "cannot be used", error) from None
+        raise _unwritable_folder(wanted, "cannot be used", error) from None
     if not free or not _marked(wanted):
         allowed = "holds files already and is left as it is: name a new or empty folder"
         raise InputError("--out", "", str(wanted), allowed)
@@ -78,17 +78,17 @@ def _candidates(name: str) -> Iterator[Path]:
         yield RESULTS / f"{name}-{i}"
 
 
-def _made(path: Path) -> bool:
+def _make_folder(path: Path) -> bool:
     """Make a folder; False if it is there already."""
     try:
         path.mkdir(parents=True)
     except FileExistsError:
         return False
     except OSError as error:
-        raise _unusable(path, "cannot be made", error) from None
+        raise _unwritable_folder(path, "cannot be made", error) from None
     return True
 
 
-def _unusable(folder: Path, reason: str, error: OSError) -> Exception:
+def _unwritable_folder(folder: Path, reason: str, error: OSError) -> Exception:
     """A full disk is no mistake of what the user wrote."""
     return error if error.errno in FULL else InputError("--out", "", str(folder), f"{reason}: {error.strerror}")

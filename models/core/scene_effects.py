@@ -142,12 +142,12 @@ def _files(system: str) -> dict[str, Path]:
 
 def listing(system: str) -> dict[str, str]:
     """First sentence of every effect of a system, read and not imported."""
-    says = {name: _says(file) for name, file in _files(system).items()}
+    says = {name: _first_sentence(file) for name, file in _files(system).items()}
     says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
     return dict(sorted(says.items()))
 
 
-def _says(file: Path) -> str:
+def _first_sentence(file: Path) -> str:
     try:
         text = ast.get_docstring(ast.parse(file.read_text())) or ""
     except SyntaxError as error:
@@ -184,10 +184,10 @@ def named(scene: Any) -> tuple[str, ...]:
 
 def _names(scene: Any, file: Path) -> bool:
     """Whether a scene names the effect of a file by its system's own tables."""
-    return _placed(file) and module_of(scene.system, file.stem).named(scene)
+    return _is_in_own_tables(file) and module_of(scene.system, file.stem).named(scene)
 
 
-def absent(scene: Any) -> tuple[str, ...]:
+def absent_effects(scene: Any) -> tuple[str, ...]:
     """Effects of its system that a scene does not name."""
     there = named(scene)
     return tuple(name for name in names_of(scene.system) if name not in there)
@@ -200,7 +200,7 @@ def tables_of(scene: Any) -> Mapping[str, Any]:
 
 
 @cache
-def _placed(file: Path) -> bool:
+def _is_in_own_tables(file: Path) -> bool:
     """Whether an effect is named by its system's own tables, as its file says, read and not imported."""
     return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
 
@@ -265,34 +265,35 @@ def legal(present: Iterable[str], scene: Any) -> None:
             if other not in present:
                 raise InputError(
                     scene.file,
-                    _place(module, name),
+                    _key_of_effect(module, name),
                     None,
-                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, present)}{_at(scene, other)}",
+                    f"needs the effect {other!r}{why}: name it too"
+                    f"{_what_to_drop(scene, other, present)}{_table_of_effect(scene, other)}",
                 )
         for other in module.EXCLUDES:
             if other in present:
                 raise InputError(
                     scene.file,
-                    _place(module, name),
+                    _key_of_effect(module, name),
                     None,
-                    f"cannot stand beside {other!r}{why}: drop one of them{_at(scene, other)}",
+                    f"cannot stand beside {other!r}{why}: drop one of them{_table_of_effect(scene, other)}",
                 )
 
 
-def _instead(scene: Any, name: str, present: tuple[str, ...]) -> str:
+def _what_to_drop(scene: Any, name: str, present: tuple[str, ...]) -> str:
     """Phrase on what must be dropped for an effect's sake."""
     clash = [other for other in module_of(scene.system, name).EXCLUDES if other in present]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
-def _place(module: Any, name: str) -> str:
+def _key_of_effect(module: Any, name: str) -> str:
     """The key that names an effect."""
     return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
 
 
-def _at(scene: Any, name: str) -> str:
+def _table_of_effect(scene: Any, name: str) -> str:
     """Where an effect is named that has no table of its name."""
-    place = _place(module_of(scene.system, name), name).removeprefix("effects.")
+    place = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
     return "" if place == name else f"; {name!r} is named by {place}"
 
 
@@ -329,7 +330,7 @@ def _depth(name: str, system: str) -> int:
     return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
-def beside(scene: Any, *more: str) -> Any:
+def with_effects(scene: Any, *more: str) -> Any:
     """The scene with these effects at their usual values; raises InputError where one cannot be, or not so."""
     table = own_table(scene)
     for name in more:
@@ -343,7 +344,7 @@ def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
     for name in effects:
         if (name in there) is not wanted:
             said = "cannot be in this scene: nothing of it takes part" if wanted else "is still there: leave it in"
-            raise InputError(scene.file, _place(module_of(scene.system, name), name), None, f"{name!r} {said}")
+            raise InputError(scene.file, _key_of_effect(module_of(scene.system, name), name), None, f"{name!r} {said}")
     return scene
 
 
@@ -356,7 +357,9 @@ def _put_in(table: Table, name: str, scene: Any) -> None:
     elif hasattr(module, "put_in"):
         module.put_in(table, scene)
     else:
-        raise InputError(scene.file, _place(module, name), None, "there are no usual values: name it in the scene")
+        raise InputError(
+            scene.file, _key_of_effect(module, name), None, "there are no usual values: name it in the scene"
+        )
 
 
 def rebuilt(table: Table, scene: Any) -> Any:
@@ -370,4 +373,4 @@ def lines(scene: Any, width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
     said = {name: module_of(scene.system, name).COST for name in named(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
-    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]
+    return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]

@@ -36,7 +36,7 @@ class SceneFile(Strict):
 
     @field_validator("quantities")
     @classmethod
-    def _once(cls, names: list[str]) -> list[str]:
+    def _refuse_repeats(cls, names: list[str]) -> list[str]:
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"names {name!r} twice")
@@ -155,18 +155,18 @@ def _apply(table: dict[str, Any], change: str) -> None:
     key, equals, text = (part.strip() for part in change.partition("="))
     if not equals or not all(key.split(".")):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
-    at, last = _holder(table, key, text, "--set")
+    at, last = _table_of_key(table, key, text, "--set")
     at[last] = _value(text)
 
 
-def put(table: dict[str, Any], key: str, value: Any) -> None:
+def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     """Set one nested key, as "run.step" or "manoeuvres.0.speed", to a plain value; None takes the key out.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
     """
     if not all(key.split(".")):
         raise InputError("set", "", key, "must name a key, for example run.step")
-    at, last = _holder(table, key, value, "set")
+    at, last = _table_of_key(table, key, value, "set")
     if value is not None:
         at[last] = value
     elif isinstance(at, list) or last in at:
@@ -175,7 +175,7 @@ def put(table: dict[str, Any], key: str, value: Any) -> None:
         raise InputError("set", key, None, "is not in the scene and cannot be taken out", tuple(at))
 
 
-def _holder(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
+def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
     """The table or list that holds a nested key, made where there is none, and the key's place in it.
 
     value, file : what a message shows as offending, and where it was written.

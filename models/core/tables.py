@@ -89,7 +89,7 @@ def read_table(
         text = plain_text(path, text, tuple(columns))
     header, rows = _header_and_rows(path, text)
     names, factors = headings(path, header, columns)
-    raw = _numbers(path, text, tuple(gaps and name != increasing for name in names))
+    raw = _all_cells(path, text, tuple(gaps and name != increasing for name in names))
     if len(rows) < least:
         raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
@@ -140,7 +140,7 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
     return used[0], used[1:]
 
 
-def ended(path: str | Path) -> bool:
+def has_line_end(path: str | Path) -> bool:
     """Whether the last line of a file has a line end; where not, its last number may lack digits."""
     with Path(path).open("rb") as file:
         size = file.seek(0, io.SEEK_END)
@@ -177,7 +177,7 @@ def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tup
             raise InputError(path, place, name, "this column appears twice")
     for name in columns:
         if name not in names:
-            raise InputError(path, place, header[1], f"column {name!r} is missing; wanted: {_wanted(columns)}")
+            raise InputError(path, place, header[1], f"column {name!r} is missing; wanted: {_header_wanted(columns)}")
     return list(names), list(factors)
 
 
@@ -186,7 +186,7 @@ def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple
     match = _HEADING.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
     if name not in columns:
-        allowed = f"this column is not known; wanted, separated by commas: {_wanted(columns)}"
+        allowed = f"this column is not known; wanted, separated by commas: {_header_wanted(columns)}"
         raise InputError(path, place, name, allowed, tuple(columns))
     units = tuple(columns[name])
     if unit is None:
@@ -196,13 +196,13 @@ def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple
     return name, columns[name][unit]
 
 
-def _wanted(columns: Columns) -> str:
+def _header_wanted(columns: Columns) -> str:
     """Return the wanted header, with the first unit of each column."""
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
 @lru_cache(KEPT)
-def _numbers(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
+def _all_cells(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
     """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
     header, rows = _header_and_rows(path, text)
     headings = header[1].split(",")
@@ -288,7 +288,7 @@ def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
 
 def _block(path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:
     lines, wrong = [line for line, _ in block], {}
-    values = _all(block, len(names))
+    values = _rows_at_once(block, len(names))
     if values is None:
         values = np.full((len(block), len(names)), np.nan)
         for i, (line, text) in enumerate(block):
@@ -300,7 +300,7 @@ def _block(path: Path, block: list[tuple[int, str]], names: list[str], factors: 
     return Block(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
 
 
-def _all(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
+def _rows_at_once(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
     """All rows at once, where none of them needs a closer look."""
     rows = [text for _, text in block]
     if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):

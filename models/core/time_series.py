@@ -38,7 +38,7 @@ def read_time_series(
 
 
 def other_unit(lasts: float, needed: float) -> str:
-    """Sentence on a file that lasts for so little (s) of the needed time that its times may be in another unit."""
+    """Hint that the times of a file may be in milliseconds, if it is far shorter (s) than needed; else empty."""
     wrong = lasts < needed / SHORT
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 

@@ -29,19 +29,21 @@ def _errors(results: Results) -> list[str]:
     for name, run in results.items():
         for line in error_lines(run) if name not in worst else ():
             untold.setdefault(line, []).append(name)
-    listed = [f"  {_few(names)}: {line}" for line, names in untold.items()]
+    listed = [f"  {_list_of_few(names)}: {line}" for line, names in untold.items()]
     if not worst:
         return listed
     largest = max(worst, key=lambda name: worst[name].share)
     warned = [name for name, estimate in worst.items() if estimate.warned]
     more = (
-        [f"  errors above {100.0 * WARNED:g} % in {len(warned)} of {len(worst)}: {_few(warned)}"] if warned[1:] else []
+        [f"  errors above {100.0 * WARNED:g} % in {len(warned)} of {len(worst)}: {_list_of_few(warned)}"]
+        if warned[1:]
+        else []
     )
     first = f"  {len(worst)} results, the largest error {largest}: {error_lines(results[largest])[0]}"
     return [first, *more, *listed]
 
 
-def _few(names: list[str]) -> str:
+def _list_of_few(names: list[str]) -> str:
     return ", ".join(names[:EACH]) + (f" and {len(names) - EACH} more" if len(names) > EACH else "")
 
 
@@ -54,7 +56,7 @@ def breaches(results: Results) -> list[tuple[str, Broken]]:
             where.setdefault(breach.name, []).append(name)
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
-    return [(_few(where[name]), breach) for name, breach in worst.items()]
+    return [(_list_of_few(where[name]), breach) for name, breach in worst.items()]
 
 
 def remarks(results: Results) -> list[str]:
@@ -113,7 +115,7 @@ def as_json(results: Results) -> dict[str, Any]:
 
 
 def summarised(summary: dict[str, Any]) -> dict[str, Any]:
-    """A study's summary with the errors and assumptions of the "results" that it hands over, told at its end."""
+    """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
     results = summary.pop("results", {})
     return summary | as_json(results) | {"table": [*summary.get("table", []), *lines(results)]}
 

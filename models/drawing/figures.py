@@ -193,7 +193,7 @@ FEW = ("", "2", "4")
 """What stands before a power of ten that is written on an axis of one decade to ``MANY``."""
 
 
-def _narrow(low: float, high: float) -> bool:
+def _spans_few_decades(low: float, high: float) -> bool:
     return 0 < low < high and bool(np.log10(high / low) < MANY)
 
 
@@ -206,9 +206,9 @@ class _Powers(LogFormatterSciNotation):
         if not power:
             return text
         low, high = sorted(self.axis.get_view_interval()) if self.axis else (0.0, 0.0)
-        if _narrow(low, high) and high > 10 * low and (power[1] or "") not in FEW:
+        if _spans_few_decades(low, high) and high > 10 * low and (power[1] or "") not in FEW:
             return ""
-        if _narrow(low, high) and 1e-3 <= x < 1e5:
+        if _spans_few_decades(low, high) and 1e-3 <= x < 1e5:
             return f"{x:g}"
         return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(RAISED)}"
 
@@ -218,7 +218,7 @@ class _Between(LogLocator):
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
         """Marks of an axis, as matplotlib asks for them."""
-        return super().tick_values(vmin, vmax) if _narrow(vmin, vmax) else np.array([])
+        return super().tick_values(vmin, vmax) if _spans_few_decades(vmin, vmax) else np.array([])
 
 
 class PlainLogScale(LogScale):

@@ -56,9 +56,9 @@ def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, dampi
     _check(deviation, step, mass, damping, steps)
     h = _stable(damping * step)
     kick = (deviation * step / mass) ** 2
-    last, before = _gone(h, steps), _gone(h, steps - 1)
+    last, before = _geometric_sum(h, steps), _geometric_sum(h, steps - 1)
     mixed = (1 - h) * last * before / (2 - h) if h else steps * (steps - 1) / 2
-    velocity = _gone(h * (2 - h), steps)
+    velocity = _geometric_sum(h * (2 - h), steps)
     return kick * np.array([[step**2 * _squares(h, steps), step * mixed], [step * mixed, velocity]])
 
 
@@ -69,7 +69,7 @@ def _stable(h: float) -> float:
     return h
 
 
-def _gone(h: float, n: int) -> float:
+def _geometric_sum(h: float, n: int) -> float:
     """(1 - (1 - h)^n) / h: the sum of (1 - h)^i over i < n."""
     if h == 0 or n <= 0:
         return float(max(n, 0))
@@ -85,7 +85,7 @@ def _squares(h: float, n: int) -> float:
     if n == 0:
         return 0.0
     if n * h > SMALL:
-        return (n - 2 * _gone(h, n) + _gone(h * (2 - h), n)) / h**2
+        return (n - 2 * _geometric_sum(h, n) + _geometric_sum(h * (2 - h), n)) / h**2
     terms = range(2, 40)
     whole = ((math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms)
     return n**3 / (2 - h) * math.fsum(c / d * (-n * h) ** (k - 2) for k, (c, d) in zip(terms, whole, strict=True))

@@ -130,9 +130,9 @@ def figures_of_run(run: Result, p: Parameters) -> RunFigures:
     return RunFigures(
         moment_rms=rms(moment),
         moment_max=float(np.abs(moment).max()),
-        moment_share=_share(moment, inertia),
-        moment_share_band=_share(band["moment"], band["inertia"]),
-        force_share_band=_share(band["force"], band["heave"]),
+        moment_share=_rms_ratio(moment, inertia),
+        moment_share_band=_rms_ratio(band["moment"], band["inertia"]),
+        force_share_band=_rms_ratio(band["force"], band["heave"]),
         pitch_max=float(np.abs(run["pitch"]).max()),
         seconds=float(run.data.attrs["seconds"]),
         force_calls=counts.get("force calls", 0),
@@ -167,7 +167,7 @@ def verdict(figures: RunFigures, deviations: Errors, effects: Iterable[str], lim
     """
     if figures.pitch_max > TUMBLED:
         return _tumbled(figures)
-    wrong = [*_beyond(deviations, limits), *_burden(figures, limits)]
+    wrong = [*_exceeded_limits(deviations, limits), *_burden(figures, limits)]
     if not wrong:
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
     stabilised = not set(effects).isdisjoint((*MEASURED, *LEVEL))
@@ -240,7 +240,7 @@ def _free(duration: float, trusted: float | None) -> Verdict:
     return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
 
 
-def _beyond(deviations: Errors, limits: Limits) -> list[str]:
+def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
     """Sentences on errors against the true run that are above their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
@@ -274,7 +274,7 @@ def low_pass(values: np.ndarray, step: float) -> np.ndarray:
     return sosfiltfilt(butter(ORDER, BAND, fs=1.0 / step, output="sos"), values)
 
 
-def _share(values: np.ndarray, total: np.ndarray) -> float:
+def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
     """Rms of a part divided by that of the total; 0 where both are 0."""
     size, all_of_it = rms(values), rms(total)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)

@@ -143,7 +143,7 @@ class HubModel:
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
         states[0] = np.concatenate((q, v))
         for first, last in self.hub_inputs.spans():
-            self._hold(first, last)
+            self._hold_forces(first, last)
             try:
                 path = self._march(states[first, : self.size], states[first, self.size :], last - first)
             except RunFailed as error:
@@ -165,7 +165,7 @@ class HubModel:
     def _times(self, steps: int) -> np.ndarray:
         return self.step * np.arange(steps + 1)
 
-    def _hold(self, first: int, last: int) -> None:
+    def _hold_forces(self, first: int, last: int) -> None:
         """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
         hub_inputs = self.hub_inputs.during(first, last)
         if self.plain:
@@ -264,7 +264,7 @@ def _check(engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, rows: int) -
 
 
 def _check_settings(engine: str, vehicle: CutVehicle, settings: Settings) -> None:
-    """Refused where fixed steps are too long, or where the engine has no such integrator."""
+    """Raise Refused if fixed steps are too long, or if the engine does not have the integrator."""
     adaptive = ADAPTIVE.get("reference" if engine == PLAIN else engine, ())
     if settings.integrator == FIXED:
         check_step(engine, vehicle, settings.step, settings.duration)

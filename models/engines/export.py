@@ -85,7 +85,7 @@ def of_free(engine: str, driven: Driven, subject: Subject, left_out: Sequence[st
     vehicle, lowered = realisable(driven.vehicle)
     driven = replace(driven, vehicle=vehicle)
     spec = specified(driven)
-    add_shapes(spec, shown(vehicle, {body.name for body in spec.bodies}))
+    add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     return of_mujoco(spec, compiled(spec, driven), names_of(vehicle), subject, [*left_out, *lowered])
 
 
@@ -96,7 +96,7 @@ def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
     return bodies | {f"{numbers[name]} {freedom}": f"{name} {freedom}" for name, freedom in vehicle.coordinates()}
 
 
-def shown(vehicle: SpatialVehicle, built: Iterable[str]) -> dict[str, float]:
+def masses_of_shown_bodies(vehicle: SpatialVehicle, built: Iterable[str]) -> dict[str, float]:
     """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
     return {str(i): body.mass for i, body in enumerate(vehicle.bodies) if str(i) in set(built) and body.mass > SEEN}
 

@@ -15,7 +15,16 @@ import numpy as np
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.exudyn_clock import Clock
-from models.engines.exudyn_system import KINDS, counted, items, march_settings, mass_and_force, recorders, solve, start
+from models.engines.exudyn_system import (
+    KINDS,
+    items,
+    march_settings,
+    mass_and_force,
+    recorders,
+    solve,
+    solver_counts,
+    start,
+)
 from models.engines.protocol import balanced, guard, landings_followed
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
@@ -37,7 +46,7 @@ class Build:
     callbacks: int = 0
 
 
-def _exact(assembly: Assembly) -> Build:
+def _exact_bodies(assembly: Assembly) -> Build:
     """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -151,7 +160,7 @@ def _linear(assembly: Assembly) -> Build:
 
 def native(assembly: Assembly) -> Build:
     """Bodies, weights, springs and dampers without any input, in a system that is not assembled yet."""
-    return _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+    return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
 
 
 def columns(built: Build, vehicle: Vehicle) -> list[int]:
@@ -260,10 +269,10 @@ class ExudynModel:
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
         accelerations = self._free_acceleration(time, q, v)
-        accelerations[list(self.assembly.guided)] = self._wanted(time)
+        accelerations[list(self.assembly.guided)] = self._prescribed_accelerations(time)
         return accelerations
 
-    def _wanted(self, time: float) -> np.ndarray:
+    def _prescribed_accelerations(self, time: float) -> np.ndarray:
         """Accelerations of the prescribed coordinates, if any."""
         signal, count = self.assembly.input, len(self.assembly.guided)
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
@@ -298,7 +307,7 @@ class ExudynModel:
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
         landings_followed("exudyn", self.assembly, self.settings, times, states)
-        counts = counted(self.built.mbs)
+        counts = solver_counts(self.built.mbs)
         if enforced is not None:
             balanced("exudyn", times, enforced, lambda i: self._balance(times[i], states[i]))
         return Trajectory(times, states, enforced, counts)
@@ -306,7 +315,7 @@ class ExudynModel:
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forces that enforce the prescribed coordinates at one row of a run, and their inertia terms (N, N m)."""
         wanted, free = (
-            self._wanted(time),
+            self._prescribed_accelerations(time),
             self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],
         )
         return self._inertia * (wanted - free), self._inertia * wanted

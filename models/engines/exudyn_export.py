@@ -153,7 +153,7 @@ class _Writer:
                     yield key, self.need(referred, int(value))
             elif referred:
                 yield key, f"[{', '.join(self.need(referred, int(each)) for each in value)}]"
-            elif (text := _literal(value)) not in (_literal(usual[key]), "[]"):
+            elif (text := _python_text(value)) not in (_python_text(usual[key]), "[]"):
                 yield key, text
 
 
@@ -162,18 +162,18 @@ def _class(kind: str, item: dict[str, Any]) -> str:
     return f"{kind.capitalize()}{item[f'{kind}Type']}"
 
 
-def _literal(value: Any) -> str:
+def _python_text(value: Any) -> str:
     """A value as the script has it; matrices as arrays, Exudyn's own lists by their constructors."""
     if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
         entries: Any = value  # Exudyn's type hints do not know that these are lists
-        inner = ", ".join(_literal(np.asarray(entries[i]).tolist()) for i in range(len(entries)))
+        inner = ", ".join(_python_text(np.asarray(entries[i]).tolist()) for i in range(len(entries)))
         return f"exu.{type(value).__name__}([{inner}])" if len(entries) else "[]"
     if isinstance(value, exu.MatrixContainer):
-        return _literal(np.array(value.Convert2DenseMatrix()))
+        return _python_text(np.array(value.Convert2DenseMatrix()))
     if isinstance(value, np.ndarray):
         return f"np.array({value.tolist()!r})" if value.ndim > 1 and value.size else repr(value.ravel().tolist())
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_literal, value))}]"
+        return f"[{', '.join(map(_python_text, value))}]"
     if hasattr(value, "name") and hasattr(type(value), "__members__"):
         return f"exu.{type(value).__name__}.{value.name}"
     if value is None or isinstance(value, bool | int | float | str):

@@ -110,10 +110,10 @@ def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
     with marching(lambda: mbs.systemData.GetTime() / settings.duration):
-        return ended(mbs, settings.integrator, options)
+        return solver_failure(mbs, settings.integrator, options)
 
 
-def ended(mbs: Any, integrator: str, options: Any) -> str:
+def solver_failure(mbs: Any, integrator: str, options: Any) -> str:
     """How Exudyn's solver ended, as a phrase; empty if well."""
     try:
         done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, integrator))
@@ -124,7 +124,7 @@ def ended(mbs: Any, integrator: str, options: Any) -> str:
     return "" if done else "; the solver reported failure"
 
 
-def counted(mbs: Any) -> dict[str, int]:
+def solver_counts(mbs: Any) -> dict[str, int]:
     """Steps, evaluations of the forces and Jacobians of a system's last run, from the solver's own counters."""
     solver = mbs.sys["dynamicSolver"]
     steps = solver.it.currentStepIndex - 1

@@ -34,15 +34,15 @@ def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: S
 
 def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
     """States (steps + 1, 2 n), a row at a time, and what it took."""
-    from models.engines.exudyn_system import counted, ended, start
+    from models.engines.exudyn_system import solver_counts, solver_failure, start
 
     mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
     states[0], counts = begun, {"steps": 0, "force calls": 0}
     for i in range(settings.steps):
         start(mbs, *np.split(states[i], 2))
-        if ended(mbs, settings.integrator, _options(i * settings.step, settings)):
+        if solver_failure(mbs, settings.integrator, _options(i * settings.step, settings)):
             raise RunFailed("exudyn", "no step is short enough for its tolerance", i * settings.step, states[i])
-        data, took = mbs.systemData, counted(mbs)
+        data, took = mbs.systemData, solver_counts(mbs)
         states[i + 1] = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
         counts = {name: count + took[name] for name, count in counts.items()}
     return states, counts

@@ -14,7 +14,7 @@ from models.engines.mujoco_layout import check
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed
-from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.native_mujoco import (
     add_ground_spring,
     add_line_spring,
@@ -72,10 +72,10 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     """The model of ``specified`` with all its numbers, without the callback."""
     model = spec.compile()
     model.numeric_data[:] = driven.numbers
-    places = Numbers(driven.vehicle, model, _merged(driven))
+    places = MujocoIndices(driven.vehicle, model, _merged(driven))
     if not np.array_equal(places.columns, np.arange(driven.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
-    weigh(model, places, driven.vehicle.bodies)
+    set_masses(model, places, driven.vehicle.bodies)
     set_laws(model, driven.parts)
     set_rotors(model, rotors(driven.vehicle))
     set_line_springs(model, driven.line_springs)

@@ -42,17 +42,17 @@ def _move_alike(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarr
     and is taken from the heaviest body that always lies parallel to these.
     """
     tensor = tensors[body.name]
-    axes = {turn for name in vehicle.chain(body.name) for turn in _turns(vehicle.body(name))}
+    axes = {turn for name in vehicle.chain(body.name) for turn in _turning_freedoms(vehicle.body(name))}
     if len(axes) <= 1:
         place = "xyz".index(axes.pop()[1]) if axes else 0
         tensors[body.name] = float(tensor[place, place]) * np.eye(3)
-    elif len(_turns(body)) == 1 and np.count_nonzero(tensor) == 1 and body.parent is not None:
+    elif len(_turning_freedoms(body)) == 1 and np.count_nonzero(tensor) == 1 and body.parent is not None:
         across = (0.5 + MARGIN) * (tensor.max() * np.eye(3) - tensor)
         tensors[body.name] = tensor + across
         tensors[max(_parallel(vehicle, body.parent), key=lambda name: float(np.trace(tensors[name])))] -= across
 
 
-def _turns(body: Body) -> list[str]:
+def _turning_freedoms(body: Body) -> list[str]:
     """Freedoms by which a body turns beside what it rides on."""
     return [freedom for freedom in body.freedoms if freedom.startswith("r")]
 
@@ -62,7 +62,7 @@ def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
 
     def leader(name: str) -> str:
         body = vehicle.body(name)
-        return name if _turns(body) or body.parent is None else leader(body.parent)
+        return name if _turning_freedoms(body) or body.parent is None else leader(body.parent)
 
     return [body.name for body in vehicle.bodies if leader(body.name) == leader(name)]
 

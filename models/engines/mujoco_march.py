@@ -8,7 +8,7 @@ from mujoco import rollout
 
 from models.core.errors import RunFailed
 from models.core.waiting import marching
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_quiet import without_warnings
 from models.engines.protocol import guard
 
 CHUNK = 4096
@@ -35,7 +35,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
     path[0, 0], path[0, 1:] = 0.0, start
     for warning in data.warning:
         warning.number = 0
-    with quiet(), marching(lambda: data.time / times[-1]):
+    with without_warnings(), marching(lambda: data.time / times[-1]):
         for first, last in _chunks(steps):
             rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
             rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])

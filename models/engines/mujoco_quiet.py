@@ -10,7 +10,7 @@ from models.core.errors import RunFailed
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def without_warnings() -> Iterator[None]:
     """Keep MuJoCo from printing warnings and writing a log into the user's folder: the guard reports them."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
@@ -33,7 +33,7 @@ def installed(law: Any) -> Iterator[None]:
         return
     mujoco.set_mjcb_passive(law.ctypes)
     try:
-        with quiet():
+        with without_warnings():
             yield
     finally:
         mujoco.set_mjcb_passive(None)

@@ -72,7 +72,7 @@ def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
     return inertias, quaternion
 
 
-class Numbers:
+class MujocoIndices:
     """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order.
 
     carriers : bodies that are one there with the only one that rides on them, by its name.
@@ -87,7 +87,7 @@ class Numbers:
         self.columns = np.array(list(self.joints.values()))
 
 
-def weigh(model: mujoco.MjModel, numbers: Numbers, bodies: Iterable[Body]) -> None:
+def set_masses(model: mujoco.MjModel, numbers: MujocoIndices, bodies: Iterable[Body]) -> None:
     """Give the bodies their masses and principal inertias, summed where they are one."""
     model.body_mass[1:] = model.body_inertia[1:] = 0.0
     for body in bodies:

@@ -100,8 +100,11 @@ class LineSpring:
 
 @dataclass(frozen=True)
 class Division:
-    """native : the engine's own; shared : elements with what the compiled forces have of their laws; reasons : of
-    these, by name."""
+    """How the elements of a vehicle are divided between an engine and the compiled forces.
+
+    native : elements that the engine itself computes; shared : the rest of each law, which the compiled forces add;
+    reasons : why an element is shared, by its name.
+    """
 
     native: tuple[NativePart, ...]
     shared: tuple[Element, ...]
@@ -109,7 +112,7 @@ class Division:
 
 
 def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
-    """Elements of a vehicle's tree between "exudyn" or "mujoco" and the compiled forces."""
+    """Divide the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
     for element in elements:
         travel = travel_of(tree, element)
@@ -147,9 +150,9 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 
 def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
-    """The joint elements of a vehicle that have a force, as every engine has them; their inertia is left to it."""
+    """Joint elements with a spring, damper or friction, as native parts; each engine adds their inertia itself."""
     return tuple(
-        NativePart(_joint_force(element), CoordinateTravel(_numbers(vehicle, element), element.factors))
+        NativePart(_joint_force(element), CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors))
         for element in vehicle.joint_elements
         if element.stiffness or element.damping or element.held
     )
@@ -158,13 +161,13 @@ def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
 def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]:
     """Name, travel and inertia (kg, kg m^2) of the joint elements that have one."""
     return [
-        (element.name, CoordinateTravel(_numbers(vehicle, element), element.factors), element.inertia)
+        (element.name, CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors), element.inertia)
         for element in vehicle.joint_elements
         if element.inertia
     ]
 
 
-def _numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple[int, ...]:
+def _coordinate_numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple[int, ...]:
     places = {place: i for i, place in enumerate(vehicle.coordinates())}
     return tuple(places[place] for place in element.coordinates)
 
@@ -177,8 +180,8 @@ def _joint_force(element: JointElement) -> Element:
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element as an engine may have it; None where it is neither."""
-    first, two = (_behind(tree, end, element.frame) for end in (element.first_body, element.second_body))
-    if first is not None and two is not None and not any(_turns(tree, body) for body in (*first, *two)):
+    first, two = (_bodies_up_to_frame(tree, end, element.frame) for end in (element.first_body, element.second_body))
+    if first is not None and two is not None and not any(_turns_on_carrier(tree, body) for body in (*first, *two)):
         return _along_coordinates(tree, element, first, two)
     if element.frame == element.second_body and first is not None:
         return AxialTravel(
@@ -191,12 +194,12 @@ def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | Axia
     return None
 
 
-def _turns(tree: SpatialVehicle, body: str) -> bool:
+def _turns_on_carrier(tree: SpatialVehicle, body: str) -> bool:
     """Whether a body turns against the body that carries it."""
     return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
 
 
-def _behind(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
+def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
     """The bodies from one up to that which rides on the frame; None where the frame does not carry it."""
     chain = tree.chain(body)
     return chain[: chain.index(frame)] if frame in chain else None

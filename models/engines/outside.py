@@ -46,7 +46,7 @@ def register(name: str) -> None:
     outside_class = _class(name)
     order = getattr(outside_class, "order", None)
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST:
-        raise _unusable(name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST}")
+        raise _unusable_engine(name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST}")
     integrates = callable(getattr(outside_class, "integrate", None))
     missing = (
         []
@@ -58,7 +58,7 @@ def register(name: str) -> None:
         ]
     )
     if missing:
-        raise _unusable(
+        raise _unusable_engine(
             name,
             f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
             "state), an integrator has integrate(f, times, start, tolerance)",
@@ -68,26 +68,26 @@ def register(name: str) -> None:
     RECOMMENDED[name], OUTSIDE[name] = name, outside_class
 
 
-def _unusable(name: str, why: str) -> InputError:
+def _unusable_engine(name: str, why: str) -> InputError:
     return InputError("--engine", "", name, why)
 
 
 def _class(name: str) -> type:
     module, _, attribute = name.partition(":")
     if not all(part.isidentifier() for part in (*module.split("."), attribute)):
-        raise _unusable(name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
+        raise _unusable_engine(name, "must read module:Class, for mine.py in this folder for example mine:Scipy")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:
         outside_class = getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
-        raise _unusable(name, f"there is no module {error.name!r} here, nor among the installed ones") from None
+        raise _unusable_engine(name, f"there is no module {error.name!r} here, nor among the installed ones") from None
     except AttributeError:
-        raise _unusable(name, f"the module {module} has no {attribute}") from None
+        raise _unusable_engine(name, f"the module {module} has no {attribute}") from None
     except (Exception, SystemExit) as error:
-        raise _unusable(name, f"the module {module} cannot be imported: {_said(error)}") from None
+        raise _unusable_engine(name, f"the module {module} cannot be imported: {_said(error)}") from None
     if not isinstance(outside_class, type):
-        raise _unusable(name, f"{attribute} is no class")
+        raise _unusable_engine(name, f"{attribute} is no class")
     return outside_class
 
 
@@ -99,11 +99,11 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     """The class on an assembly: as an engine of its own, or as an integrator of the reference's equations."""
     outside_class = OUTSIDE[name]
     if callable(getattr(outside_class, "integrate", None)):
-        return Integrated(assembly, settings, name, _asked(name, "building it", outside_class).integrate)
-    return Guarded(name, _asked(name, "building it", outside_class, assembly, settings), assembly, settings)
+        return Integrated(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
+    return Guarded(name, _call_engine(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
-def _asked(name: str, question: str, function: Callable, *arguments: Any) -> Any:
+def _call_engine(name: str, question: str, function: Callable, *arguments: Any) -> Any:
     """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
     errors."""
     try:
@@ -114,7 +114,7 @@ def _asked(name: str, question: str, function: Callable, *arguments: Any) -> Any
         raise RunFailed(name, f"{question} raised {_said(error)}") from error
 
 
-def _numbers(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _answer_as_array(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An answer as an array of this shape; RunFailed if it is none."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
@@ -151,8 +151,8 @@ class Integrated(Reference):
             last = [] if len(within) and within[-1] > end - 1e-9 * self.settings.step else [end]
             grid = np.array([start, *within, *last])
             asked = (self._rhs(start, end, calls), grid, y.copy(), self.settings.tolerance)
-            answer = _asked(self.name, "integrate", self.integrate, *asked)
-            states_then = _numbers(self.name, "integrate", answer, (len(grid), 8))
+            answer = _call_engine(self.name, "integrate", self.integrate, *asked)
+            states_then = _answer_as_array(self.name, "integrate", answer, (len(grid), 8))
             states[inside], y = states_then[1 : 1 + len(within)], states_then[-1]
             if not np.isfinite(y).all():
                 raise RunFailed(self.name, "the state became infinite or not a number", start)
@@ -182,22 +182,22 @@ class Guarded:
 
     def run(self) -> Trajectory:
         """The trajectory of the outside engine's run, checked."""
-        answer = _asked(self.name, "run", self.model.run)
+        answer = _call_engine(self.name, "run", self.model.run)
         if not (hasattr(answer, "times") and hasattr(answer, "states")):
             raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
         count = np.size(answer.times)
-        times = _numbers(self.name, "run, as times,", answer.times, (count,))
-        states = _numbers(self.name, "run, as states,", answer.states, (count, 8))
+        times = _answer_as_array(self.name, "run, as times,", answer.times, (count,))
+        states = _answer_as_array(self.name, "run, as states,", answer.states, (count, 8))
         enforced = getattr(answer, "enforced", None)
         if self.assembly.guided:
-            enforced = _numbers(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
+            enforced = _answer_as_array(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
         guard(self.name, times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), which the class gets as one state (8,)."""
-        answer = _asked(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
-        return _numbers(self.name, "acceleration", answer, (4,))
+        answer = _call_engine(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
+        return _answer_as_array(self.name, "acceleration", answer, (4,))
 
     def plan(self) -> dict[str, int]:
         """Counts of what an outside engine built, as far as it states them."""

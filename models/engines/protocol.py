@@ -44,7 +44,7 @@ def check(engine: str, assembly: Assembly, settings: Settings) -> None:
     integrator = CATALOGUE[engine][settings.integrator]
     if (engine, settings.integrator) in MISSING:
         raise Refused(engine, MISSING[engine, settings.integrator])
-    _whole(engine, settings.step, "the duration", settings.duration)
+    _refuse_uneven_step(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
         right = (name for name, known in CATALOGUE[engine].items() if known.constraints)
         raise Refused(
@@ -91,10 +91,10 @@ def _sampling(engine: str, integrator: Integrator, settings: Settings, period: f
             "use interpolation = 'linear' or 'smooth', or an explicit Runge-Kutta integrator",
         )
     if not integrator.adaptive:
-        _whole(engine, settings.step, "the sampling period", period)
+        _refuse_uneven_step(engine, settings.step, "the sampling period", period)
 
 
-def _whole(engine: str, step: float, multiple: str, length: float) -> None:
+def _refuse_uneven_step(engine: str, step: float, multiple: str, length: float) -> None:
     if not divides(step, length):
         raise Refused(
             engine,

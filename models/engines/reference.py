@@ -108,13 +108,13 @@ class Reference:
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
-        return derivative_of(*self._key)(np.concatenate((q, v)), self._at(time), self._p)[4:]
+        return derivative_of(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:
         """Counts of what the reference built: equations alone."""
         return {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
 
-    def _at(self, time: float) -> np.ndarray:
+    def _input_at(self, time: float) -> np.ndarray:
         return NO_INPUT[0] if self._input is None else self._input.at(time)
 
     def _inputs(self) -> tuple[np.ndarray, tuple[int, int, int]]:
@@ -156,7 +156,7 @@ class Reference:
         for start, end, inside in self._stretches(times, self.settings.duration):
             within = times[inside]
             dense = bool(len(within)) and within[0] < end - 1e-9 * h  # else a row at the end at most, which is y there
-            solution = self._piece(start, end, y, dense)
+            solution = self._march_piece(start, end, y, dense)
             y = solution.y[:, -1]
             if len(within):
                 states[inside] = solution.sol(np.minimum(within, end)).T if dense else y
@@ -172,7 +172,7 @@ class Reference:
         for start, end in pairwise((0.0, *knots, last)):
             yield start, end, slice(*np.searchsorted(times, (start + small, end + small)))
 
-    def _piece(self, start: float, end: float, y: np.ndarray, dense: bool):
+    def _march_piece(self, start: float, end: float, y: np.ndarray, dense: bool):
         from scipy.integrate import solve_ivp
 
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)
@@ -201,12 +201,12 @@ class Reference:
 
     def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
         """The input within one piece: held forces stay what they are in its middle, all beside them moves on."""
-        middle = self._at(0.5 * (start + end))
+        middle = self._input_at(0.5 * (start + end))
         if self._input is None or (self._input.held and self._input.channels == 2):
             return lambda t: middle
         if self._input.held:
-            return lambda t: np.concatenate((middle[:2], self._at(t)[2:]))
-        return self._at
+            return lambda t: np.concatenate((middle[:2], self._input_at(t)[2:]))
+        return self._input_at
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray | None:
         """Enforced moment A = I beta'' - cos(beta) (b f3 - a f4), below eq. (34), and force m3 (z3'' - g) + f3 + f4."""

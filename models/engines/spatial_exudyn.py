@@ -7,9 +7,9 @@ import numpy as np
 
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import KINDS, counted, mass_and_force, quiet_settings, recorders, solve, start
+from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, solver_counts, start
 from models.engines.protocol import timed
-from models.engines.spatial_exudyn_build import RoadTable, assemble
+from models.engines.spatial_exudyn_build import RoadRows, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,
     EngineKinematics,
@@ -32,7 +32,7 @@ class SpatialExudyn:
         self.size = len(vehicle.coordinates())
         per_time = 2.0 / settings.step if settings is not None and road is not None else 0.0
         self._flat = np.zeros((1, 2 * len(vehicle.tyres)))
-        self.road = RoadTable(self._flat if road is None else road, per_time)
+        self.road = RoadRows(self._flat if road is None else road, per_time)
         self.built = assemble(vehicle, speed, self.road)
         mbs = self.mbs = self.built.mbs
         places = [self.built.places[place] for place in vehicle.coordinates()]
@@ -40,7 +40,7 @@ class SpatialExudyn:
         mbs.Assemble()
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 
-    def _all(self, values: np.ndarray) -> np.ndarray:
+    def _values_in_exudyn_order(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) in Exudyn's own order, tree by tree."""
         out = np.empty(self.size)
         out[self._columns] = values
@@ -55,7 +55,7 @@ class SpatialExudyn:
             return np.linalg.solve(*self._mass_and_force(q, v))
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        start(self.mbs, self._all(q), self._all(v))
+        start(self.mbs, self._values_in_exudyn_order(q), self._values_in_exudyn_order(v))
         mass, force = mass_and_force(self.mbs, time)
         return mass[np.ix_(self._columns, self._columns)], force[self._columns]
 
@@ -106,16 +106,20 @@ class SpatialExudyn:
         data, columns = self.mbs.systemData, []
         data.SetODE2Coordinates(np.zeros(self.size))
         for unit in np.eye(self.size):
-            data.SetODE2Coordinates_t(self._all(unit))
+            data.SetODE2Coordinates_t(self._values_in_exudyn_order(unit))
             columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
         return np.column_stack(columns)
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
         """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
         settings, rest = timed("exudyn", self.settings), np.zeros(self.size)
-        start(self.mbs, self._all(rest if q is None else q), self._all(rest if v is None else v))
+        start(
+            self.mbs,
+            self._values_in_exudyn_order(rest if q is None else q),
+            self._values_in_exudyn_order(rest if v is None else v),
+        )
         note = solve(self.mbs, settings)
-        return sound("exudyn", settings, *self._recorded(settings), note, counted(self.mbs))
+        return sound("exudyn", settings, *self._recorded(settings), note, solver_counts(self.mbs))
 
     def _recorded(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Times (m,) and states (m, 2 n) from the sensors. Steps are counted: Exudyn's sum of them ends 1e-13 early."""

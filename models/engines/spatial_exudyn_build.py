@@ -37,7 +37,7 @@ class RoadForces:
 
 
 @dataclass
-class RoadTable:
+class RoadRows:
     """Heights (m) under the tyres, then their rates (m/s), ``per_time`` rows in a second, and all forces of them."""
 
     rows: np.ndarray
@@ -147,7 +147,7 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
         built.callbacks += 1
 
 
-def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable) -> None:
+def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """A spring-damper to the flat ground, and what the road adds as a load; ``by_road`` (2 w,): what it adds (N)."""
     marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
@@ -164,7 +164,7 @@ def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
     built.callbacks += 1
 
 
-def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadTable) -> None:
+def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
     """All tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
     by_road : (2 w, tyres), what the road adds to each (N).
@@ -198,7 +198,7 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     built.callbacks += 1
 
 
-def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable) -> None:
+def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """A tyre that may leave the road: one law of all of it; ``by_road`` (2 w, 2): the height and the rate under it."""
     k, c, held, rest = tyre.stiffness, tyre.damping, built.held.tyres[tyre.name], tyre.point[2]
     under = road.forces(by_road)
@@ -213,7 +213,7 @@ def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
     built.spring(on_road, built.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
-def _tyres(built: Build, road: RoadTable) -> None:
+def _tyres(built: Build, road: RoadRows) -> None:
     """All tyres."""
     tyres, turns, count = built.vehicle.tyres, built.vehicle.turns, len(built.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
@@ -246,7 +246,7 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
     return list(trees.values())
 
 
-def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadTable) -> Build:
+def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> Build:
     """The vehicle in a system of its own, which is not assembled yet: sensors may follow."""
     mbs = exu.SystemContainer().AddSystem()
     built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))

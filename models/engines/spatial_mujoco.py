@@ -13,7 +13,7 @@ from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_layout import check
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
-from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.protocol import timed
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
 from models.engines.spatial_protocol import EngineKinematics, curves, difference_step, jacobian, linear_vehicle, sound
@@ -28,13 +28,13 @@ def _compiled(
     spec = spec_of(vehicle, step)
     spec.option.integrator = INTEGRATORS[integrator]
     plain = spec.compile()
-    counts, content = packed(vehicle, elements(vehicle, speed), plain, Numbers(vehicle, plain))
+    counts, content = packed(vehicle, elements(vehicle, speed), plain, MujocoIndices(vehicle, plain))
     begins = HEADER + len(content)
     header = [per_time, len(road), len(vehicle.tyres), *counts, begins]
     spec.add_numeric(name="vehicle", size=begins + road.size, data=[0.0])
     model = spec.compile()
     model.numeric_data[:] = np.concatenate([header, content, road.ravel()])
-    weigh(model, Numbers(vehicle, model), vehicle.bodies)
+    set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
     return model
 
 
@@ -50,12 +50,12 @@ class SpatialMujoco:
         table = self._flat[None, :] if road is None else road
         self.model = _compiled(vehicle, step, integrator, speed, table, 0.0 if road is None else 2.0 / step)
         self.data = mujoco.MjData(self.model)
-        self.numbers = Numbers(vehicle, self.model)
+        self.numbers = MujocoIndices(vehicle, self.model)
         self.law: Any = spatial_law()
         check(self.model, self.data)
 
     @contextmanager
-    def _still(self) -> Iterator[np.ndarray]:
+    def _hold_road(self) -> Iterator[np.ndarray]:
         """The callback reads the row (2 w,) of the road that is given here, at every time."""
         numbers = self.model.numeric_data
         first = int(numbers[ROAD])
@@ -73,7 +73,7 @@ class SpatialMujoco:
         if road is None:
             with installed(self.law):
                 return self._acceleration(q, v, time)
-        with self._still() as row:
+        with self._hold_road() as row:
             row[:] = road
             return self._acceleration(q, v)
 
@@ -86,7 +86,7 @@ class SpatialMujoco:
     def linearise(self) -> LinearVehicle:
         """M from MuJoCo; D, K and the road's columns by central differences of the acceleration, callback included."""
         n, zero, h = self.model.nv, np.zeros(self.model.nv), difference_step(self.vehicle)
-        with self._still() as row:
+        with self._hold_road() as row:
 
             def on_road(heights_and_rates: np.ndarray) -> np.ndarray:
                 row[:] = heights_and_rates

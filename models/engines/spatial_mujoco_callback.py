@@ -20,7 +20,7 @@ from numba.extending import register_jitable
 
 from models.engines.mujoco_callback import CALLBACK
 from models.engines.mujoco_layout import offsets
-from models.engines.mujoco_tree import AXES, Numbers
+from models.engines.mujoco_tree import AXES, MujocoIndices
 from models.machine.stack import array_at, beyond, double_at, doubles
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import preloads
@@ -54,7 +54,7 @@ Acting = tuple[str | None, Vector, Vector]
 
 
 class Parts(NamedTuple):
-    """Counts and numbers of a vehicle's parts in the model's numeric data; all but counts are pointers to doubles."""
+    """Where a callback reads a vehicle's parts in MuJoCo's numeric data: counts, and pointers to doubles."""
 
     body_count: int
     bodies: Any
@@ -314,7 +314,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 
 
 def packed(
-    vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: Numbers
+    vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
     """Counts of bodies, elements and points, and all their numbers for the callback."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
@@ -329,7 +329,7 @@ def packed(
 
 
 def _body(
-    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: Numbers
+    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: MujocoIndices
 ) -> list[float]:
     """A body that may turn, or carries one that may."""
     body, number = vehicle.body(name), numbers.bodies[name]
@@ -350,7 +350,7 @@ def _points_of(acting: list[Element], vehicle: SpatialVehicle, name: str) -> lis
     ]
 
 
-def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> list[float]:
+def _element(element: Element, vehicle: SpatialVehicle, numbers: MujocoIndices) -> list[float]:
     """An element: its law, the shares of coordinates in its travel, and what of its law is no line."""
     shares, rest = dict[int, float](), 0.0
     if element.added_coordinate in numbers.joints:
@@ -369,7 +369,7 @@ def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> lis
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 
 
-def _rest_of_law(element: Element, numbers: Numbers) -> list[float]:
+def _rest_of_law(element: Element, numbers: MujocoIndices) -> list[float]:
     """Numbers of the nonlinear rest of an element's law; none where the law is a straight line."""
     steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]

@@ -155,7 +155,7 @@ def curves(vehicle: SpatialVehicle) -> int:
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
-    """(outputs, size) of a function of (size,) at 0, by the central differences of DIFFERENCES."""
+    """Jacobian (outputs, size) at 0 of a function of (size,), by the central differences in DIFFERENCES."""
     columns = [
         sum(weight * (function(i * step * unit) - function(-i * step * unit)) for i, weight in DIFFERENCES.items())
         / step

@@ -15,7 +15,7 @@ from models.vehicles.spatial_linear import UNIT, End, preloads
 
 @dataclass
 class Motion:
-    """A body: its centre, rotation, and the rows (3, n) of centre and turning velocity with their rates' parts (3,)."""
+    """Motion of a body: centre, rotation, Jacobians (3, n) of both, and accelerations (3,) without q''."""
 
     centre: np.ndarray
     rotation: np.ndarray
@@ -38,7 +38,7 @@ def across(v: np.ndarray) -> np.ndarray:
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
-def _turned(axis: int, angle: float) -> np.ndarray:
+def _rotation_about(axis: int, angle: float) -> np.ndarray:
     """Rotation about a unit axis (Rodrigues)."""
     cross = across(UNIT[axis])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
@@ -93,7 +93,7 @@ class SpatialReference:
                     i, axis = self.index[body.name, freedom], m.rotation[:, k]
                     m.turn_rest += across(m.turn @ v) @ axis * v[i]
                     m.turn[:, i] += axis
-                    m.rotation = m.rotation @ _turned(k, q[i])
+                    m.rotation = m.rotation @ _rotation_about(k, q[i])
             motions[body.name] = m
         return motions
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.scene_file import put
+from models.core.scene_file import set_key
 from models.core.strict import LARGEST
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import Clock, Curve, Measured, Parameter, Problem, measured_channel
@@ -90,7 +90,7 @@ class SceneModel:
         """The scene with these values."""
         table = copy.deepcopy(self.table)
         for key, value in zip(self.keys, values, strict=True):
-            put(table, key, float(value))
+            set_key(table, key, float(value))
         return of_table(table, self.file, self.folder)
 
     def result(self, values: np.ndarray) -> Result:

@@ -189,16 +189,18 @@ def steady(axles: AxleForces) -> Steady:
     level = _slope(times, _blocks(axles.rise))
     climbing = _slope(times, _blocks(axles.rise), _blocks(pitch)) if abs(pitch).max() < STEEP else level
     risen, turned = (
-        _known(estimate, unit, gained, axles.lasted)
+        _slope_with_error(estimate, unit, gained, axles.lasted)
         for estimate, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
     )
     risen = min(
-        risen, _known(climbing, units[0], RISE, axles.lasted), key=lambda estimate: abs(estimate[0]) / estimate[1]
+        risen,
+        _slope_with_error(climbing, units[0], RISE, axles.lasted),
+        key=lambda estimate: abs(estimate[0]) / estimate[1],
     )
     return Steady(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
 
-def _known(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
+def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
     """A slope, and how well it is known, from the scatter about it."""
     return estimate[0], SMALL * unit + (gained + SCATTER * estimate[1]) / lasted
 

@@ -40,16 +40,16 @@ IN_FILE: dict[Wrong, str] = {
 
 
 def check(axles: AxleForces) -> list[Finding]:
-    """All findings; what an earlier one explains, a later one does not name again."""
+    """Findings on the forces of the axles; a fault that one finding explains is not named by another."""
     largest = float(np.abs(axles.forces).max())
     if largest > IMPOSSIBLE * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
         return [_error(axles, "weight", text, largest, "N")]
-    for look in (_sparse, _explained, _coarse, _balance, _start):
+    for look in (_sparse, _explained, _wrong_means, _balance, _start):
         findings = look(axles)
         if findings:
-            return findings + _dead(axles)
-    return _dead(axles) + _copied(axles) + _order(axles) or [_good(axles)]
+            return findings + _constant_axle(axles)
+    return _constant_axle(axles) + _copied(axles) + _order(axles) or [_weights_agree(axles)]
 
 
 def _sparse(axles: AxleForces) -> list[Finding]:
@@ -74,14 +74,14 @@ def _explained(axles: AxleForces) -> list[Finding]:
         return [_error(axles, "weight", text, 100 * (axles.means.sum() / axles.loads.sum() - 1), "%")]
     wheels = np.array([p.m1, p.m2]) * p.g
     missing, lacks = axles.loads - axles.means, 100 * (axles.means.sum() / axles.loads.sum() - 1)
-    if _near(missing, wheels, axles.loads) and not _near(missing, 0 * wheels, axles.loads):
+    if _is_near(missing, wheels, axles.loads) and not _is_near(missing, 0 * wheels, axles.loads):
         text = (
             f"The wheel forces lack {missing[0]:.4g} N in front and {missing[1]:.4g} N at the rear on average, the "
             f"weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they were measured above the wheels. Add "
             "it, with the wheels' inertia force if they move."
         )
         return [_error(axles, "weight", text, lacks, "%")]
-    if _near(axles.means, axles.loads / 2, axles.loads / 2):
+    if _is_near(axles.means, axles.loads / 2, axles.loads / 2):
         text = (
             f"The wheel forces are half the static loads of the axles "
             f"({axles.loads[0]:.5g} N and {axles.loads[1]:.5g} N): "
@@ -91,7 +91,7 @@ def _explained(axles: AxleForces) -> list[Finding]:
     return _exchanged(axles)
 
 
-def _near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
+def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
     return bool((np.abs(values - wanted) < LIKE * scale / 2).all())
 
 
@@ -108,9 +108,9 @@ def _exchanged(axles: AxleForces) -> list[Finding]:
     return [_error(axles, "swapped", text, 100 * float(as_is), "%")]
 
 
-def _coarse(axles: AxleForces) -> list[Finding]:
+def _wrong_means(axles: AxleForces) -> list[Finding]:
     """Axles whose mean says by itself that sign or unit is wrong, or that moves the vehicle beyond all roads."""
-    findings, far = [], _far(axles, steady(axles)).any()
+    findings, far = [], _travels_too_far(axles, steady(axles)).any()
     for axle, mean, load in zip(axles.signals, axles.means, axles.loads if axles.parameters.g else (), strict=False):
         for_axle = f"the {load:.5g} N that rest on it on average"
         ratio, names = float(mean / load), tuple(s.name for s in axle)
@@ -127,11 +127,11 @@ def _balance(axles: AxleForces) -> list[Finding]:
     if not motion.seen.any():
         return []
     beyond = np.abs(motion.shares) > LARGE + motion.known / motion.units
-    weight: Weight = "error" if (beyond & _far(axles, motion)).any() else "doubt"
+    weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
     excess = np.linalg.solve(axles.arms, np.where(motion.seen, motion.accelerations, 0.0))
     share = excess / axles.loads
     told = " and ".join(
-        _excess(*each)
+        _excess_text(*each)
         for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
         if abs(each[2]) > SMALL / 2
     )
@@ -145,12 +145,12 @@ def _balance(axles: AxleForces) -> list[Finding]:
     return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", axles.names)]
 
 
-def _far(axles: AxleForces, motion: Steady) -> np.ndarray:
+def _travels_too_far(axles: AxleForces, motion: Steady) -> np.ndarray:
     """Which of the two steady accelerations (2,) moves the vehicle further in the run than a road does."""
     return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEP])
 
 
-def _excess(name: str, excess: float, share: float) -> str:
+def _excess_text(name: str, excess: float, share: float) -> str:
     return f"{name} carries {abs(excess):.4g} N ({abs(share):.2%}) too {'much' if excess > 0 else 'little'}"
 
 
@@ -186,7 +186,7 @@ def _noise(axles: AxleForces) -> float:
     return 4 * (axles.rigid.intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
-def _dead(axles: AxleForces) -> list[Finding]:
+def _constant_axle(axles: AxleForces) -> list[Finding]:
     """An axle that never changes, beside one that does."""
     still = np.ptp(axles.forces, axis=0) == 0
     if still.all() or not still.any():
@@ -254,7 +254,7 @@ def unchecked(axles: AxleForces) -> str:
     return f"not checked: whether an axle is late{seen}; {tells}"
 
 
-def _good(axles: AxleForces) -> Finding:
+def _weights_agree(axles: AxleForces) -> Finding:
     motion = steady(axles)
     text = (
         f"The mean wheel forces carry the vehicle to {motion.shares[0]:+.2%} of its weight; an error of "

@@ -19,7 +19,7 @@ LEAST = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredDrive:
     """times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : samples of each channel that were spikes or
     not measured, and are bridged by a straight line."""
 
@@ -29,13 +29,13 @@ class Measured:
     left_out: dict[str, int]
 
 
-def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> Measured:
+def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
     """The drive of a file, or of a stretch (s, s) of its time; InputError for what is no drive."""
     return _read(path, stretch, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> Measured:
+def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
     source = open_source(path)
     read = {name: curve(source, name, unit) for name, unit in CHANNELS.items()}
     first = max(times[0] for times, _ in read.values())
@@ -55,7 +55,7 @@ def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> Measured:
     if values["speed"][slow] < LEAST_SPEED:
         allowed = f"at {grid[slow]:g} s: a drive needs at least {LEAST_SPEED:g} m/s, forward, throughout"
         raise InputError(path, "speed", float(values["speed"][slow]), allowed)
-    return Measured(grid, values["steer"], values["speed"], left_out)
+    return MeasuredDrive(grid, values["steer"], values["speed"], left_out)
 
 
 def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:

@@ -83,11 +83,13 @@ def measured(
     columns = []
     for signal, true in zip(signals, truth.T, strict=True):
         late = amount(faults.delay, signal)
-        values = (1.0 + amount(faults.gain, signal)) * _late(true, step, every, late) + amount(faults.bias, signal)
+        values = (1.0 + amount(faults.gain, signal)) * _delayed_samples(true, step, every, late) + amount(
+            faults.bias, signal
+        )
         values = values + amount(faults.noise, signal) * _stream(signal.channel, seed, path, len(values), TRANSDUCERS)
-        if faults.quantisation and _among(faults.quantisation.channels, signal):
+        if faults.quantisation and _is_named(faults.quantisation.channels, signal):
             values = quantised(values, faults.quantisation.bits)
-        if faults.dropouts and _among(faults.dropouts.channels, signal):
+        if faults.dropouts and _is_named(faults.dropouts.channels, signal):
             values[silent(faults.dropouts, signal.at, seed, path, len(values), period)] = np.nan
         columns.append(values)
     return np.column_stack(columns)
@@ -113,7 +115,7 @@ def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period
     return lost
 
 
-def _late(true: np.ndarray, step: float, every: int, delay: float) -> np.ndarray:
+def _delayed_samples(true: np.ndarray, step: float, every: int, delay: float) -> np.ndarray:
     """Every ``every``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
     if delay == 0.0:
         return true[::every].copy()
@@ -132,5 +134,5 @@ def _names(signal: Signal) -> tuple[str, ...]:
     return signal.channel, signal.at, signal.quantity
 
 
-def _among(names: list[str], signal: Signal) -> bool:
+def _is_named(names: list[str], signal: Signal) -> bool:
     return not names or not set(names).isdisjoint(_names(signal))

@@ -73,7 +73,7 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
         doubt = np.nan
         known = _neighbours(values, first, end, span, every)
         if len(known) and (end - first) * period <= longest * (1 + 1e-9):
-            guess, doubt = _likely(law, known, np.arange(first, end), values[known] - mean)
+            guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
         gaps.append(Gap(first, end, doubt))
     return out, gaps
@@ -120,7 +120,9 @@ def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int)
     return around[~np.isnan(values[around])]
 
 
-def _likely(law: np.ndarray, known: np.ndarray, lost: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
+def _conditional_mean(
+    law: np.ndarray, known: np.ndarray, lost: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, float]:
     """Mean (m,) of the lost samples given the known ones, and the largest standard deviation."""
     among = law[np.abs(known[:, None] - known)]
     among[np.diag_indices(len(known))] *= 1 + 1e-9

@@ -25,7 +25,7 @@ EMPTY = 0.05
 Wrong = Literal["sign", "unit", "gain", "size"]
 
 
-def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
+def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
     """Recorded by true value -> what is wrong, and where it is the unit which one was taken for which.
 
     "size" is what no two usual units explain. Of several pairs, one with the unit of the map is preferred.
@@ -52,7 +52,7 @@ def sentence(
 
     remedies : what to do about each, None for those of a channel map.
     """
-    kind, unit = wrong(ratio, signal)
+    kind, unit = probable_mistake(ratio, signal)
     reads = f"{signal.name} reads {ratio:.4g} times {against}"
     reading = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
     texts: dict[Wrong, str] = {

@@ -16,7 +16,7 @@ Progress = Callable[[str, float], None]
 """Told what is done now, and which part of all is."""
 
 
-def silent(*told: Any) -> None:
+def no_progress(*told: Any) -> None:
     """Progress that nobody is told of."""
 
 

@@ -37,7 +37,7 @@ class Shift:
 
 def time_shift(pairs: Sequence[Pair]) -> Shift:
     """The shift at which channels correlate best, means and scales aside, to a fraction of a sample."""
-    moving = [pair for pair in pairs if _moves(pair.run) and _moves(pair.values)]
+    moving = [pair for pair in pairs if _varies(pair.run) and _varies(pair.values)]
     if not moving:
         return Shift(0.0, np.nan)
     step = _step(moving)
@@ -45,7 +45,7 @@ def time_shift(pairs: Sequence[Pair]) -> Shift:
     return _refined(moving, coarse, step)
 
 
-def _moves(values: np.ndarray) -> bool:
+def _varies(values: np.ndarray) -> bool:
     finite = values[np.isfinite(values)]
     return bool(len(finite) > 2 and np.var(finite) > STILL * np.mean(finite**2))
 
@@ -106,7 +106,7 @@ def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
     curves = [(pair, CubicSpline(pair.run_times, pair.run)) for pair in pairs]
 
     def apart(seconds: float) -> float:
-        return -float(np.mean([_alike(pair, curve, seconds) for pair, curve in curves]))
+        return -float(np.mean([_correlation_at_shift(pair, curve, seconds) for pair, curve in curves]))
 
     best = minimize_scalar(
         apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": FINE * step}
@@ -115,7 +115,7 @@ def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
     return Shift(seconds, -apart(seconds))
 
 
-def _alike(pair: Pair, curve: Callable[[np.ndarray], np.ndarray], seconds: float) -> float:
+def _correlation_at_shift(pair: Pair, curve: Callable[[np.ndarray], np.ndarray], seconds: float) -> float:
     """Correlation of a channel at a shift (s)."""
     times = pair.times - seconds
     inside = np.isfinite(pair.values) & (times >= pair.run_times[0]) & (times <= pair.run_times[-1])

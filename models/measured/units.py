@@ -58,19 +58,23 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
     """
     parsed = _parsed(unit, quantity)
     if parsed is None:
-        raise InputError(file, place, unit, f"no such unit is known: write {_like(quantity)}{_meant(unit, quantity)}")
+        raise InputError(
+            file, place, unit, f"no such unit is known: write {_units_of_quantity(quantity)}{_meant(unit, quantity)}"
+        )
     if not parsed.is_compatible_with(_si(quantity)):
         raise InputError(
             file,
             place,
             unit,
             f"{_kind(parsed)}, and the channel is mapped as {quantity}: write "
-            f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}",
+            f"{_units_of_quantity(quantity)}, or map it as what it is{_meant(unit, quantity)}",
         )
-    turned = _turned(parsed)
+    turned = _has_angle(parsed)
     if turned != (quantity in ("angle", "angular rate")):
         what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"
-        raise InputError(file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_like(quantity)}")
+        raise InputError(
+            file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_units_of_quantity(quantity)}"
+        )
     return float(_registry().Quantity(1.0, parsed).to(_si(quantity)).magnitude)
 
 
@@ -83,13 +87,13 @@ def factor_between(unit: str, wanted: str, file: object, place: str) -> float:
     goal = _parsed(wanted, "force")
     accelerates = goal is not None and goal.is_compatible_with(_si("acceleration"))
     given = _parsed(unit, "acceleration" if accelerates else "force")
-    if given is None or goal is None or not given.is_compatible_with(goal) or _turned(given) != _turned(goal):
+    if given is None or goal is None or not given.is_compatible_with(goal) or _has_angle(given) != _has_angle(goal):
         told = "no such unit is known" if given is None else "is the unit of another quantity"
         raise InputError(file, place, unit, f"{told}: the channel is in {wanted or '-'}")
     return float(_registry().Quantity(1.0, given).to(goal).magnitude)
 
 
-def _turned(unit: Any) -> bool:
+def _has_angle(unit: Any) -> bool:
     """Whether there is an angle in a unit of pint's."""
     return bool(TURNS & set(re.split(r"[^a-z_]+", str(unit))))
 
@@ -145,6 +149,6 @@ def _meant(unit: str, quantity: Quantity) -> str:
     return suggestion(unit, EXAMPLES[quantity])
 
 
-def _like(quantity: Quantity) -> str:
+def _units_of_quantity(quantity: Quantity) -> str:
     *others, last = EXAMPLES[quantity]
     return f"{', '.join(others)} or {last}"

@@ -21,7 +21,10 @@ TURNED, PLACE, ALONG, OMEGA, REST, TURN_REST, PER_MOTION = 0, 9, 12, 15, 18, 21,
 
 @lean
 def turned(matrix, vector):
-    """Product of the first nine numbers, rows of a matrix, and a vector: of a row of ``m`` from its axes to space's."""
+    """Product of a matrix and a vector; the matrix is the first nine numbers of ``matrix``, row by row.
+
+    With a row of ``m`` it turns a vector from the body's axes to those of space.
+    """
     return dot(three(matrix, 0), vector), dot(three(matrix, 3), vector), dot(three(matrix, 6), vector)
 
 

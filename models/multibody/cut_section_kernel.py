@@ -82,7 +82,10 @@ def _accelerate(joints, m, last, qdd, place, a):
 
 @lean
 def _move_bodies(joints, bodies, m, gravity, qdd, acting):
-    """Write place, force and moment about it (9 each) that move every body as it does, its weight held."""
+    """Write, for each body, the resultant that gives its acceleration and carries its weight (9 numbers).
+
+    These are its point of action, its force, and its moment about that point.
+    """
     tensor = array(doubles(9), (9,))
     for b in range(len(bodies)):
         body, row, last = bodies[b], acting[b], int(bodies[b, LAST])
@@ -148,7 +151,7 @@ def _feel_point(joints, m, point, gravity, qdd):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def felt(numbers, every, states, places, own_axes, out):
+def section_answers(numbers, every, states, places, own_axes, out):
     """Write answers (n, all) of states (n, 2 c), ``every`` half steps apart from time 0 on.
 
     places : ``FeltPlaces``; own_axes : whether guides and hubs are given in the axes of what they carry instead of the

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_quiet import without_warnings
 from models.own_model.content import Content, check_and_leave_out, ranges
 from models.own_model.reading import TwinModel, described
 from models.own_model.xml_guard import Document, guarded
@@ -45,7 +45,7 @@ def compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
     """By MuJoCo's own parser; InputError with its words, and notes."""
     path, notes = document.path, list[str]()
     try:
-        with quiet():
+        with without_warnings():
             if document.kind == "URDF":
                 text, dropped = _without_shapes(path)
                 if dropped:

@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, placed, touches_of
+from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, touches_of, touching_pose
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
@@ -171,24 +171,24 @@ class Contact:
         """
         quantity("lateral_shift", shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-        pose = placed(self.side, shift, yaw)
+        pose = touching_pose(self.side, shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLLS):
-            right, left = wheels = self._carried(pose, rolling)
+            right, left = wheels = self._both_wheels(pose, rolling)
             span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * self.side.wheelset.arm
             pose = replace(pose, roll=level + (right.approach - left.approach) / span)
             if self.friction > 0.0:
                 rolling = self._free_spin(wheels)
-        wheels = self._carried(pose, rolling)
+        wheels = self._both_wheels(pose, rolling)
         for _ in range(TURNS):
-            wheels = [self._exact(wheel) for wheel in wheels]
+            wheels = [self._with_exact_normal(wheel) for wheel in wheels]
             if self.friction == 0.0:
                 break
             rolling = self._free_spin(wheels)
-            wheels = [self._turned(wheel, rolling) for wheel in wheels]
-        return _standing(Placed(shift, yaw, pose.roll, rolling, *map(self._places, wheels)))
+            wheels = [self._at_other_spin(wheel, rolling) for wheel in wheels]
+        return _standing(Placed(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
 
-    def _carried(self, pose: Pose, spin: float) -> list[Carried]:
+    def _both_wheels(self, pose: Pose, spin: float) -> list[Carried]:
         """The right wheel, and the left one in its mirror, each lowered until it touches and pressed on its rail.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
@@ -206,7 +206,7 @@ class Contact:
 
         return self._balanced(by_normal, self.load)
 
-    def _exact(self, near: Carried) -> Carried:
+    def _with_exact_normal(self, near: Carried) -> Carried:
         """The pressed wheel, its normal contact solved exactly in place of the simplified theory."""
         patches = [touch.patch for touch in near.touches]
 
@@ -231,12 +231,12 @@ class Contact:
         """Speed of spin (rad/s) at which the creep forces have no moment about the axle, pressed as the wheels are."""
 
         def moment(spin: float) -> float:
-            return sum(self._turned(wheel, spin).moment for wheel in wheels)
+            return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
 
         rolling = -self.speed / self.side.wheelset.radius
         return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
 
-    def _turned(self, wheel: Carried, spin: float) -> Carried:
+    def _at_other_spin(self, wheel: Carried, spin: float) -> Carried:
         """A wheel that is pressed as it was and turns at another speed (rad/s)."""
         creepages = [self._creepage(wheel.pose, touch, spin) for touch in wheel.touches]
         return self._rolled(replace(wheel, creepages=creepages))
@@ -275,7 +275,7 @@ class Contact:
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 
-    def _places(self, wheel: Carried) -> tuple[PatchReport, ...]:
+    def _patch_reports(self, wheel: Carried) -> tuple[PatchReport, ...]:
         """The reports of a wheel's patches, those that carry something; patches that have grown together as one."""
         rows = [
             row
@@ -283,9 +283,9 @@ class Contact:
             if row[-1].load > 0.0
         ]
         pieces = dict.fromkeys(share.piece for *_, share in rows)
-        return tuple(self._place(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
+        return tuple(self._joined_report(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
 
-    def _place(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> PatchReport:
+    def _joined_report(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> PatchReport:
         """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)

@@ -36,12 +36,12 @@ from models.rail.wheel_forces import (
     LAWS,
     REPORT,
     Rails,
-    carries,
     patches,
     plain,
     rails_in,
     rails_of,
     room_for,
+    supported_force,
     wheel_forces,
 )
 from models.rail.wheelset import GRAVITY, Wheelset
@@ -233,7 +233,7 @@ class Equations:
         sunk = float(w.ellipse.approach) / w.slant[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
             rails = rails_of(w)
-            sunk = float(brentq(lambda z: carries(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
+            sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
         stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
         held = any(stiffness + damping)
         inertia = w.mass, w.spin_inertia, w.yaw_inertia
@@ -282,7 +282,7 @@ class Equations:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATES)
         start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
-        return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
+        return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced(self, shift: float) -> Array:
         """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
@@ -292,9 +292,9 @@ class Equations:
         if w.profiles:
             rise, start[ROLL] = w.profiles.touching(w.radius, shift)
             start[Z] += rise
-        return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
+        return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _settled(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
+    def _state_in_balance(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
         """The state with two of its values such that two accelerations vanish."""
         places = list(coordinates)
         scale = np.maximum(np.abs(start[places]), self.body.sunk)

@@ -155,7 +155,7 @@ def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWav
         slope = float(dr[1] - dr[0]) / (2.0 * amplitude)
         return KlingelWave(amplitude, low + amplitude, 2.0 * math.pi / math.sqrt(slope)) if slope > 0.0 else None
     energy = _energy(dr, length)
-    if not ((energy[1:-1] > 0.0).all() and (_least(dr, length, energy) > 0.0).all()):
+    if not ((energy[1:-1] > 0.0).all() and (_lowest_energy(dr, length, energy) > 0.0).all()):
         return None
     speed = np.sqrt(2.0 * energy)
     speed[0] = speed[-1] = 0.0
@@ -171,7 +171,7 @@ def _energy(dr: Array, length: Array) -> Array:
     return np.where(np.arange(len(dr)) <= np.argmax(from_left), from_left, from_right)
 
 
-def _least(dr: Array, length: Array, energy: Array) -> Array:
+def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
     """Energy where the potential is highest within a piece: where a falling difference passes zero."""
     falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
     way = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
@@ -234,7 +234,7 @@ def harmonic_linearised_conicity(
 
 @dataclass(frozen=True)
 class ConicityRow:
-    """Both conicities at an amplitude (m): the standard's with the wave's centre (m), the first harmonic about it.
+    """Equivalent conicity at one amplitude (m), by the standard and by the first harmonic, and the wave's centre (m).
 
     spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
     such wave.

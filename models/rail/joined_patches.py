@@ -94,7 +94,7 @@ def _pressed(
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))
             return [
-                _share(solved.pressure * (owner == k), x, y, patch.contour_position, cell, pieces)
+                _pressure_share(solved.pressure * (owner == k), x, y, patch.contour_position, cell, pieces)
                 for k, patch in enumerate(patches)
             ], approach
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
@@ -122,12 +122,12 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     return heights
 
 
-def _share(pressure: Array, x: Array, y: Array, place: float, cell: float, pieces: Array) -> Share:
+def _pressure_share(pressure: Array, x: Array, y: Array, place: float, cell: float, pieces: Array) -> Share:
     """Share of a patch at a place on the contour (m), of which ``pressure`` is zero elsewhere."""
     total = float(pressure.sum())
     if total == 0.0:
         return Share(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
-    box = (*_ends(x, pressure.sum(axis=0) > 0.0), *_ends(y, pressure.sum(axis=1) > 0.0))
+    box = (*_outer_sides(x, pressure.sum(axis=0) > 0.0), *_outer_sides(y, pressure.sum(axis=1) > 0.0))
     return Share(
         total * cell,
         float((pressure.sum(axis=0) @ x) / total),
@@ -139,7 +139,7 @@ def _share(pressure: Array, x: Array, y: Array, place: float, cell: float, piece
     )
 
 
-def _ends(at: Array, inside: Array) -> tuple[float, float]:
+def _outer_sides(at: Array, inside: Array) -> tuple[float, float]:
     """Outer sides (m) of the first and the last cell inside."""
     half = (at[1] - at[0]) / 2.0
     return float(at[inside][0] - half), float(at[inside][-1] + half)

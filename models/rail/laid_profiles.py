@@ -12,7 +12,7 @@ from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
-from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, laid, placed
+from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, rail_in_track, touching_pose
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
@@ -65,14 +65,14 @@ class Profiles(Strict):
         rail = _profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _profile(self.wheel, "wheel", self.smoothing),
-            laid(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
+            rail_in_track(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
     def touching(self, radius: float, shift: float) -> tuple[float, float]:
         """Height z (m) over that in the middle, and roll (rad), at which both wheels just touch; InputError if none."""
         side = self.side(radius)
-        pose = placed(side, shift, 0.0)
+        pose = touching_pose(side, shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
@@ -92,12 +92,12 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
 
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
-    y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
+    y = _evenly_spaced(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
     curve = side.wheel.curve
-    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first(side, shift)) is not None]
+    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first_contact(side, shift)) is not None]
     cuts = [cut for cut in (_ridge(side, *pair) for pair in pairwise(touched)) if cut is not None]
     nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, cuts)])
-    knots = _even(side.rail.y, side.rail.z, OF_KNOTS)
+    knots = _evenly_spaced(side.rail.y, side.rail.z, OF_KNOTS)
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
@@ -117,16 +117,16 @@ def _frozen(rows: Any, kind: np.dtype) -> Array:
     return made
 
 
-def _even(y: Array, z: Array, spacing: float) -> Array:
+def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
     """Places y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
-def _first(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
+def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
     """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
-        pose = placed(side, shift, 0.0)
+        pose = touching_pose(side, shift, 0.0)
     except InputError:
         return None
     points, gap = side.gaps(pose)
@@ -138,7 +138,7 @@ def _ridge(side: WheelAndRail, before: tuple[float, float], after: tuple[float, 
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
     while abs(after[1] - before[1]) > APART:
         middle = (before[0] + after[0]) / 2.0
-        touch = _first(side, middle)
+        touch = _first_contact(side, middle)
         if touch is None:
             return None
         here, places, gap = touch

@@ -109,7 +109,7 @@ class Orbit:
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
-def near(equations: Equations, state: Array, period: float, step: float) -> Orbit:
+def guess_near_state(equations: Equations, state: Array, period: float, step: float) -> Orbit:
     """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
     start = state.copy()
     start[Y_RATE] = 0.0
@@ -131,10 +131,10 @@ def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
-    return solved(near(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
+    return solved(guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
 
 
-def beside(orbit: Orbit, equations: Equations) -> Orbit:
+def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
     """A guess for the same orbit by other equations: everything ASIDE farther from rest."""
     rest = orbit.equations.rest
     return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
@@ -177,7 +177,7 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
     orbit, fresh, left = guess, False, math.inf
     for _ in range(NEWTON):
         try:
-            end = _end(orbit.equations, orbit.state, orbit.period, orbit.steps)
+            end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
         missed = ((end - orbit.state) / SIZES)[RETURNS]
@@ -200,7 +200,7 @@ def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
     )
 
 
-def _end(equations: Equations, state: Array, period: float, steps: int) -> Array:
+def _state_after(equations: Equations, state: Array, period: float, steps: int) -> Array:
     return equations.run(state, period, period / steps, steps).states[-1]
 
 
@@ -208,9 +208,12 @@ def _linearised(orbit: Orbit) -> Orbit:
     """The orbit with slopes from its own linearisation."""
     eq, T, n, state, signs = orbit.equations, orbit.period, orbit.steps, orbit.state, (-1.0, 1.0)
     ends = [
-        *([_end(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs] for k in RETURNS),
-        [_end(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
-        [_end(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
+        *(
+            [_state_after(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs]
+            for k in RETURNS
+        ),
+        [_state_after(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
+        [_state_after(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
     ]
     columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
     return replace(orbit, slopes=np.array(columns).T)
@@ -249,7 +252,7 @@ def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -
         tops = maxima(y)
         if tops.size > 2 and np.ptp(y[tops[-2:]]) < STEADY * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
-            return solved(near(equations, path.states[tops[-1]], period, step), "amplitude")
+            return solved(guess_near_state(equations, path.states[tops[-1]], period, step), "amplitude")
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 

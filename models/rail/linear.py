@@ -52,7 +52,7 @@ class NoCriticalSpeed(InputError):
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearWheelset:
     """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
 
     mass: Array
@@ -80,7 +80,7 @@ def kalker(wheelset: Wheelset) -> Array:
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 
 
-def matrices(wheelset: Wheelset, speed: float) -> Linear:
+def matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
     """Equations of motion at a speed (m/s) above 0; raises InputError for another one."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
@@ -94,7 +94,7 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
     for motion, place in _contacts(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ place
-    return Linear(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
+    return LinearWheelset(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
 def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:

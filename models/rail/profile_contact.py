@@ -200,14 +200,14 @@ def settled(touches, modulus):
             down = 0.0
             for j in range(n):
                 if j != i and load[j] > 0.0:
-                    down += load[j] * _alike(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
+                    down += load[j] * _cosine_of_normals(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
             depth = alone[i] - down / (math.pi * modulus)
             touches[i].depth = depth
             load[i] = stiff[i] * (max(0.0, depth) / alone[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
 
 
 @lean
-def _alike(first, second, squares):
+def _cosine_of_normals(first, second, squares):
     """Cosine between the normals of two touches by their distance (1/m)."""
     apart = (first.x - second.x) ** 2 + (first.y - second.y) ** 2 + (first.z - second.z) ** 2
     return (first.n_y * second.n_y + first.n_z * second.n_z) / math.sqrt(apart + squares / 5.0)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array, quantity
-from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, placed
+from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, touching_pose
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
@@ -83,18 +83,18 @@ class RollingRadiusTable:
 
     def difference(self, place: float, side: Any = "right") -> float:
         """The difference at a displacement; at a jump the value to its left or right."""
-        i, share = self._piece(place, side)
+        i, share = self._row_before(place, side)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
     def integral(self, place: float) -> float:
         """The potential at a displacement."""
-        i, share = self._piece(place, "right")
+        i, share = self._row_before(place, "right")
         y, dr = self.displacements, self.differences
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _piece(self, place: float, side: Any) -> tuple[int, float]:
+    def _row_before(self, place: float, side: Any) -> tuple[int, float]:
         """The row before a displacement, and the share of the way from there to the next one."""
         y = self.displacements
         i = int(np.clip(np.searchsorted(y, place, side) - 1, 0, y.size - 2))
@@ -142,7 +142,7 @@ def rolling_radii_of(
 
 def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
-    pose = placed(right, shift, 0.0, left)
+    pose = touching_pose(right, shift, 0.0, left)
     return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
 
 

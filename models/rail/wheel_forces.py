@@ -203,7 +203,7 @@ def contact_points(pose, rails, touches):
 
 
 @njit(cache=True, error_model="numpy")
-def carries(z, rails):
+def supported_force(z, rails):
     """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
     touches, whole = np.zeros(patches(rails.profile), TOUCH), 0.0
     contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)

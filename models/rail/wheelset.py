@@ -53,7 +53,7 @@ class Wheelset(Strict):
             raise message(error, type(self), "", "wheelset") from None
 
     @model_validator(mode="after")
-    def _possible(self) -> "Wheelset":
+    def _check_possible(self) -> "Wheelset":
         if self.conicity * self.radius >= self.half_gauge:
             raise ValueError("conicity times radius must be below half_gauge: such cones do not steer")
         if self.mass * GRAVITY > self.load:

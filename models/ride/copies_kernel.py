@@ -152,7 +152,7 @@ def sum_up(value, sums, p, first):
 
 
 @lean
-def ahead(x, time, rate, moved):
+def states_ahead(x, time, rate, moved):
     """Fill the states (2 n, copies) that rates lead to in a time (s)."""
     for j in range(x.shape[0]):
         for c in range(x.shape[1]):
@@ -178,11 +178,11 @@ def march(states, roads, step, first, every, laws, sums):
                 for p in range(laws.read.shape[0]):
                     output(p, x, road[2 * i], k1, force, laws, room[0])
                     sum_up(room[0], sums, p, copy)
-            ahead(x, 0.5 * step, k1, moved)
+            states_ahead(x, 0.5 * step, k1, moved)
             rates(moved, road[2 * i + 1], laws, force, k2, room)
-            ahead(x, 0.5 * step, k2, moved)
+            states_ahead(x, 0.5 * step, k2, moved)
             rates(moved, road[2 * i + 1], laws, force, k3, room)
-            ahead(x, step, k3, moved)
+            states_ahead(x, step, k3, moved)
             rates(moved, road[2 * i + 2], laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):

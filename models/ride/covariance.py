@@ -18,7 +18,7 @@ from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
+from models.ride.marginal import ACCURACY, TOLD, Growth, MarginalParts, growth, split_marginal
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 """What an output can be."""
@@ -59,15 +59,15 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     where a variance cannot be told to UNCERTAIN of itself.
     """
     met = hits(system)
-    split = parts(system.A, accuracy)
+    split = split_marginal(system.A, accuracy)
     onto_stable = met._replace(B=[(split.W @ b).astype(float) for b in met.B])
     P, correction, residual = lyapunov(split.S, intensity(split.S, onto_stable))
     V = split.V
     if split.marginal:
         P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
     C = system.C @ V
-    floor, change = silence(C, P), _seen(C, correction)
-    variance = _seen(C, P)
+    floor, change = silence(C, P), _output_variances(C, correction)
+    variance = _output_variances(C, P)
     variance = np.where(variance > floor, variance, 0.0)
     grown = growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
     status, reason = verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
@@ -204,7 +204,7 @@ is enough but where a motion hardly dies out; each takes as many digits off the 
 
 
 def _with_marginal(
-    split: Parts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
+    split: MarginalParts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance of the whole state (marginal motions first), its correction and basis, motions that diffuse left out.
 
@@ -238,7 +238,7 @@ def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
     return (integral + integral.T) / 2
 
 
-def _seen(C: np.ndarray, P: np.ndarray) -> np.ndarray:
+def _output_variances(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Variances (p,) of y = C x."""
     return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
 
@@ -255,7 +255,7 @@ def verdicts(
     grown: Growth,
     fastest: float,
     accuracy: float,
-    split: Parts | None = None,
+    split: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status and reason of every output.
 
@@ -268,7 +268,7 @@ def verdicts(
     return tuple(status for status, _ in each), tuple(reason for _, reason in each)
 
 
-def _verdict(white: bool, rate: float, power: int, split: Parts | None) -> tuple[str, str]:
+def _verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
     if white:
         return INFINITE, WHITE
     if power:

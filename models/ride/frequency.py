@@ -102,7 +102,9 @@ def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np
 def quadrature(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
 ) -> Quadrature:
-    """Variances as integrals over all frequencies, weighted outputs in place of their own; inf where one diverges.
+    """Variances of the outputs as integrals over all frequencies; inf where an integral diverges.
+
+    Outputs with a weighting are replaced by their weighted ones.
 
     The error holds what halving the panels changes, the tail beyond the last one, and what a last digit of the
     largest stiffness of each motion changes: that is much for places of a vehicle that is free to drive away. Raises
@@ -130,7 +132,7 @@ def quadrature(
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
     total = abs(first).sum(axis=0)
     limit = np.maximum(TOLERANCE * np.maximum(total, SILENT * terms), rounding)
-    variance, error, taken = _halved(over, edges, first, limit)
+    variance, error, taken = _halve_panels(over, edges, first, limit)
     error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
@@ -145,7 +147,7 @@ def _check_stable(vehicle: LinearVehicle) -> None:
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
-def _halved(
+def _halve_panels(
     over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""

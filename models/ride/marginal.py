@@ -45,7 +45,7 @@ class Unstable(InputError):
 
 
 @dataclass(frozen=True)
-class Parts:
+class MarginalParts:
     """x' = A x + u in two parts that know nothing of one another: x = V0 a + V b, a' = M a + W0 u, b' = S b + W u.
 
     M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
@@ -71,7 +71,7 @@ class Parts:
         return len(self.M)
 
 
-def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
+def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
     """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable, InputError where it cannot be told.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
@@ -90,7 +90,7 @@ def parts(A: np.ndarray, accuracy: float = ACCURACY) -> Parts:
         _decouple(form, V, W, size)
     S, T, back = _by_motions(form[k:, k:])
     stable = (V[:, k:] @ T, back @ W[k:]) if k else (T, back)
-    return Parts(
+    return MarginalParts(
         form[:k, :k],
         scale[:, None] * V[:, :k],
         W[:k] / scale,
@@ -219,7 +219,7 @@ class Growth:
 
 
 def growth(
-    split: Parts,
+    split: MarginalParts,
     B: Sequence[np.ndarray],
     delays: Sequence[float],
     C: np.ndarray,

@@ -60,7 +60,7 @@ class VarianceEstimate:
         return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
 
 
-def along(
+def variances_along_drive(
     vehicle: LinearVehicle,
     excitation: Excitation,
     profile: SpeedProfile,
@@ -160,7 +160,7 @@ class _Cells:
         """States (n, copies) at the end of each cell, crossed by the first axle in the given times (s)."""
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
-        draws = _drawn(seed, copies, k * MODES * (axles if independent else 1))
+        draws = _draw_coefficients(seed, copies, k * MODES * (axles if independent else 1))
         last = int(self.shifts[-1])
         met = deque((next(draws) for _ in range(last)), maxlen=last + 1)
         x, before = np.zeros((len(self.at_rest), copies)), None
@@ -200,8 +200,11 @@ def _legendre() -> np.ndarray:
     return np.einsum("u,uj,ul->jl", weights / 2.0, powers((1.0 - points) / 2.0, TERMS), basis)
 
 
-def _drawn(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
-    """Coefficients (channels, copies) of cell after cell; cells share a block of noise if copies are few."""
+def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
+    """Yield the random coefficients (channels, copies) of each cell in turn.
+
+    Several cells are drawn from the same block of noise if there are few copies.
+    """
     together, path = max(1, BLOCK // copies), 0
     while True:
         yield from normal(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT

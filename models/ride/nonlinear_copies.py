@@ -112,7 +112,7 @@ def copies_in_time(
     march = CopiesMarch(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         left = settling + counted - number * BLOCK
-        march.over(portion[: 2 * left + 1], _first(settling, number * BLOCK))
+        march.over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * BLOCK))
         if left <= BLOCK:
             break
     moments = march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY))
@@ -135,7 +135,9 @@ def coarser_variances(
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         left = settling + counted - number * block
         march.over(
-            portion[: 2 * times * left + 1 : times, :, :kept].copy(), _first(settling, number * block, every), every
+            portion[: 2 * times * left + 1 : times, :, :kept].copy(),
+            _steps_to_first_output(settling, number * block, every),
+            every,
         )
         if left <= block:
             break
@@ -178,7 +180,7 @@ def followed(vehicle: SpatialVehicle, speed: float) -> float:
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _first(settling: int, completed: int, every: int = EVERY) -> int:
+def _steps_to_first_output(settling: int, completed: int, every: int = EVERY) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
     return settling - completed if completed <= settling else (settling - completed) % every
 
@@ -213,7 +215,7 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T, heights.T)
     motion = np.linalg.solve(plain.mass, np.hstack(forced))
     named_forces = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
-    read = np.array([[float((o.kind, _part(o)) == force) for force in named_forces] for o in vehicle.outputs])
+    read = np.array([[float((o.kind, _part_of_output(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
         [
             [
@@ -243,7 +245,7 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     )
 
 
-def _part(output: SpatialOutput) -> str:
+def _part_of_output(output: SpatialOutput) -> str:
     """The spring or tyre that an output reads."""
     return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
 

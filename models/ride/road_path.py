@@ -52,7 +52,7 @@ class RoadPath:
         ``path`` + 1 and so on.
         """
         F, G, heights = _axles(self.excitation)
-        move, root = _over(F, G, self.speed * self.half)
+        move, root = _transition_over(F, G, self.speed * self.half)
         lags = np.rint(np.array(self.excitation.lengths) / (self.speed * self.half)).astype(int)
         lags = 0 * lags if self.excitation.independent else lags
         met = np.empty((0, len(F), copies))
@@ -65,10 +65,10 @@ class RoadPath:
             for before, after in pairwise(drawn):
                 after += move @ before
             met = np.concatenate([met[:-1], drawn])
-            yield self._under(F, heights, met, lags, 2 * steps + 1)
+            yield self._road_under_wheels(F, heights, met, lags, 2 * steps + 1)
             met, path = met[2 * steps :], path + 1
 
-    def _under(
+    def _road_under_wheels(
         self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray, count: int
     ) -> np.ndarray:
         """Heights and rates (count, 2 w, copies) of what the filters met, every axle after its lag."""
@@ -106,7 +106,7 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
     return block_diag(*[F] * len(heights)), block_diag(*[G] * len(heights)), tuple(rows)
 
 
-def _over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Transition over a length (m) of road and root of the covariance of the noise met there (van Loan).
 
     By doubling: over many decays at once, rounding would grow as their exponential.

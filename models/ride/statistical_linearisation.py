@@ -149,9 +149,9 @@ class _Search:
         changes: list[float] = []
         part = 1.0
         while not changes or changes[-1] > SETTLED:
-            moments, position = self._moved(gains, position)
+            moments, position = self._spring_moments(gains, position)
             wanted = self._gains(moments)
-            changes.append(_largest(wanted, gains))
+            changes.append(_largest_gain_change(wanted, gains))
             if len(changes) >= MOST:
                 raise RunFailed(
                     "statistical linearisation",
@@ -179,7 +179,7 @@ class _Search:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
         return linearise(vehicle, self.speed, named)
 
-    def _moved(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
+    def _spring_moments(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
         """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
         linear = self._replaced(gains, self.watched)
         deviation = stationary(excited(linear, self.excitation, self.speed)).deviation[len(self.vehicle.outputs) :]
@@ -282,7 +282,7 @@ def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> Lin
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
 
 
-def _largest(wanted: np.ndarray, gains: np.ndarray) -> float:
+def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
     """Largest change of a gain, by the gain or, where that is next to nothing, by the largest of its kind."""
     size = np.maximum(abs(wanted), 1e-6 * abs(wanted).max(axis=0, initial=np.finfo(float).tiny))
     return float((abs(wanted - gains) / size).max(initial=0.0))

@@ -201,9 +201,9 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
         return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        met = _joined(vehicle_modes, A[:vehicle, vehicle:last] @ V, values[1])
-        felt = _joined(behind, A[last:, :vehicle] @ vehicle_modes.V, values[0])
-        heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
+        met = _coupling_solution(vehicle_modes, A[:vehicle, vehicle:last] @ V, values[1])
+        felt = _coupling_solution(behind, A[last:, :vehicle] @ vehicle_modes.V, values[0])
+        heard = _coupling_solution(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
     C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
     C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
     arrivals, inputs = hits(system), []
@@ -216,7 +216,7 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
     return _summed(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 
-def _joined(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
     """X of A X + coupling = X diag(values) for a diagonalised A."""
     return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
 

@@ -101,12 +101,12 @@ def varying_speed(
     else:
         P = stationary(at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
-    seen = [_seen(form, P, first, status)]
+    seen = [_all_variances(form, P, first, status)]
     time = [profile.times[0]]
     moments = _moments(form, profile, P, instants, reach)
     for end, P in moments:
         time.append(end)
-        seen.append(_seen(form, P, float(profile.speed(np.array(end))), status))
+        seen.append(_all_variances(form, P, float(profile.speed(np.array(end))), status))
     deviation, height = np.split(np.sqrt(seen), [len(status)], axis=1)
     at = np.array(time)
     return VaryingSpeed(
@@ -134,7 +134,9 @@ def quasi_stationary(
         over = sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
         deviations[moving] = over.deviation[0]
     if not moving.all():
-        deviations[~moving] = np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[: len(form.names)]
+        deviations[~moving] = np.sqrt(_all_variances(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[
+            : len(form.names)
+        ]
     return deviations[which]
 
 
@@ -231,10 +233,10 @@ def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
     after = np.zeros((axles * m, len(behind), G.shape[1]))
     after[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
-    return np.tensordot(_rest(form), after, 1)
+    return np.tensordot(_state_at_rest(form), after, 1)
 
 
-def _rest(form: RoadInPath) -> np.ndarray:
+def _state_at_rest(form: RoadInPath) -> np.ndarray:
     """State (y, f) of a vehicle at rest over the states f of its road: (n + a m, a m)."""
     if np.linalg.cond(form.A) > 1.0 / (1e3 * np.finfo(float).eps):
         raise InputError(
@@ -259,11 +261,11 @@ def _at_rest(form: RoadInPath) -> np.ndarray:
             if i == j or not road.independent:
                 P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ stationary
                 P[j, :, i] = P[i, :, j].T
-    rest = _rest(form)
+    rest = _state_at_rest(form)
     return rest @ P.reshape(rest.shape[1], -1) @ rest.T
 
 
-def _seen(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
+def _all_variances(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
     """Variances of all outputs and of the road's height under each wheel."""
     n, C = len(form.A), form.C + speed * form.rate
     H = np.hstack(form.excitation.heights)

@@ -46,7 +46,7 @@ class FittedRoad:
     spectra: TrackSpectra
 
 
-def fit(
+def fit_road(
     tracks: MeasuredTracks, window_length: float | None = None, low: float | None = None, high: float | None = None
 ) -> FittedRoad:
     """First-order mean and roll process by least squares on the logarithms of the measured densities.
@@ -64,15 +64,21 @@ def fit(
         raise InputError(tracks.name, "heights", None, "left and right have the same mean all along: there is no road")
     least = 2.0 * float(measured.wavenumber[0]) if low is None else low
     most = min(HIGHEST, 0.5 * float(measured.wavenumber[-1])) if high is None else high
-    mean = _fit(measured.wavenumber, measured.mean, measured.freedom, least, most, tracks.name)
+    mean = _fit_first_order(measured.wavenumber, measured.mean, measured.freedom, least, most, tracks.name)
     apart = float(np.abs(tracks.left - tracks.right).max())
-    roll = _fit(measured.wavenumber, measured.roll, measured.freedom, least, most, tracks.name) if apart > 0.0 else None
+    roll = (
+        _fit_first_order(measured.wavenumber, measured.roll, measured.freedom, least, most, tracks.name)
+        if apart > 0.0
+        else None
+    )
     silent = ShapeFilter(mean.filter.corner, 0.0)
     road = TwoTrackRoad(mean.filter, silent if roll is None else roll.filter)
     return FittedRoad(road, mean, roll, (*_limits(tracks, measured), *_doubts(measured, mean, roll)), measured)
 
 
-def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str) -> FilterFit:
+def _fit_first_order(
+    k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str
+) -> FilterFit:
     """ln S = ln(q / 2 pi) - ln(corner^2 + k^2), both unknowns as logarithms."""
     from scipy.optimize import least_squares
 

@@ -127,7 +127,7 @@ def _stations(path: str | Path, length: float, increment: float) -> int:
 
 def _load(path: str | Path) -> Any:
     """Read a file that is complete; whatever the library finds to say about reading it is an error."""
-    promise = _promise(path)
+    promise = _check_header(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # looked at below, where they can be told apart
@@ -151,7 +151,7 @@ def _unreadable(path: str | Path, error: Exception) -> InputError:
     return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
 
 
-def _promise(path: str | Path) -> _Promise:
+def _check_header(path: str | Path) -> _Promise:
     """Read the header, check it, and compare the bytes that follow with what it promises."""
     try:
         header = read_ipl(path, meta_only=True)

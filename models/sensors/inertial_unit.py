@@ -55,7 +55,7 @@ def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def mean_scalar(walks: np.ndarray, time: float) -> float:
-    """E[q1] of the error rotation after ``time`` (s): exp(-sum of s^2 t / 8), on any true motion.
+    """Expected scalar part q1 of the error quaternion after ``time`` (s): exp(-sum of s^2 t / 8), on any motion.
 
     walks : (k,) in rad per sqrt(s). It holds for unequal noise and on a turning body alike, because the squares of
     the three matrices of eq. (26) are all -1: the quaternion's mean cannot see which axis is the noisy one.

@@ -209,15 +209,15 @@ def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Qua
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
-    whole = _judged(array, readings, noise)
+    whole = _quality_of(array, readings, noise)
     if whole.rigid is not False:
         return whole
-    without = {name: _without(array, readings, name, noise) for name in array.names}
+    without = {name: _quality_without(array, readings, name, noise) for name in array.names}
     told = {name: other.share for name, other in without.items() if other is not None and other.rigid}
     return replace(whole, suspect=min(told, key=lambda name: told[name])) if told else whole
 
 
-def _judged(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
+def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
     spins = spin(array, readings)
     left = unexplained(spins)
     count = 3 * len(array.names)
@@ -227,14 +227,14 @@ def _judged(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
     return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
 
 
-def _without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
+def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
     """Quality of the other sensors; None where they do not make an array."""
     keep = [i for i, other in enumerate(array.names) if other != name]
     try:
         rest = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
     except InputError:
         return None
-    return _judged(rest, readings[:, keep], noise)
+    return _quality_of(rest, readings[:, keep], noise)
 
 
 def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ def net(cells: int) -> Grid:
 
 
 def shape_factor(cells: int) -> float:
-    """C / (a^2 b k) as the net sums it up, nearly 8/3."""
+    """C / (a^2 b k) of a patch with ``cells`` cells: slip stiffness by the bristles' stiffness; near the exact 8/3."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT.items():
         contacts[name] = value

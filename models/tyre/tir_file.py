@@ -44,24 +44,26 @@ def tir_table(path: str | Path) -> TyreTable:
     properties = _properties(path)
     _check(path, properties)
     named = (name for name in properties if name in (*NEEDED, *UNIT_SCALES) or COEFFICIENT.fullmatch(name))
-    c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {name: _number(path, properties, name) for name in named}
+    c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {
+        name: _number_of(path, properties, name) for name in named
+    }
     least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
-            raise _wrong(path, properties, name, "must be a load above 0 and at most 1e7 N")
+            raise _wrong_value(path, properties, name, "must be a load above 0 and at most 1e7 N")
     if not least < most:
-        raise _wrong(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
+        raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
     loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
-    curves = {load: (along(c, load), across(c, load)) for load in loads}
+    curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
     return by_similarity(
         lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
     )
 
 
-def along(c: dict[str, float], load: float) -> Curve:
+def longitudinal_formula(c: dict[str, float], load: float) -> Curve:
     """Magic formula of braking under a load (N) from a file's coefficients."""
-    _, off = _excess(c, load)
+    _, off = _load_excess(c, load)
     peak = (c["PDX1"] + c["PDX2"] * off) * c["LMUX"]
     shape = c["PCX1"] * c["LCX"]
     bend = (c["PEX1"] + c["PEX2"] * off + c["PEX3"] * off**2) * (1.0 + c["PEX4"]) * c["LEX"]
@@ -69,9 +71,9 @@ def along(c: dict[str, float], load: float) -> Curve:
     return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def across(c: dict[str, float], load: float) -> Curve:
+def lateral_formula(c: dict[str, float], load: float) -> Curve:
     """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
-    nominal, off = _excess(c, load)
+    nominal, off = _load_excess(c, load)
     peak = abs(c["PDY1"] + c["PDY2"] * off) * c["LMUY"]
     shape = c["PCY1"] * c["LCY"]
     bend = (c["PEY1"] + c["PEY2"] * off) * c["LEY"]
@@ -80,7 +82,7 @@ def across(c: dict[str, float], load: float) -> Curve:
     return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def _excess(c: dict[str, float], load: float) -> tuple[float, float]:
+def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
     """Scaled nominal load (N), and by which share of it a load is above."""
     nominal = c["FNOMIN"] * c["LFZO"]
     return nominal, (load - nominal) / nominal
@@ -107,9 +109,9 @@ def _check(path: str | Path, properties: dict[str, Property]) -> None:
         if name not in properties:
             raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
         if properties[name].text.lower() not in allowed:
-            raise _wrong(path, properties, name, f"must be '{allowed[0]}'")
-    if "FITTYP" in properties and _number(path, properties, "FITTYP") not in VERSIONS:
-        raise _wrong(
+            raise _wrong_value(path, properties, name, f"must be '{allowed[0]}'")
+    if "FITTYP" in properties and _number_of(path, properties, "FITTYP") not in VERSIONS:
+        raise _wrong_value(
             path,
             properties,
             "FITTYP",
@@ -120,17 +122,17 @@ def _check(path: str | Path, properties: dict[str, Property]) -> None:
             raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED))
 
 
-def _number(path: str | Path, properties: dict[str, Property], name: str) -> float:
+def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> float:
     try:
         value = float(properties[name].text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _wrong(path, properties, name, "must be a finite number")
+        raise _wrong_value(path, properties, name, "must be a finite number")
     return value
 
 
-def _wrong(path: str | Path, properties: dict[str, Property], name: str, allowed: str) -> InputError:
+def _wrong_value(path: str | Path, properties: dict[str, Property], name: str, allowed: str) -> InputError:
     return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
 
 

@@ -68,14 +68,14 @@ def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.nda
     ):
         wrong = np.flatnonzero(~((columns[name] >= least) & (columns[name] <= most * (1.0 + 1e-12))))
         if wrong.size:
-            raise _at(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
+            raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
     for name, zero in (("mu_x", "slip"), ("mu_y", "slip angle")):
         wrong = np.flatnonzero((columns[zero] == 0.0) & (columns[name] != 0.0))
         if wrong.size:
-            raise _at(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
+            raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
 
 
-def _at(path: str | Path, lines: np.ndarray, name: str, row: int, value: float, allowed: str) -> InputError:
+def _error_in_row(path: str | Path, lines: np.ndarray, name: str, row: int, value: float, allowed: str) -> InputError:
     return InputError(path, f"line {lines[row]}, column {name!r}", float(value), f"{allowed} (in SI units)")
 
 
@@ -106,7 +106,7 @@ def _check_product(
     off = np.abs(product - mu_y)
     worst = int(off.argmax())
     if off.flat[worst] > PRODUCT * max(mu_x.max(), mu_y.max()):
-        raise _at(
+        raise _error_in_row(
             path,
             lines,
             "mu_y",

@@ -102,7 +102,7 @@ class TyreTable:
 
     def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
         """The tyre's functions on nodes that include these tables' own: linear interpolation loses nothing."""
-        mu_x, g, h = self._at(angles, slips, loads)
+        mu_x, g, h = self._at_nodes(angles, slips, loads)
         return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
 
     def scaled(self, factor: float) -> "TyreTable":
@@ -111,7 +111,7 @@ class TyreTable:
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
         """mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
-        mu_x, g, h = self._at(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
+        mu_x, g, h = self._at_nodes(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
     def figures(self, load: float) -> dict[str, float]:
@@ -128,14 +128,19 @@ class TyreTable:
             "slope [1/deg]": float(y[:, 0][min(1, len(y) - 1)] / np.rad2deg(little_angle)) if little_angle else 0.0,
         }
 
-    def _at(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
+    def _at_nodes(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
         """mu_x, g and h at other nodes."""
-        mu_x = _along(_along(_along(self.mu_x, 0, self.angles, angles), 1, self.loads, loads), 2, self.slips, slips)
-        g = _along(_along(self.g, 0, self.angles, angles), 1, self.slips, slips)
-        return [mu_x, g, _along(_along(self.h, 0, self.angles, angles), 1, self.loads, loads)]
+        mu_x = _interpolate_axis(
+            _interpolate_axis(_interpolate_axis(self.mu_x, 0, self.angles, angles), 1, self.loads, loads),
+            2,
+            self.slips,
+            slips,
+        )
+        g = _interpolate_axis(_interpolate_axis(self.g, 0, self.angles, angles), 1, self.slips, slips)
+        return [mu_x, g, _interpolate_axis(_interpolate_axis(self.h, 0, self.angles, angles), 1, self.loads, loads)]
 
 
-def _along(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+def _interpolate_axis(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> np.ndarray:
     """Values at new nodes along one axis, linear between the old ones and constant beyond."""
     if np.array_equal(old, new):
         return values
@@ -176,7 +181,7 @@ def stacked(tables: Sequence[TyreTable]) -> Tables:
 
 
 @lean
-def place(nodes, value):
+def cell_and_share(nodes, value):
     """Cell at which a value lies, and the share of that cell below it; held at the ends."""
     last = nodes.size - 1
     if last == 0 or value <= nodes[0]:
@@ -194,7 +199,7 @@ def place(nodes, value):
 
 
 @lean
-def across(table, cells, k, w, g, h):
+def lateral_adhesion(table, cells, k, w, g, h):
     """mu_y of one table at a slip angle and a load in these ``cells``, and in cell k of slip with its share w."""
     i, p, j, q = cells
     i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
@@ -208,7 +213,7 @@ def across(table, cells, k, w, g, h):
 
 
 @lean
-def along(table, cells, k, mu_x):
+def longitudinal_adhesion(table, cells, k, mu_x):
     """mu_x of one table at slip node k, at a slip angle and a load in these ``cells``."""
     i, p, j, q = cells
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)

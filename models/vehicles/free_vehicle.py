@@ -46,7 +46,9 @@ def free_vehicle(
         if spin_inertia and tyre.name not in fixed
     ]
     bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
-    free = replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
+    free = replace(
+        vehicle, bodies=_bodies_before_riders(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity
+    )
     return free.in_frame(CARRIER)
 
 
@@ -136,7 +138,7 @@ def _swaying(bar: AntiRollBar) -> AntiRollBar:
     return replace(bar, body=SWAY)
 
 
-def _walked(bodies: list[Body]) -> tuple[Body, ...]:
+def _bodies_before_riders(bodies: list[Body]) -> tuple[Body, ...]:
     """Every body right before all that ride on it: the order in which engines number them."""
     walked: list[Body] = []
 

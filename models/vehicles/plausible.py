@@ -109,12 +109,12 @@ def _query(check: str, place: str, said: str, size: float, unit: str) -> Finding
     return Finding(check, "doubt", place, f"{place}: {said}.", size, unit)
 
 
-def _beyond(value: float, usual: tuple[float, float]) -> bool:
+def _is_unusual(value: float, usual: tuple[float, float]) -> bool:
     return not usual[0] <= value <= usual[1]
 
 
 def _masses(figures: VehicleFigures) -> Iterator[Finding]:
-    if _beyond(figures.total, MASS):
+    if _is_unusual(figures.total, MASS):
         yield _query(
             "mass",
             "mass of the vehicle",
@@ -123,7 +123,7 @@ def _masses(figures: VehicleFigures) -> Iterator[Finding]:
             "kg",
         )
     unsprung = sum(figures.vehicle.body(name).mass for name in figures.wheels)
-    if figures.wheels and not _beyond(figures.total, MASS) and figures.total - unsprung < LIGHT * unsprung:
+    if figures.wheels and not _is_unusual(figures.total, MASS) and figures.total - unsprung < LIGHT * unsprung:
         yield _query(
             "mass",
             f"bodies[{figures.carried.name}].mass",
@@ -142,10 +142,10 @@ def _tonnes(value: float) -> str:
 def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
     metres = "Lengths are in m, not in mm"
     for name, value, usual in (("wheelbase", figures.wheelbase, WHEELBASE), ("track", figures.track, TRACK)):
-        if value and _beyond(value, usual):
+        if value and _is_unusual(value, usual):
             yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
     for body in figures.vehicle.bodies:
-        if _beyond(body.position[2], (-0.01, HEIGHT)):
+        if _is_unusual(body.position[2], (-0.01, HEIGHT)):
             yield _query(
                 "size",
                 f"bodies[{body.name}].position",
@@ -163,7 +163,7 @@ def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
     for freedom, usual in GYRATION.items():
         span, inertia = spans[freedom], about[freedom]
         radius = (inertia / body.mass) ** 0.5
-        if span and freedom in body.freedoms and inertia and _beyond(radius / span, usual):
+        if span and freedom in body.freedoms and inertia and _is_unusual(radius / span, usual):
             yield _query(
                 "inertia",
                 f"bodies[{body.name}].inertia",
@@ -202,7 +202,7 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
                 "1",
             )
         for strut in struts:
-            apart = _apart(strut, wheel, tyres)
+            apart = _distance_from_wheel(strut, wheel, tyres)
             if apart > FAR:
                 point = strut.first_point if strut.first_body == wheel else strut.second_point
                 yield _query(
@@ -215,7 +215,7 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
                 )
 
 
-def _apart(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
+def _distance_from_wheel(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
     """Distance (m) of a strut's point on a wheel from the line between its tyres, seen from above."""
     x, y, _ = strut.first_point if strut.first_body == wheel else strut.second_point
     beside = [tyre.point[1] for tyre in tyres]
@@ -279,7 +279,7 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
     sunk = _sunk(figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
-    if _beyond(bounce, BOUNCE):
+    if _is_unusual(bounce, BOUNCE):
         yield _query(
             "frequency",
             f"bodies[{figures.carried.name}]",
@@ -290,7 +290,7 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
         )
     for wheel in figures.wheels:
         hop = _hop(figures, wheel)
-        if hop is not None and _beyond(hop, HOP):
+        if hop is not None and _is_unusual(hop, HOP):
             yield _query(
                 "frequency",
                 f"bodies[{wheel}]",
@@ -300,7 +300,7 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
             )
     for tyre in figures.vehicle.tyres:
         pressed = figures.held[tyre.name] / tyre.stiffness
-        if pressed > 0 and _beyond(pressed, PRESSED):
+        if pressed > 0 and _is_unusual(pressed, PRESSED):
             yield _query(
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
@@ -339,7 +339,7 @@ def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
         if not (strut.damping and stiffness > 0 and load > 0):
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)
-        if _beyond(share, DAMPING):
+        if _is_unusual(share, DAMPING):
             yield _query(
                 "damping",
                 f"springs[{name}].damping",

@@ -88,12 +88,12 @@ class Curve:
 
     def __call__(self, argument: float) -> float:
         """Force (N) at a travel or rate."""
-        i = self._piece(argument)
+        i = self._piece_of(argument)
         return self.forces[i] + self._slopes[i] * (argument - self.arguments[i])
 
     def slope_at_rest(self) -> float:
         """Slope at 0; in a corner the mean of its two sides, which is what a central difference sees."""
-        slopes, at = self._slopes, self._piece(0.0)
+        slopes, at = self._slopes, self._piece_of(0.0)
         if self.arguments[at] == 0.0 and at > 0:
             return 0.5 * (slopes[at - 1] + slopes[at])
         return slopes[at]
@@ -109,7 +109,7 @@ class Curve:
         x, f = self.arguments, self.forces
         return [(f[i + 1] - f[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
 
-    def _piece(self, argument: float) -> int:
+    def _piece_of(self, argument: float) -> int:
         """Index of the piece that holds the argument, the outer ones for all beyond."""
         return bisect_right(self.arguments, argument, 1, len(self.arguments) - 1) - 1
 

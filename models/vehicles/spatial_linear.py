@@ -92,7 +92,7 @@ class Kinematics:
         return np.zeros((3, self.size)) if frame is None else np.cross(self.turn(frame), axis, axisa=0).T
 
     def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
-        """(n, n): second derivatives of axis . (point two - point one), the axis fixed in a body or in the space."""
+        """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
         ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
         total = np.tensordot(axis, second, 1)
         if frame is None:
@@ -135,7 +135,7 @@ def linearise(
     gains |= equivalent or {}
     tyres = _tyres(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
-    for row, k, c in (*_parts(vehicle, motion, gains).values(), *tyres.values()):
+    for row, k, c in (*_parts_by_name(vehicle, motion, gains).values(), *tyres.values()):
         stiffness += k * np.outer(row, row)
         damping += c * np.outer(row, row)
     stiffness += _geometric(vehicle, motion)
@@ -163,7 +163,7 @@ def outputs(
     vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains] | None = None
 ) -> tuple[Output, ...]:
     """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
-    parts, tyres = _parts(vehicle, motion, gains or _gains(vehicle)), _tyres(vehicle, motion)
+    parts, tyres = _parts_by_name(vehicle, motion, gains or _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
@@ -175,7 +175,7 @@ def mass(vehicle: SpatialVehicle) -> np.ndarray:
         shift, turn = motion.shift(body.name, body.position), motion.turn(body.name)
         total += body.mass * shift.T @ shift + turn.T @ np.array(body.inertia) @ turn
     for element in vehicle.joint_elements:
-        row = _along(motion, element)
+        row = _joint_row(motion, element)
         total += element.inertia * np.outer(row, row)
     return total
 
@@ -205,7 +205,7 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     and would have to pull.
     """
     motion = Kinematics(vehicle)
-    parts, tyres = _parts(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
+    parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
     stiffness = static_stiffness(vehicle, motion)
     weight = sum(body.mass * vehicle.gravity * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
@@ -233,7 +233,7 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
     return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
 
 
-def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
+def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
     """Spring-dampers, bars and joint elements by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
@@ -246,10 +246,10 @@ def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gain
         )
         rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
     rows |= {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
-    return rows | {e.name: (_along(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
+    return rows | {e.name: (_joint_row(motion, e), e.stiffness, e.damping) for e in vehicle.joint_elements}
 
 
-def _along(motion: Kinematics, element: JointElement) -> np.ndarray:
+def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
     """Row (n,) of a joint element's d, which is linear in the coordinates."""
     places = zip(element.coordinates, element.factors, strict=True)
     return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
@@ -275,7 +275,7 @@ def preloaded(vehicle: SpatialVehicle, held: Preloads) -> SpatialVehicle:
 
 def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     """Stiffness (n, n) of springs, bars and tyres at rest, without gravity: N/m, N, N m."""
-    parts = (*_parts(vehicle, motion, _gains(vehicle)).values(), *_tyres(vehicle, motion).values())
+    parts = (*_parts_by_name(vehicle, motion, _gains(vehicle)).values(), *_tyres(vehicle, motion).values())
     return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
@@ -353,7 +353,7 @@ def _output(
         row, *force_gains = parts[spec.part]
         gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[spec.kind]
         rows[:2] = np.outer(gains, row)
-        turning = {bar.name for bar in vehicle.bars} | {e.name for e in vehicle.joint_elements if _turns(e)}
+        turning = {bar.name for bar in vehicle.bars} | {e.name for e in vehicle.joint_elements if _is_angle(e)}
         if spec.part in turning:
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
@@ -363,7 +363,7 @@ def _output(
     return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
 
 
-def _turns(element: JointElement) -> bool:
+def _is_angle(element: JointElement) -> bool:
     """Whether the d of a joint element is an angle."""
     return all(freedom.startswith("r") for _, freedom in element.coordinates)
 

@@ -100,11 +100,11 @@ def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
         section, number = place[1], int(place[2])
         entry = table[section][number]
         name = entry.get("name") if isinstance(entry, Mapping) else None
-        told = _place(section, name or number) + error.place[place.end() :]
+        told = _place_of_key(section, name or number) + error.place[place.end() :]
         raise InputError(file, told, error.value, error.allowed) from None
 
 
-def _place(table: str, entry: object, key: str = "") -> str:
+def _place_of_key(table: str, entry: object, key: str = "") -> str:
     return f"{table}[{entry}]" + (f".{key}" if key else "")
 
 
@@ -154,11 +154,11 @@ class _Builder:
         )
         for key, names, kind, choices in known:
             for name in names:
-                self._known(f"reduced.{key}", name, kind, choices)
+                self._known_name(f"reduced.{key}", name, kind, choices)
         locked = frozenset(place for place in places if list(place) in table.locked)
         return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
 
-    def _need(self, right: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
+    def _require(self, right: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
         """InputError unless something is right."""
         if not right:
             raise InputError(self.file, place, value, allowed, tuple(choices))
@@ -166,16 +166,16 @@ class _Builder:
     def _unique(self, table: str, entries: Sequence[Any], reserved: Sequence[str] = ()) -> None:
         names = [entry.name for entry in entries]
         for i, name in enumerate(names):
-            place = _place(table, name, "name")
-            self._need(name not in reserved, place, name, "this name means the ground: choose another")
-            self._need(name not in names[:i], place, name, "two entries have this name")
+            place = _place_of_key(table, name, "name")
+            self._require(name not in reserved, place, name, "this name means the ground: choose another")
+            self._require(name not in names[:i], place, name, "two entries have this name")
 
-    def _known(self, place: str, name: str, kind: str, choices: Sequence[str]) -> str:
-        self._need(name in choices, place, name, f"no such {kind}", choices)
+    def _known_name(self, place: str, name: str, kind: str, choices: Sequence[str]) -> str:
+        self._require(name in choices, place, name, f"no such {kind}", choices)
         return name
 
     def _body(self, place: str, name: str) -> str:
-        return self._known(place, name, "body", tuple(self.bodies))
+        return self._known_name(place, name, "body", tuple(self.bodies))
 
     def _bodies(self) -> dict[str, Body]:
         """Parents before their children, otherwise as the file has them, then the occupants of the seats."""
@@ -183,12 +183,12 @@ class _Builder:
         names, done = tuple(waiting), dict[str, Body]()
         for body in self.tables.bodies:
             if body.parent is not None:
-                self._known(_place("bodies", body.name, "parent"), body.parent, "body", names)
+                self._known_name(_place_of_key("bodies", body.name, "parent"), body.parent, "body", names)
         while waiting:
             first = next(iter(waiting.values()))
             ready = next((body for body in waiting.values() if body.parent is None or body.parent in done), None)
-            place = _place("bodies", first.name, "parent")
-            self._need(ready, place, first.parent, "bodies ride on one another")
+            place = _place_of_key("bodies", first.name, "parent")
+            self._require(ready, place, first.parent, "bodies ride on one another")
             assert ready is not None
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
             inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
@@ -203,12 +203,14 @@ class _Builder:
 
     def _hitch(self, body: Body, point: Vector) -> Body:
         """The massless body with the turns of a towed one, about the point where its parent tows it."""
-        place, name = _place("bodies", body.name), hitch_of(body.name)
-        self._need(body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent")
+        place, name = _place_of_key("bodies", body.name), hitch_of(body.name)
+        self._require(
+            body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
+        )
         turns = "rz" in body.freedoms and all(freedom.startswith("r") for freedom in body.freedoms)
-        self._need(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
+        self._require(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
         names = [each.name for each in (*self.tables.bodies, *self.tables.seats)]
-        self._need(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
+        self._require(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
         return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, name: str | None) -> str | None:
@@ -222,22 +224,22 @@ class _Builder:
         axles = {axle.name: axle for axle in self.tables.axles}
         for before, axle in pairwise(axles.values()):
             allowed = f"axles are listed from the front: must lie behind {before.name!r}, below {before.x:g} m"
-            self._need(axle.x < before.x, _place("axles", axle.name, "x"), axle.x, allowed)
+            self._require(axle.x < before.x, _place_of_key("axles", axle.name, "x"), axle.x, allowed)
         named = {
-            self._known(_place("tyres", tyre.name, "axle"), tyre.axle, "axle", tuple(axles))
+            self._known_name(_place_of_key("tyres", tyre.name, "axle"), tyre.axle, "axle", tuple(axles))
             for tyre in self.tables.tyres
         }
         for name in axles:
-            self._need(name in named, _place("axles", name), None, "no tyre names this axle")
+            self._require(name in named, _place_of_key("axles", name), None, "no tyre names this axle")
         return axles
 
     def _spring(self, spring: SpringTable) -> SpringDamper:
-        place = _place("springs", spring.name)
-        ends, points = self._ends(place, spring.bodies), self._points(place, spring)
+        place = _place_of_key("springs", spring.name)
+        ends, points = self._two_bodies(place, spring.bodies), self._points(place, spring)
         axis = self._axis(place, spring, points)
         gains = spring.stiffness, spring.damping
         acts = any((*gains, spring.friction, spring.travel_force, spring.rate_force))
-        self._need(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
+        self._require(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
         travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
         return SpringDamper(
             spring.name,
@@ -259,16 +261,16 @@ class _Builder:
         first, second = map(self._towed_under, ends)
         return first if first == second else None
 
-    def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
+    def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""
         (first, second), place = bodies, f"{place}.bodies"
-        self._need(first != second, place, bodies, "connects a body with itself")
-        self._need(first != GROUND, place, bodies, "name the ground second")
+        self._require(first != second, place, bodies, "connects a body with itself")
+        self._require(first != GROUND, place, bodies, "name the ground second")
         return self._body(place, first), None if second == GROUND else self._body(place, second)
 
     def _points(self, place: str, spring: SpringTable) -> tuple[Vector, Vector]:
         both = (spring.point is None) != (spring.points is None)
-        self._need(both, f"{place}.point", None, "give either point, the place of both ends, or points, both")
+        self._require(both, f"{place}.point", None, "give either point, the place of both ends, or points, both")
         first, second = (spring.point, spring.point) if spring.points is None else spring.points
         return _vector(first), _vector(second)
 
@@ -282,56 +284,56 @@ class _Builder:
 
     def _unit(self, place: str, direction: Sequence[float]) -> Vector:
         length = float(np.linalg.norm(direction))
-        self._need(length, place, list(direction), "a direction needs a length")
+        self._require(length, place, list(direction), "a direction needs a length")
         return _vector(np.array(direction) / length)
 
     def _curve(self, place: str, table: CurveTable | None) -> Curve | None:
         if table is None:
             return None
         at, force = table.at, table.force
-        self._need(len(at) == len(force), f"{place}.force", force, f"must hold as many values as at, {len(at)}")
+        self._require(len(at) == len(force), f"{place}.force", force, f"must hold as many values as at, {len(at)}")
         rises = all(before < after for before, after in pairwise(at))
-        self._need(rises, f"{place}.at", at, "must rise from value to value")
+        self._require(rises, f"{place}.at", at, "must rise from value to value")
         curve = Curve(tuple(at), tuple(force))
         still = abs(curve(0.0)) <= 1e-9 * max(map(abs, force))
-        self._need(still, f"{place}.force", curve(0.0), "must be 0 N at 0: the design position is at rest")
+        self._require(still, f"{place}.force", curve(0.0), "must be 0 N at 0: the design position is at rest")
         return curve
 
     def _mounts(self) -> Iterator[SpringDamper]:
         for mount in self.tables.mounts:
-            ends, at = self._ends(_place("mounts", mount.name), mount.bodies), _vector(mount.point)
+            ends, at = self._two_bodies(_place_of_key("mounts", mount.name), mount.bodies), _vector(mount.point)
             acts = any(mount.stiffness) or any(mount.damping)
-            place = _place("mounts", mount.name, "stiffness")
-            self._need(acts, place, mount.stiffness, "has neither spring nor damper")
-            frame = self._frame(_place("mounts", mount.name), mount.frame, ends)
+            place = _place_of_key("mounts", mount.name, "stiffness")
+            self._require(acts, place, mount.stiffness, "has neither spring nor damper")
+            frame = self._frame(_place_of_key("mounts", mount.name), mount.frame, ends)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
                 yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat: SeatTable) -> SpringDamper:
         """Carrier below, occupant above: turned round so that force is positive in compression."""
-        carrier = self._body(_place("seats", seat.name, "body"), seat.body)
+        carrier = self._body(_place_of_key("seats", seat.name, "body"), seat.body)
         at = _vector(seat.position)
         law, frame = (seat.stiffness, seat.damping), self._towed_under(carrier)
         return SpringDamper(seat.name, seat.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
     def _tyre(self, tyre: TyreTable) -> Tyre:
-        place, axle = _place("tyres", tyre.name), self.axles[tyre.axle]
+        place, axle = _place_of_key("tyres", tyre.name), self.axles[tyre.axle]
         x, y, z = self.bodies[self._body(f"{place}.body", tyre.body)].position
         allowed = f"its body lies at x = {x:g} m, its axle {axle.name!r} at {axle.x:g} m: they must agree"
-        self._need(abs(x - axle.x) <= 1e-9, f"{place}.axle", tyre.axle, allowed)
+        self._require(abs(x - axle.x) <= 1e-9, f"{place}.axle", tyre.axle, allowed)
         at, number = (axle.x, y if tyre.y is None else tyre.y, z), list(self.axles).index(tyre.axle)
         return Tyre(tyre.name, tyre.body, at, number, tyre.stiffness, tyre.damping)
 
     def _bar(self, bar: BarTable) -> AntiRollBar:
-        place, names = _place("anti_roll_bars", bar.name), tuple(self.tyres)
+        place, names = _place_of_key("anti_roll_bars", bar.name), tuple(self.tyres)
         body = self.bodies[self._body(f"{place}.body", bar.body)]
         towed = body.name in self.towed
         rolls = towed or ("rx" in body.freedoms and body.parent is None)
         allowed = "needs a body with the freedom rx and without a parent, or a towed one"
-        self._need(rolls, f"{place}.body", bar.body, allowed)
-        left, right = (self.tyres[self._known(f"{place}.tyres", name, "tyre", names)] for name in bar.tyres)
+        self._require(rolls, f"{place}.body", bar.body, allowed)
+        left, right = (self.tyres[self._known_name(f"{place}.tyres", name, "tyre", names)] for name in bar.tyres)
         pair = left.axle == right.axle and left.point[1] > right.point[1]
-        self._need(pair, f"{place}.tyres", bar.tyres, "must be the left and the right tyre of one axle")
+        self._require(pair, f"{place}.tyres", bar.tyres, "must be the left and the right tyre of one axle")
         ends, frame = (left.body, right.body, left.point, right.point), body.name if towed else None
         return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping, frame)
 
@@ -339,12 +341,12 @@ class _Builder:
         """Side forces of the tyres on the chassis, which guides the wheels sideways."""
         rolling, chassis = [tyre for tyre in self.tables.tyres if tyre.cornering], self.tables.chassis
         for axle in (axle for axle in self.tables.axles if axle.roll_steer):
-            place = _place("axles", axle.name, "roll_steer")
-            self._need(rolling, place, axle.roll_steer, "steers nothing: no tyre has a cornering stiffness")
+            place = _place_of_key("axles", axle.name, "roll_steer")
+            self._require(rolling, place, axle.roll_steer, "steers nothing: no tyre has a cornering stiffness")
         if not rolling:
             return ()
         named, forces = chassis is not None, []
-        self._need(named, "chassis", None, f"is missing: tyre {rolling[0].name!r} has a side force")
+        self._require(named, "chassis", None, f"is missing: tyre {rolling[0].name!r} has a side force")
         assert chassis is not None
         self._body("chassis", chassis)
         for tyre in rolling:
@@ -353,22 +355,22 @@ class _Builder:
             guided = tyre.body == carrying or "y" not in self.bodies[tyre.body].freedoms
             kind = "chassis" if carrying == chassis else "towed body"
             allowed = f"its side force acts on the {kind}: body {tyre.body!r} must not have the freedom y"
-            self._need(guided, _place("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
+            self._require(guided, _place_of_key("tyres", tyre.name, "cornering"), tyre.cornering, allowed)
             steer = self.axles[tyre.axle].roll_steer
             forces.append(SideForce(tyre.name, carrying, (x, y, 0.0), carrying, tyre.cornering, steer))
         return tuple(forces)
 
     def _output(self, output: OutputTable, parts: tuple[str, ...]) -> SpatialOutput:
-        place, kind = _place("outputs", output.name), output.kind
+        place, kind = _place_of_key("outputs", output.name), output.kind
         needed = "part" if kind in ("travel", "travel rate", "force") else "tyre" if "tyre" in kind else "body"
         foreign = {"part": "body point tyre", "tyre": "body point part", "body": "part tyre"}[needed].split()
         for key in foreign:
             value = getattr(output, key)
-            self._need(value is None, f"{place}.{key}", value, f"{kind} is read of a {needed}")
+            self._require(value is None, f"{place}.{key}", value, f"{kind} is read of a {needed}")
         name = getattr(output, needed)
-        self._need(name is not None, f"{place}.{needed}", None, f"is missing: {kind} is read of a {needed}")
+        self._require(name is not None, f"{place}.{needed}", None, f"is missing: {kind} is read of a {needed}")
         known = {"part": parts, "tyre": tuple(self.tyres), "body": tuple(self.bodies)}[needed]
-        self._known(f"{place}.{needed}", name, needed, known)
+        self._known_name(f"{place}.{needed}", name, needed, known)
         if needed != "body":
             read_of: Any = PartOutput if needed == "part" else TyreOutput
             return read_of(output.name, kind, name)

@@ -92,7 +92,7 @@ class Overlay:
         head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
         rows = [
             f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {each.relative:>9.2%} {each.peak:>11.4g}  "
-            f"{each.at:.6g} s{_within(each)}"
+            f"{each.at:.6g} s{_within_error_text(each)}"
             for each in self.matches
         ]
         return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
@@ -106,7 +106,7 @@ class Overlay:
         return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
 
 
-def _within(match: Match) -> str:
+def _within_error_text(match: Match) -> str:
     return f"; rms within the run's own error of {match.stated:.2g}" if match.rms <= match.stated else ""
 
 
@@ -213,7 +213,7 @@ def report(run_path: Path, measurement: Path, folder: Path, shift: float | None 
             f"{measurement.name} over {name}",
             folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
         )
-    table = [line for name, each in overlays.items() for line in _told(name, each, len(overlays))]
+    table = [line for name, each in overlays.items() for line in _overlay_lines(name, each, len(overlays))]
     return {
         "scene": f"{measurement} over {run_path}",
         "folder": str(folder),
@@ -225,7 +225,7 @@ def report(run_path: Path, measurement: Path, folder: Path, shift: float | None 
     }
 
 
-def _told(name: str, overlay: Overlay, count: int) -> Sequence[str]:
+def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
     return [*([f"  {name}"] if count > 1 else []), *overlay.lines()]
 
 

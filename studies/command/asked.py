@@ -52,7 +52,7 @@ def scene_path(name: str) -> Path:
     return Path(name)
 
 
-def ready(scene: Any, engines: tuple[str, ...]) -> Any:
+def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
     """The study's module, once everything that can be refused before a run has been checked."""
     module = study_of(scene)
     plan_of(scene).check(scene, engines)
@@ -92,14 +92,14 @@ def causes(scene: Any) -> list[str]:
 
 def _unended(scene: Any) -> Iterator[Finding]:
     """Remarks on the CSV files that a scene names whose last line has no line end."""
-    from models.core.tables import ended
+    from models.core.tables import has_line_end
 
     for name in dict.fromkeys(_files(scene.table())):
         try:
             path = scene.path(name)
         except InputError:  # a file that is written, not read
             continue
-        if not ended(path):
+        if not has_line_end(path):
             yield Finding(
                 "file",
                 "note",
@@ -125,14 +125,14 @@ def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple
     if name is None or name == "all":
         return engines
     if ":" in name:
-        return _outside(name, system, option)
+        return _registered_outside(name, system, option)
     named = (*engines, *KNOWN[system].on_request)
     if name not in named:
         raise InputError(option, "", name, "no such engine", (*named, "all"))
     return (name,)
 
 
-def _outside(name: str, system: str, option: str) -> tuple[str, ...]:
+def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
     if system != DEFAULT:
         raise InputError(option, "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from models.core.errors import InputError
-from studies.command.finishing import end, folder_of
+from studies.command.finishing import exit_with_message, folder_of
 from studies.command.waiting import waiting
 
 
@@ -34,5 +34,5 @@ def blind_spot_audit(more: bool, only: str | None, out: Path | None, resume: Pat
         with waiting("blind spots") as progress:
             lines = audit(folder, progress) if only is None else audit_of(only, folder, progress)
     except KeyboardInterrupt:
-        end(f"interrupted; finished functions are kept: {again} --resume {folder}", 130)
+        exit_with_message(f"interrupted; finished functions are kept: {again} --resume {folder}", 130)
     print("\n".join(summary(lines, folder)))

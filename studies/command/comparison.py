@@ -113,7 +113,7 @@ def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
         a, b = (dict(_quantities(file)) for file in files)
-        notes += _alone(prefix, (files[0], a), (files[1], b))
+        notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
         differences += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
     return _sorted(differences, first, second), notes
 
@@ -122,7 +122,7 @@ def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple
     """Differences between two results in memory, which messages and notes call by ``names``."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
-    return _sorted(differences, *names), _alone("", (names[0], a), (names[1], b))
+    return _sorted(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
 def _sorted(differences: list[Difference], first: object, second: object) -> list[Difference]:
@@ -132,7 +132,7 @@ def _sorted(differences: list[Difference], first: object, second: object) -> lis
     return sorted(differences, key=lambda each: -each.share)
 
 
-def _alone(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
+def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
     """Notes on names that one side alone has."""
     return [
         f"{prefix}only in {path}: {', '.join(alone)}"
@@ -161,7 +161,9 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
         raise InputError(
             later, "", None, f"has no results of the same names as {earlier}: compare two results of one study"
         )
-    return [(name, first[name], second[name]) for name in common], _alone("", (earlier, first), (later, second))
+    return [(name, first[name], second[name]) for name in common], _notes_on_missing(
+        "", (earlier, first), (later, second)
+    )
 
 
 def _files(folder: Path) -> dict[str, Path]:
@@ -252,7 +254,7 @@ def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
         raise InputError(path, "", None, f"is not a table of results: {error}") from None
     if not columns:
         raise InputError(path, "", None, "is not a table of results: it has no rows")
-    numeric = {head: values for head, cells in columns.items() if (values := _numbers(cells)) is not None}
+    numeric = {head: values for head, cells in columns.items() if (values := _numeric_cells(cells)) is not None}
     over = names[0]
     labels = () if over in numeric else columns[over]
     grid = numeric.pop(over, np.arange(len(rows), dtype=float))
@@ -261,7 +263,7 @@ def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
         yield name, Quantity(unit.rstrip("]"), values, over, grid, labels=labels)
 
 
-def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
+def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
     try:
         values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
     except ValueError:
@@ -359,14 +361,17 @@ def _lines(differences: list[Difference]) -> list[str]:
     same, more = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
-        *(f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {_told(d)}" for d in shown),
+        *(
+            f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {_difference_text(d)}"
+            for d in shown
+        ),
         *([f"  {more} more that differ less: compare.csv"] if more else []),
         *([f"  the same to the last bit: {same} of {len(differences)}"] if same else []),
         *(f"  {note}" for note in dict.fromkeys(each.note for each in differences if each.note)),
     ]
 
 
-def _told(difference: Difference) -> str:
+def _difference_text(difference: Difference) -> str:
     """Where a difference is largest, and whether it tells anything."""
     return (
         f"{difference.where}; rms within the stated error of {difference.stated:.2g}"

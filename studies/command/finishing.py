@@ -16,13 +16,13 @@ Work = Callable[[Any], dict[str, Any]]
 """A study, which is given what it tells its progress to, and returns its summary."""
 
 
-def end(message: str, code: int) -> NoReturn:
+def exit_with_message(message: str, code: int) -> NoReturn:
     """End with a message on stderr and an exit code: 1 for a failed run, 2 for a user's mistake, 130 for Ctrl-C."""
     print(f"twinrig: {message}", file=sys.stderr)
     sys.exit(code)
 
 
-def watched(profile: bool) -> Callable[[Work], Work]:
+def profile_lines(profile: bool) -> Callable[[Work], Work]:
     """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
     if not profile:
         return lambda work: work
@@ -51,7 +51,9 @@ def finish(
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
         kept = {path.name for path in folder.iterdir()} - {COMMAND}
-        end(f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130)
+        exit_with_message(
+            f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130
+        )
     finally:
         drop_if_empty(folder)
     if as_json:
@@ -75,7 +77,7 @@ def folder_of(name: str, blocks: str | None, study: str, out: Path | None, resum
     return resumed_folder(resume, blocks)
 
 
-def untold(findings: tuple[Finding, ...], told: str) -> list[str]:
+def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
     """Lines of those findings that a plan or a study has not told."""
     return lines(finding for finding in findings if finding.text not in told)
 
@@ -94,7 +96,7 @@ def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
     for pair, gap in summary.get("largest difference of states", {}).items():
         print(f"  {pair}: states differ by at most {gap:.1e}")
     table = summary.get("table", [])
-    for line in (*untold(doubts, "\n".join(table)), *table):
+    for line in (*untold_findings(doubts, "\n".join(table)), *table):
         print(line)
     kept = Path(summary["folder"]).exists()
     print(f"  results in {summary['folder']}" if kept else "  nothing was saved")

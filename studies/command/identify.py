@@ -98,7 +98,7 @@ def as_dict(known: Uncertainty, profiles: Sequence[Profile] = ()) -> dict[str, A
         "estimates": {
             name: {
                 "value": float(value),
-                "standard error": _number(error),
+                "standard error": _finite_number(error),
                 "determined": bool(sure),
                 "at a bound": bool(at),
             }
@@ -111,7 +111,7 @@ def as_dict(known: Uncertainty, profiles: Sequence[Profile] = ()) -> dict[str, A
             {"standard error": error, "direction": dict(zip(names, vector.tolist(), strict=True))}
             for error, vector in known.combinations()
         ],
-        "condition": _number(known.condition),
+        "condition": _finite_number(known.condition),
         "residuals stay alike for [s]": known.staying,
         "errors of channels": errors(solved),
         "samples left out": {channel.name: channel.left_out for channel in solved.problem.channels},
@@ -130,7 +130,7 @@ def correlation(known: Uncertainty) -> np.ndarray:
     return np.divide(known.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
 
 
-def _number(value: float) -> float | None:
+def _finite_number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 

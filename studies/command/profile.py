@@ -47,10 +47,10 @@ class Watch:
     def __init__(self) -> None:
         self.seconds = defaultdict[str, float](float, {BEGIN: time.process_time()})
         self._main, self._over = threading.main_thread().ident, threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread = threading.Thread(target=self._sample_stack, daemon=True)
         self._thread.start()
 
-    def _look(self) -> None:
+    def _sample_stack(self) -> None:
         """Give the time since the last look to what is seen now: a call that lets no thread in ends before a look."""
         last = time.perf_counter()
         while not self._over.wait(EVERY):

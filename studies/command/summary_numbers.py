@@ -13,21 +13,21 @@ FRAMES = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
 
 
-def numbers(summary: dict[str, Any]) -> dict[str, float]:
+def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
     """Every scalar of a summary: names joined with ", ", the unit in [ ] at the end where the study gives one.
 
     Lists of tables are named by the texts with which each table begins, if that tells them apart, or else counted.
     What is not finite is left out.
     """
-    return {name: value for name, value in _walk("", "", summary) if math.isfinite(value)}
+    return {name: value for name, value in _scalars("", "", summary) if math.isfinite(value)}
 
 
-def _walk(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
+def _scalars(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(value, dict):
         unit = f" [{value['unit']}]" if isinstance(value.get("unit"), str) and value["unit"] else unit
         for key, inner in value.items():
             if key not in SKIPPED:
-                yield from _walk(name if key in FRAMES else _joined(name, str(key)), unit, inner)
+                yield from _scalars(name if key in FRAMES else _joined_name(name, str(key)), unit, inner)
     elif isinstance(value, list):
         yield from _list(name, unit, value)
     elif isinstance(value, int | float) and not isinstance(value, bool):
@@ -37,13 +37,15 @@ def _walk(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
 def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
     if len(values) > LONGEST and all(isinstance(value, dict) for value in values):
         columns = {key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED}
-        yield from _walk(name, unit, {key: numbers for key, numbers in columns.items() if all(map(_number, numbers))})
+        yield from _scalars(
+            name, unit, {key: numbers for key, numbers in columns.items() if all(map(_is_number, numbers))}
+        )
     elif len(values) > LONGEST:
-        numbers = [float(value) for value in values if _number(value)]
+        numbers = [float(value) for value in values if _is_number(value)]
         if numbers:
-            yield f"{_joined(name, 'largest')}{unit}", max(map(abs, numbers))
+            yield f"{_joined_name(name, 'largest')}{unit}", max(map(abs, numbers))
             yield (
-                f"{_joined(name, 'rms')}{unit}",
+                f"{_joined_name(name, 'rms')}{unit}",
                 math.sqrt(math.fsum(value * value for value in numbers) / len(numbers)),
             )
     else:
@@ -52,16 +54,16 @@ def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]
         if len(set(labels)) < len(labels) or not all(labels):
             labels = [str(i + 1) for i in range(len(values))]
         for label, value in zip(labels, values, strict=True):
-            yield from _walk(_joined(name, label), unit, value)
+            yield from _scalars(_joined_name(name, label), unit, value)
 
 
 def _is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
-def _number(value: Any) -> bool:
+def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _joined(name: str, key: str) -> str:
+def _joined_name(name: str, key: str) -> str:
     return f"{name}, {key}" if name else key

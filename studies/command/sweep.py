@@ -31,9 +31,9 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import Crew
-from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
-from studies.command.summary_numbers import numbers
-from studies.command.sweep_figure import Columns, Swept, draw, moves, there
+from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
+from studies.command.summary_numbers import summary_scalars
+from studies.command.sweep_figure import Columns, Swept, draw, has_several_values, present_numbers
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -64,11 +64,11 @@ class Points:
 
     def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point; InputError if it cannot be run."""
-        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_written(self.values[i])}"])
+        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
-        return scene, engines, ready(scene, engines)
+        return scene, engines, checked_study(scene, engines)
 
     def check(self) -> Any:
         """The scene of the first point that can be run; the InputError of the first one if every point is refused: then
@@ -93,7 +93,7 @@ class Points:
         except (InputError, RunFailed) as error:
             return _failed(error)
         said = told.attributes(summary.get("results", {}))
-        return {"numbers": numbers(summary), "failed": summary.get("failed", {}), "results": said}
+        return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
         """Everything that the points depend on: the scene as written, the files that it names, the code."""
@@ -134,7 +134,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 _RANGE = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
 
 
-def asked(text: str) -> tuple[str, tuple[Any, ...]]:
+def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     """Key and values of KEY=FROM:TO:N, evenly spaced, or of KEY=a,b,c; raises InputError."""
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not key or not rest:
@@ -147,14 +147,14 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
             raise InputError("--sweep", key, str(value), allowed)
     if not 2 <= len(values) <= MOST:
         raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST:,} make a sweep")
-    if len(set(map(_written, values))) < len(values):
+    if len(set(map(_value_text, values))) < len(values):
         raise InputError("--sweep", key, rest, "gives a value twice")
     return key, values
 
 
 def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
     """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
-    key, values = asked(text)
+    key, values = parse_range(text)
     job = Points(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
     return job
@@ -181,7 +181,7 @@ def _listed(rest: str) -> tuple[Any, ...]:
         return tuple(part.strip() for part in rest.split(","))
 
 
-def _written(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """The value as a scene file would hold it."""
     return json.dumps(value, ensure_ascii=False, default=str)
 
@@ -189,7 +189,7 @@ def _written(value: Any) -> str:
 def _writable(value: Any) -> bool:
     """Whether a scene file that holds what is written holds this value."""
     try:
-        return bool(tomllib.loads(f"x = {_written(value)}")["x"] == value)
+        return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
     except ValueError:
         return False
 
@@ -200,7 +200,7 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
         records = _records(job, progress, crew)
-        swept = _swept(job, records)
+        swept = _sweep_columns(job, records)
         _save(job.folder, swept)
         pages = draw(swept, job.folder)
     reasons = {
@@ -223,7 +223,7 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     }
 
 
-def _swept(job: Points, records: list[Record]) -> Swept:
+def _sweep_columns(job: Points, records: list[Record]) -> Swept:
     """The records as columns, and what their results say."""
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
@@ -244,7 +244,7 @@ def _unit(job: Points) -> str:
 
 
 def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
-    """Records of all points; InputError if none of them has a number although none failed."""
+    """Compute the records of all points; InputError if no point failed and yet none has a number to show."""
 
     def tell(finished: Done) -> None:
         progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
@@ -253,7 +253,7 @@ def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) ->
         return _array(_failed(reason) for _ in points)
 
     if crew.cluster is not None:  # whose workers compute in folders of their own
-        job = replace(job, folder=job.folder.resolve(), scene=_absolute(job.scene))
+        job = replace(job, folder=job.folder.resolve(), scene=_absolute_path(job.scene))
     with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
         kept = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
     records = [json.loads(str(text_of_record)) for text_of_record in kept]
@@ -262,14 +262,17 @@ def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) ->
     return records
 
 
-def _absolute(scene: str) -> str:
+def _absolute_path(scene: str) -> str:
     """The path of a scene file, from any folder; the name of a scene that comes with twinrig."""
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
 def _save(folder: Path, swept: Swept) -> None:
     """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
-    errors, broken = [_largest(results) for results in swept.results], [_broken(results) for results in swept.results]
+    errors, broken = (
+        [_largest_error(results) for results in swept.results],
+        [_broken(results) for results in swept.results],
+    )
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
@@ -282,7 +285,7 @@ def _save(folder: Path, swept: Swept) -> None:
     write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
-def _largest(results: told.Results) -> float | None:
+def _largest_error(results: told.Results) -> float | None:
     """The largest error of a point's results, by its channel's deviation; None where none was estimated."""
     return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
@@ -295,7 +298,7 @@ def _broken(results: told.Results) -> str:
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
-    moving = {name: there(column) for name, column in columns.items() if moves(column)}
+    moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [
         f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "
         f"{min(values):>12.5g} to {max(values):.5g}"

@@ -61,15 +61,19 @@ class Swept:
 
     def broken(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
-        return [i for i, results in enumerate(self.results) if any(map(broken_of, _of(results, engine).values()))]
+        return [
+            i
+            for i, results in enumerate(self.results)
+            if any(map(broken_of, _results_of_engine(results, engine).values()))
+        ]
 
     def warned(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", has an error that is a warning."""
-        shown = (map(worst_of, _of(results, engine).values()) for results in self.results)
+        shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
-def _of(results: Results, engine: str) -> Results:
+def _results_of_engine(results: Results, engine: str) -> Results:
     """Results that an engine's curve rests on: its own, and those of none."""
     others = set(LABELS) - {engine} if engine else set()
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
@@ -94,27 +98,29 @@ def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
         first, _, rest = name.partition(", ")
         engine, what = (first, rest) if rest and first in LABELS else ("", name)
         panels.setdefault(what, {})[engine] = column
-    return {what: panel for what, panel in panels.items() if any(moves(column) for column in panel.values())}
+    return {
+        what: panel for what, panel in panels.items() if any(has_several_values(column) for column in panel.values())
+    }
 
 
-def there(column: list[Any]) -> list[Any]:
+def present_numbers(column: list[Any]) -> list[Any]:
     """Numbers of a column without those that are missing."""
     return [value for value in column if value is not None]
 
 
-def moves(column: list[Any]) -> bool:
+def has_several_values(column: list[Any]) -> bool:
     """Whether a column has more than one value."""
-    return len(set(there(column))) > 1
+    return len(set(present_numbers(column))) > 1
 
 
 def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
     figure, axes = panels(len(shown), min(ACROSS, len(shown)), 2.3)
-    at, ticks = _places(swept.values)
+    at, ticks = _axis_places(swept.values)
     for axis, (what, curves) in zip(axes, shown, strict=True):
         _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(at, ticks)
-        elif _spread(at):
+        elif _wants_log_axis(at):
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
@@ -124,7 +130,7 @@ def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Pat
     save(figure, path)
 
 
-def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     """Places on the axis and, for values that are no numbers, what is written there."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.array(values, float), []
@@ -144,7 +150,7 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
             label=LABELS[engine] or None,
         )
         _marks(axis, at, np.array(column, float), swept, engine)
-    if all(_spread(np.array(there(column), float)) for column in curves.values()):
+    if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
@@ -168,5 +174,5 @@ def _with_unit(quantity: str) -> str:
     return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
 
 
-def _spread(values: np.ndarray) -> bool:
+def _wants_log_axis(values: np.ndarray) -> bool:
     return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())

@@ -48,7 +48,7 @@ class Kernels:
         if self.attached or "numba.core.compiler_lock" not in sys.modules:  # which has imported the events
             return
         event: Any = sys.modules["numba.core.event"]
-        listener = type("Listener", (event.Listener,), {"on_start": self._start, "on_end": self._end})()
+        listener = type("Listener", (event.Listener,), {"on_start": self._start, "on_end": self._end_compilation})()
         event.register(LOCK, listener)
         self.attached, self._remove = True, lambda: event.unregister(LOCK, listener)
 
@@ -61,7 +61,7 @@ class Kernels:
             self.since = time.monotonic()
         self.depth += 1
 
-    def _end(self, *event: Any) -> None:
+    def _end_compilation(self, *event: Any) -> None:
         self.depth = max(0, self.depth - 1)
         if self.depth == 0:
             self.total += time.monotonic() - self.since
@@ -98,17 +98,17 @@ class Waiting:
         if self.kernels.busy():
             spent, most = self.kernels.spent(), COMPILING.get(self.system, 0.0)
             share = spent / most if most > spent else None
-            return "compiling kernels, once", share, _left(most - spent if share else None, spent)
+            return "compiling kernels, once", share, _time_left_text(most - spent if share else None, spent)
         worked = time.monotonic() - self.begun - self.kernels.spent()
         march = MARCHES[-1] if MARCHES else None
         if march is None:
-            return self.text, self.share or None, _left(_remaining(self.share, worked), worked)
+            return self.text, self.share or None, _time_left_text(_remaining(self.share, worked), worked)
         if march is not self._march[0]:
             self._march = march, worked
         share, since = 0.0, worked - self._march[1]
         with suppress(Exception):  # an engine that is asked at a bad time
             share = min(max(float(march()), 0.0), 1.0)
-        return self.text, share, _left(_remaining(share, since), worked)
+        return self.text, share, _time_left_text(_remaining(share, since), worked)
 
 
 def _remaining(share: float, seconds: float) -> float | None:
@@ -116,12 +116,12 @@ def _remaining(share: float, seconds: float) -> float | None:
     return seconds * (1.0 - share) / share if share > KNOWN else None
 
 
-def _left(seconds: float | None, spent: float) -> str:
+def _time_left_text(seconds: float | None, spent: float) -> str:
     """The time left in words, or the time so far where it is not known."""
-    return f"{_told(spent)} so far" if seconds is None else f"{_told(seconds)} left"
+    return f"{_duration_text(spent)} so far" if seconds is None else f"{_duration_text(seconds)} left"
 
 
-def _told(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 

@@ -14,7 +14,7 @@ THICKNESS = 0.024
 GREY = (0.35, 0.37, 0.4)
 
 
-def drawn(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
+def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
     """Image (height, width, 3), colours from 0 to 1, of frame ``k``."""
     poses = {name: pose(motion, stage, name, k) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]

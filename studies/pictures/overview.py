@@ -43,7 +43,7 @@ def draw(path: Path) -> Path:
     figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(WIDE, 4.5), height_ratios=(1, 1.5)
     )
-    _idea(axes["idea"])
+    _draw_overview(axes["idea"])
     _forces(axes["force"], alike)
     _gaps(axes["gap"], alike)
     _prices(axes["price"])
@@ -104,7 +104,7 @@ def _price(result: Result, truth: Result, step: float) -> tuple[float, float]:
     return float(result.counts()["force calls"]), float(error)
 
 
-def _idea(axis: Any) -> None:
+def _draw_overview(axis: Any) -> None:
     """The vehicle on its road, and what becomes of one scene file."""
     axis.set(xlim=(0, 24), ylim=(0, 4.2), aspect="equal")
     axis.axis("off")

@@ -13,7 +13,7 @@ from matplotlib.patches import FancyArrow
 from matplotlib.transforms import IdentityTransform
 
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY
-from studies.pictures.drawing import drawn
+from studies.pictures.drawing import draw_frame
 from studies.pictures.film import FilmedMotion, Stage, gaps
 
 WIDTH, HEIGHT = 1280, 720
@@ -76,7 +76,7 @@ class Page:
             self._figure.draw_artist(artist)
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         for left, motion in zip(self._lefts, self.motions, strict=True):
-            image = drawn(motion, self.stage, k, self._wide, TALL)
+            image = draw_frame(motion, self.stage, k, self._wide, TALL)
             page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(image)
         return page
 

@@ -1,7 +1,7 @@
 """The plan of a scene of pictures: printed by ``twinrig show``, checked before any run."""
 
 from studies.pictures.scene import PictureScene
-from studies.pictures.video import missing
+from studies.pictures.video import missing_extra
 
 
 def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
@@ -19,5 +19,5 @@ def describe(scene: PictureScene) -> str:
         f"  vehicle    {scene.vehicle}",
         f"  film       {shown}, {film.format}",
     ]
-    said = missing(film.format)
+    said = missing_extra(film.format)
     return "\n".join([*lines, f"  note       {said}"] if said else lines)

@@ -74,7 +74,7 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
     markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
-    places, turns = of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
+    places, turns = of_exudyn(model.mbs, asked, np.array([model._values_in_exudyn_order(row) for row in positions]))
     axes = {name: np.transpose([model.built.in_body_axes(name, axis) for axis in np.eye(3)]) for name in markers}
     return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
 

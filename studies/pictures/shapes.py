@@ -104,7 +104,9 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
     return replace(round_about, normals=round_about.corners / radius)
 
 
-def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour) -> PaintedSurface:
+def line_solid(
+    tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
+) -> PaintedSurface:
     """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
     along = (head - tail) / np.linalg.norm(head - tail)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
@@ -116,7 +118,7 @@ def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.nda
 def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
     """A round rod from one point to another."""
     length = float(np.linalg.norm(head - tail))
-    return between(tail, head, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour)
+    return line_solid(tail, head, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour)
 
 
 def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
@@ -127,4 +129,4 @@ def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour
     head = min(2.6 * thickness, length)
     axial = np.array([0.0, 0.0, length - head, length - head, length])
     radii = thickness * min(1.0, length / (2.6 * thickness)) * np.array([0.0, 0.35, 0.35, 1.0, 0.0])
-    return between(tail, tail + vector, axial, radii, colour)
+    return line_solid(tail, tail + vector, axial, radii, colour)

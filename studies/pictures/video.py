@@ -13,7 +13,7 @@ from models.core.whole_files import whole_file
 PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
-def missing(form: str) -> str:
+def missing_extra(form: str) -> str:
     """A sentence that names the extra where a film of this format needs it and it is not there; else empty."""
     if form == "png" or all(find_spec(name) for name in PACKAGES):
         return ""
@@ -33,7 +33,7 @@ def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:
     return path
 
 
-def still(path: Path, image: np.ndarray) -> Path:
+def write_png(path: Path, image: np.ndarray) -> Path:
     """Write one image (h, w, 3) to a PNG file, the same bytes from the same image."""
     metadata: Any = {"Software": None}
     with whole_file(path) as part:

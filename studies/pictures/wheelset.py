@@ -11,7 +11,7 @@ from models.rail.equations import ROLL, YAW, WheelsetPath, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.profile_contact import Pose
 from models.rail.wheelset import CHOSEN, Wheelset
-from models.systems.wheelset.of_scene import started
+from models.systems.wheelset.of_scene import equations_and_start
 from models.systems.wheelset.run import run as simulate
 from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
@@ -49,7 +49,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
             "run": {"duration": duration, "step": STEP, "displacement": SHIFT, "speeds": [SPEED]},
         }
     )
-    equations: Any = started(scene, engine, SPEED)[0]
+    equations: Any = equations_and_start(scene, engine, SPEED)[0]
     run = not_estimated(simulate(scene, engine, SPEED), "a film shows the path, and the study wheelset its error")
     path: WheelsetPath = run.detail
     rows = np.rint(times / STEP).astype(int)

@@ -30,7 +30,7 @@ def write(folder: Path) -> None:
     (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
 
-def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Counts of what is handed to the run of a stop, and its path."""
     from models.systems.braking.march import Braked
     from models.systems.braking.run import run
@@ -38,7 +38,7 @@ def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int]
     counts, march = dict[str, int](), Braked.run
 
     def watched(vehicle: Braked, controller: Any, *more: Any) -> Any:
-        counts.update(_counts(vehicle, controller))
+        counts.update(_counts_of_run(vehicle, controller))
         return march(vehicle, controller, *more)
 
     with mock.patch.object(Braked, "run", watched):
@@ -46,7 +46,7 @@ def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int]
     return counts, path.states.tobytes()
 
 
-def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
+def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
     """Counts of what a braking run is made of."""
     from models.brake.controllers import CONTROLLERS
     from models.brake.pressure import still

@@ -22,7 +22,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the theory that computes, and forces at all motions."""
     from models.contact.theories import Exact, ExactOnEllipse, Linear, Simplified
     from models.systems.contact import run

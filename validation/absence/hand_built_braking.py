@@ -19,7 +19,7 @@ from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import controller_of, ready
-from models.tyre.tyre_table import Cells, Tables, across, place
+from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare
 
@@ -119,7 +119,7 @@ def settle(now, regular, starts, truck, known):
         angle = math.atan2(abs(v), max(forwards, regular))
         known.rate[i], known.along[i], known.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
         known.angle[i] = angle
-        known.cell[i], known.share[i] = place(angles, angle)
+        known.cell[i], known.share[i] = cell_and_share(angles, angle)
         known.east[i], known.north[i], known.arm[i], known.side[i] = e, f, arm, side
 
 
@@ -133,8 +133,8 @@ def tyre(i, given, now, truck, known):
         Wheel(truck.radius[i], truck.spin[i], sign * now.turning[i]),
         Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
-    k, part = place(tables.slips, abs(slip))
-    side = load * across(0, cells, k, part, tables.g, tables.h)
+    k, part = cell_and_share(tables.slips, abs(slip))
+    side = load * lateral_adhesion(0, cells, k, part, tables.g, tables.h)
     if slip > NEARLY and (known.along[i] > 0.0 or v != 0.0):
         total, speed = math.hypot(force, side), math.hypot(known.along[i], v)
         part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)

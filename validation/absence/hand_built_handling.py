@@ -49,7 +49,7 @@ def law(numbers, t, q, v, f):
     contacts, forces = doubles(4 * TOUCH), stacked(4, FORCES)
     places, pushes = doubles(12), doubles(12)
     left = places, pushes, contacts
-    moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
+    moment = plus(_engine(mounts, head, frame, q, v, f), _add_seat_forces(beyond(mounts, 3 * MOUNT), frame, q, v, f))
     for i in range(4):
         moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, passing, q, v, i, left))
     _bar((head[6], head[7], head[8]), 0, left, q, f)
@@ -155,7 +155,7 @@ def _engine(mounts, head, frame, q, v, f):
 
 
 @lean
-def _seats(seats, frame, q, v, f):
+def _add_seat_forces(seats, frame, q, v, f):
     """Add the forces of both seats; moment on the chassis about S."""
     _, _, z, turning = frame
     moment = 0.0, 0.0, 0.0

@@ -15,7 +15,7 @@ BARE: dict[str, Any] = {
 }
 
 
-def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a manoeuvre as both engines are handed it, and its path."""
     path = run(scene, engine)
     handling = path.detail.handling

@@ -49,7 +49,7 @@ def write(folder: Path) -> None:
     write_time_series(folder / "angles.csv", angles, PERIOD)
 
 
-def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the scene's run, as an engine is handed it, and its path."""
     measurement, step = measure(scene, engine), scene.run.step
     hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEPS)

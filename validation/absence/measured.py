@@ -64,7 +64,7 @@ def write(folder: Path) -> None:
     write_time_series(folder / "recording.csv", forces | angles, PERIOD)
 
 
-def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the run that a recording drives, as an engine is handed it, and its answers."""
     tables, build = list[np.ndarray](), section_run.build
 

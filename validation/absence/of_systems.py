@@ -18,7 +18,7 @@ from typing import Any
 from unittest import mock
 
 from models.core.errors import Refused
-from models.core.scene_effects import beside, module_of, names_of
+from models.core.scene_effects import module_of, names_of, with_effects
 from models.core.systems import SYSTEMS, modules_of
 from validation.absence.probes import registered
 from validation.common.rows import Observed, Row, System, behaves
@@ -32,7 +32,7 @@ Counts = dict[str, dict[str, int]]
 
 
 def file_of(system: str) -> Any:
-    """BARE, ENGINES and seen(scene, engine) -> counts and path of a system.
+    """BARE, ENGINES and counts_and_path(scene, engine) -> counts and path of a system.
 
     If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
     scene has in place of its own tables without such an effect, and with it.
@@ -59,15 +59,15 @@ def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     return getattr(file_of(system), "BY_HAND", {})
 
 
-def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
+def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
     """Counts and path of a scene in each engine that does not refuse it, or in the first one; the counts of Exudyn and
     MuJoCo with the callbacks that were there while it ran."""
-    file, counts_and_path = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
+    file, seen_by_engine = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
         with suppress(Refused), registered(engine) as callbacks:
-            counts, path = file.seen(scene, engine)
-            counts_and_path[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
-    return counts_and_path
+            counts, path = file.counts_and_path(scene, engine)
+            seen_by_engine[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
+    return seen_by_engine
 
 
 def controlled(system: str) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ def pair(system: str, effect: str) -> tuple[Any, Any]:
         less, more = (bare(system, **tables) for tables in by_hand(system)[effect])
         return less, more
     needs = module_of(system, effect).NEEDS
-    return beside(bare(system), *needs), beside(bare(system), *needs, effect)
+    return with_effects(bare(system), *needs), with_effects(bare(system), *needs, effect)
 
 
 def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
@@ -98,25 +98,28 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
 def added(system: str, effect: str, quick: bool = False) -> Counts:
     """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
     both."""
-    before, after = _before(system, effect, quick), seen(system, pair(system, effect)[1], quick)
-    return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
+    before, after = (
+        _counts_without_effect(system, effect, quick),
+        counts_and_paths(system, pair(system, effect)[1], quick),
+    )
+    return {engine: _increases(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
 
 
-def _before(system: str, effect: str, quick: bool) -> Counts:
+def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
     """Counts of the scene without an effect."""
     if effect in by_hand(system):
-        return _counted(system, (), json.dumps(by_hand(system)[effect][0]), quick)
-    return _counted(system, module_of(system, effect).NEEDS, "{}", quick)
+        return _counts_text(system, (), json.dumps(by_hand(system)[effect][0]), quick)
+    return _counts_text(system, module_of(system, effect).NEEDS, "{}", quick)
 
 
 @cache
-def _counted(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
+def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
     """Counts of a bare scene with some effects, or with tables of its own, as text."""
-    scene = beside(bare(system, **json.loads(tables)), *needs)
-    return {engine: counts for engine, (counts, _) in seen(system, scene, quick).items()}
+    scene = with_effects(bare(system, **json.loads(tables)), *needs)
+    return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
 
-def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
+def _increases(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
     return {key: n - before[key] for key, n in after.items() if n != before[key]}
 
 
@@ -129,11 +132,11 @@ def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
     for system in systems:
         if file_of(system).ENGINES[0] == "reference":
             with _removed(system, modules_of[system]):
-                seen(system, bare(system), quick=True)
+                counts_and_paths(system, bare(system), quick=True)
     engines, bares = _loaded(["exudyn", "mujoco"]), dict[str, Any]()
     for system in systems:  # all of them before any effect, as two systems may have a module in common
         with _removed(system, modules_of[system]):
-            bares[system] = seen(system, bare(system)), _loaded(modules_of[system])
+            bares[system] = counts_and_paths(system, bare(system)), _loaded(modules_of[system])
     return {"engines": engines, "systems": {system: _probed(system, *bares[system]) for system in systems}}
 
 
@@ -147,7 +150,7 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
     for name in controlled(system):
         adds[name] = added(system, name)
         missing += [module for module in modules[name] if not _loaded([module])]
-    last = seen(system, bare(system))
+    last = counts_and_paths(system, bare(system))
     callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
     return {
         "imported": imported,
@@ -205,11 +208,11 @@ def rows(quick: bool) -> list[Row]:
     return [
         *present,
         engines,
-        *(row for system, probe in seen_there["systems"].items() for row in _absent(system, probe)),
+        *(row for system, probe in seen_there["systems"].items() for row in _absent_modules(system, probe)),
     ]
 
 
-def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
+def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
     why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
     return [
         Observed(

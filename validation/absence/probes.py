@@ -92,7 +92,7 @@ def march(engine: str, model: Model) -> MarchCounts:
     return seen
 
 
-def quietest(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
+def leanest_march(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march that took the least memory of some: what a loop allocates shows in every one of them."""
     return min((march(engine, make()) for _ in range(runs)), key=lambda seen: seen.memory)
 
@@ -104,20 +104,20 @@ def _entry(engine: str, seen: MarchCounts) -> Iterator[None]:
         from models.engines import reference
 
         real = reference.march_of
-        patch = mock.patch.object(reference, "march_of", lambda *key: _watched(real(*key), seen))
+        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), seen))
     elif engine == "mujoco":
         from mujoco import rollout
 
-        patch = mock.patch.object(rollout, "rollout", _watched(rollout.rollout, seen))
+        patch = mock.patch.object(rollout, "rollout", _with_probes(rollout.rollout, seen))
     else:
         import exudyn as exu
 
-        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _watched(exu.MainSystem.SolveDynamic, seen))
+        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _with_probes(exu.MainSystem.SolveDynamic, seen))
     with patch:
         yield
 
 
-def _watched(function: Callable[..., Any], seen: MarchCounts) -> Callable[..., Any]:
+def _with_probes(function: Callable[..., Any], seen: MarchCounts) -> Callable[..., Any]:
     """The function, with frames, memory and callbacks added to ``seen``."""
 
     def call(*args: Any, **options: Any) -> Any:

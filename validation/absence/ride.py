@@ -78,7 +78,7 @@ def write(folder: Path) -> None:
     write_table(folder / "road.csv", {"s": ("m", s), "left": ("m", tracks[0]), "right": ("m", tracks[1])})
 
 
-def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the linear system that a scene makes, and what is found of its outputs."""
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
@@ -95,11 +95,11 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         "bent springs": sum(spring.bent for spring in vehicle.springs) if in_time else 0,
         "tyres that lift": sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
-    result = run(scene, engine, **({"sampling": _few()} if in_time else {}))
+    result = run(scene, engine, **({"sampling": _with_fewest_copies()} if in_time else {}))
     return counts, result["deviation"].tobytes()
 
 
-def _few() -> Any:
+def _with_fewest_copies() -> Any:
     """Context with the smallest allowed number of copies."""
     from models.systems.ride.nonlinear import Sampling
 
@@ -117,7 +117,7 @@ print(json.dumps(sorted(sys.modules)))
 """Runs a linear ride by an engine in a process of its own and says what it imported."""
 
 
-def imported(engine: str) -> list[str]:
+def imported_modules(engine: str) -> list[str]:
     """Modules of FOREIGN after a linear ride in a fresh process."""
     command = [sys.executable, "-c", PROBE, engine]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -171,7 +171,7 @@ def rows(quick: bool = False) -> list[Row]:
     bare, curved = (callbacks(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
     told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
-    counted = () if quick else (len(imported("reference")),)
+    counted = () if quick else (len(imported_modules("reference")),)
     return [
         *(Observed("absent.ride.imports", SYSTEM, told, count, "").at_most(0, why, "none") for count in counted),
         behaves(
@@ -194,7 +194,7 @@ def rows(quick: bool = False) -> list[Row]:
             "absent.ride.curves",
             SYSTEM,
             "number of curves and callbacks of a quarter car, and of a quarter car with three curves",
-            f"{_counts(bare)}; {_counts(curved)}",
+            f"{_counts_text(bare)}; {_counts_text(curved)}",
             "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
             "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own",
         ),
@@ -209,5 +209,5 @@ def rows(quick: bool = False) -> list[Row]:
     ]
 
 
-def _counts(counts: dict[str, tuple[int, int]]) -> str:
+def _counts_text(counts: dict[str, tuple[int, int]]) -> str:
     return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in counts.items())

@@ -32,7 +32,7 @@ BARE: dict[str, Any] = {
 """A free wheelset on cones without flanges."""
 
 
-def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
+def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a wheelset, in its numbers and in what an engine builds of it, and its path."""
     from models.systems.wheelset.of_scene import equations_of
     from models.systems.wheelset.run import run

@@ -17,7 +17,7 @@ from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Cells, Tables, across, along, place, stacked
+from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
 
 PLANE: Plane = truck(PAPER)
 DRY = stacked([surface("dry")])
@@ -37,9 +37,12 @@ def tyre(tables: Tables, under: Surface, motion: WheelMotion, load: float, of: B
 
 def friction(tables: Tables, which: int, angle: float, load: float, slip: float) -> tuple[float, float]:
     """mu_x and mu_y of one of the tables at a slip angle (rad), a load (N) and a slip."""
-    cells, (s, w) = Cells(*place(tables.angles, angle), *place(tables.loads, load)), place(tables.slips, slip)
-    below, above = (along(which, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1)))
-    return below + w * (above - below), across(which, cells, s, w, tables.g, tables.h)
+    cells, (s, w) = (
+        Cells(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
+        cell_and_share(tables.slips, slip),
+    )
+    below, above = (longitudinal_adhesion(which, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1)))
+    return below + w * (above - below), lateral_adhesion(which, cells, s, w, tables.g, tables.h)
 
 
 def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) -> np.ndarray:

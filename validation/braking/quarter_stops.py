@@ -17,7 +17,7 @@ from models.brake.quarter import Quarter, QuarterStop, braked
 from models.brake.surfaces import EVEN
 from models.machine.compiled import njit
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, place, stacked
+from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked
 
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)
@@ -48,7 +48,7 @@ class Change(NamedTuple):
 
     before: Curve
     behind: Curve
-    place: float = math.inf
+    cell_and_share: float = math.inf
 
 
 @njit(cache=True, error_model="numpy")
@@ -56,7 +56,7 @@ def force_at(u, w, quarter, curve):
     """Force (N) and slip of a wheel (rad/s) whose centre has a speed (m/s)."""
     u, mu = max(u, SLOWEST), curve.mu
     slip = (u - quarter.radius * w) / u
-    cell, share = place(curve.slips, min(abs(slip), 1.0))
+    cell, share = cell_and_share(curve.slips, min(abs(slip), 1.0))
     return math.copysign(quarter.mass * GRAVITY * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
 
 

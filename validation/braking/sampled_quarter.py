@@ -57,7 +57,7 @@ def tight_distance(
         law = _law(pressure, torque, valve, brake)
         y = _sample(y, law, quarter, stretches, {"method": method, "rtol": tolerance, "atol": 1e-2 * tolerance})
         pressure, torque, number = law(SAMPLE)[0], law(SAMPLE)[1], number + 1
-    slowing = GRAVITY * _under(y[0], stretches)[0](1.0)  # so slow, all is applied and the wheel stands
+    slowing = GRAVITY * _friction_at(y[0], stretches)[0](1.0)  # so slow, all is applied and the wheel stands
     return float(y[0] + max(y[1], 0.0) ** 2 / (2.0 * slowing))
 
 
@@ -76,7 +76,7 @@ def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[
     return at
 
 
-def _under(x: float, stretches: Stretches) -> tuple[Callable[[float], float], float]:
+def _friction_at(x: float, stretches: Stretches) -> tuple[Callable[[float], float], float]:
     """mu by the slip at x (m), and where that ends."""
     number = sum(begin <= x + 1e-10 for begin, _ in stretches[1:])
     return stretches[number][1], stretches[number + 1][0] if number + 1 < len(stretches) else np.inf
@@ -85,7 +85,7 @@ def _under(x: float, stretches: Stretches) -> tuple[Callable[[float], float], fl
 def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, options: dict[str, Any]) -> np.ndarray:
     """One sample from x, u, w; a wheel that stops is held while its brake can."""
     radius, inertia, load, now = quarter.radius, quarter.spin_inertia, quarter.mass * GRAVITY, 0.0
-    mu, end = _under(y[0], stretches)
+    mu, end = _friction_at(y[0], stretches)
 
     def force(slip: float) -> float:
         return load * mu(slip)
@@ -115,7 +115,7 @@ def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, opt
         )
         now, y = float(solution.t[-1]), solution.y[:, -1].copy()
         if solution.t_events[1].size:
-            mu, end = _under(y[0], stretches)
+            mu, end = _friction_at(y[0], stretches)
         elif solution.status == 1:
             y[2] = 0.0
             if held:

@@ -17,7 +17,7 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
-from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
+from validation.absence.probes import belongs_to_effects, installed, leanest_march, march, probe, user_functions
 from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 
@@ -82,14 +82,14 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     return less, scene({**base, effect: module.EXAMPLE}, steps, folder, guided)
 
 
-def counts(bare: Scene, engine: str) -> dict[str, int]:
+def counts_of_scene(bare: Scene, engine: str) -> dict[str, int]:
     """Counts of what a scene builds in an engine, and of the channels it saves."""
     return {**model(bare, engine).plan(), "channels": len(run(bare, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
     """Changes of the counts by an effect, without the zeros."""
-    before, after = (counts(bare, engine) for bare in pair(effect, 20, folder))
+    before, after = (counts_of_scene(bare, engine) for bare in pair(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
@@ -139,7 +139,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
     """Frames, memory and callbacks of a bare march, short and long."""
     for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
         march(engine, model(bare, engine))
-    short, long = (quietest(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
+    short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     callbacks = max(short.callbacks, installed())
     if engine == "exudyn":
         callbacks += user_functions(model(scene({}, 20, folder), engine))

@@ -132,23 +132,25 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
     return rows
 
 
-def _largest(mechanism: Mechanism, reaction: Reaction) -> tuple[float, float]:
+def _largest_reaction(mechanism: Mechanism, reaction: Reaction) -> tuple[float, float]:
     """Largest force (N) of a reaction, or the weight, and that by the arm of the centre, or 1 m, as a moment (N m)."""
     weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
     force = max(float(np.abs(reaction.force).max()), weight)
     return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.place)), 1.0)
 
 
-def _apart(mechanism: Mechanism, one: Reaction, two: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)) -> float:
+def _reaction_difference(
+    mechanism: Mechanism, one: Reaction, two: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)
+) -> float:
     """Largest difference of two reactions, less what rounding may explain, by the largest."""
-    force, moment = _largest(mechanism, two)
+    force, moment = _largest_reaction(mechanism, two)
     off = np.abs(one.force - two.force) - rounding[0], np.abs(one.moment - two.moment) - rounding[1]
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 
 
 def _own_motion(family: str, mechanism: Mechanism, output: OutputFile) -> Row:
     """Reactions on the file's own motion: no integration takes part."""
-    off = _apart(mechanism, output.reaction_of_motion(mechanism), output.reaction())
+    off = _reaction_difference(mechanism, output.reaction_of_motion(mechanism), output.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
     quantity = f"{family}: reaction on the file's own motion, by the largest"
     return Observed(_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE, why, "published")
@@ -163,7 +165,7 @@ def _against_file(
     theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
     seen = (
         ("position", "position of the centre", max(0.0, float(place.max())), "m", PLACE),
-        ("reaction", "reaction by the largest", _apart(mechanism, pushed, theirs, digits), "", FORCE),
+        ("reaction", "reaction by the largest", _reaction_difference(mechanism, pushed, theirs, digits), "", FORCE),
     )
     lost = 0.0 if mechanism.springs else output.energy_lost(mechanism)
     rows = []
@@ -204,7 +206,7 @@ def _twin(
     """An engine's joints against the reference's constraints."""
     place = float(np.abs(run[0].place - plain[0].place).max())
     turned = float(np.abs(run[0].turned - plain[0].turned).max())
-    off = max(place, turned, _apart(mechanism, run[1], plain[1]))
+    off = max(place, turned, _reaction_difference(mechanism, run[1], plain[1]))
     why = "joint coordinates against constraints with multipliers, no code in common but Runge-Kutta's steps of 5 ms"
     quantity = f"{family}: {name} from the reference: position, rotation, reaction by the largest"
     return Observed(_id(family, f"twin.{name}"), SYSTEM, quantity, off, "m, -").at_most(TWINS, why, "native")

@@ -40,13 +40,13 @@ ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=7
 @allowing("stops at the limits, and random ones: that they end, or say why not, is judged")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: three of the stops, one speed of the slow ones."""
-    ends = [finished(number) for number in range(STOPS[quick])]
+    ends = [ending_text(number) for number in range(STOPS[quick])]
     rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
     return rows + [_refused_row(*each) for each in REFUSED.items()], {"ends": ends}
 
 
-def finished(number: int) -> str:
+def ending_text(number: int) -> str:
     """Phrase on how a random stop ended: "" if the vehicle came to rest."""
     try:
         path = run(build(random_stop(SEED, number))).detail
@@ -71,7 +71,7 @@ def _scene(**tables: Any) -> Any:
     return build({"system": "braking", "title": "limit", **tables}, "limit.toml")
 
 
-def _end(scene: Any) -> RunFailed | None:
+def _error_of_procedure(scene: Any) -> RunFailed | None:
     """Error of a scene's only procedure; None if it ran."""
     try:
         run(scene)
@@ -82,7 +82,7 @@ def _end(scene: Any) -> RunFailed | None:
 
 def _jackknife_row() -> Row:
     """The drawbar's angle when the run ends, of a train whose truck slides round: against its limit."""
-    end = _end(
+    end = _error_of_procedure(
         _scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
             run={"duration": 6.0},
@@ -113,7 +113,7 @@ def _roll_rows() -> list[Row]:
     """A high truck of one track in a J-turn on dry road: lateral acceleration at which it is told to roll over."""
     track, height = 1.8, 2.2
     axle = {"track": track}
-    end = _end(
+    end = _error_of_procedure(
         _scene(
             vehicle={"override": {"height": height, "front": axle, "rear": axle}},
             load_transfer={"front": 0.5},

@@ -78,7 +78,7 @@ QUICK = ("NaN", "too few wheels", "silence", "died")
 @allowing("both sides are cut off after the same few samples", "stop")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of bits, costs and faults; quick: half a second of braking, few faults."""
-    ways = _ways(folder, second=not quick)
+    ways = _tables_of_ways(folder, second=not quick)
     rows = _bits(ways, folder, 0.5 if quick else 4.0)
     costs = _costs(ways, folder, 5 if quick else 40)
     rows += [
@@ -112,7 +112,7 @@ def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
     )
 
 
-def _ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
+def _tables_of_ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
     """Tables of all ways by name; text tells why one is not there."""
     ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
     if second:
@@ -152,12 +152,12 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue
-        ended = _same(first, run(_scene(folder, duration, table)).detail)
+        ended = _compare_bits(first, run(_scene(folder, duration, table)).detail)
         rows.append(behaves(key, SYSTEM, what, ended, "same bits", "doubles pass every way whole", "none"))
-    return [*rows, _alive(first)]
+    return [*rows, _pressures_move(first)]
 
 
-def _alive(path: Driven) -> Row:
+def _pressures_move(path: Driven) -> Row:
     """Bits could be the same of a controller that does nothing."""
     turns = int((np.diff(np.sign(np.diff(path.pressures, axis=0)), axis=0) != 0).sum())
     return behaves(
@@ -170,7 +170,7 @@ def _alive(path: Driven) -> Row:
     )
 
 
-def _same(path: Driven, other: Driven) -> str:
+def _compare_bits(path: Driven, other: Driven) -> str:
     names = ("times", "states", "turning", "pressures", "torques", "reports")
     apart = [name for name in names if not np.array_equal(getattr(path, name), getattr(other, name))]
     return f"other {', '.join(apart)}" if apart else "same bits"

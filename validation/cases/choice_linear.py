@@ -90,7 +90,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if not quick:
         rows += [_prediction_row(choices), _saving_row(choices), *_count_rows()]
     pair_rows, pair = _pair()
-    return [*rows, *pair_rows, *_activity_rows()], {"scenes": [_shown(choice) for choice in choices], "pair": pair}
+    return [*rows, *pair_rows, *_activity_rows()], {
+        "scenes": [_summary_of_choice(choice) for choice in choices],
+        "pair": pair,
+    }
 
 
 def _kept_rows(choices: list[Judged]) -> list[Row]:
@@ -306,7 +309,7 @@ def _activity_rows() -> list[Row]:
     ]
 
 
-def _shown(judged_choice: Judged) -> dict[str, Any]:
+def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
     choice = judged_choice.choice
     return {
         "tolerance": judged_choice.scene.tolerance,

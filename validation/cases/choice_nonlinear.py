@@ -8,7 +8,7 @@ from models.advice.choice.choose import Chooser
 from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST
 from models.core.errors import InputError
-from validation.choice.drawn_scenes import drawn
+from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
@@ -41,7 +41,7 @@ def judged(system: str, seed: int) -> JudgedByRuns:
     """The scene of a seed."""
     if system == "ride":
         return judged_ride(drawn_bent(seed))
-    return judged_of(drawn(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
+    return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
 def judged_ride(asked: Bent) -> JudgedByRuns:
@@ -52,11 +52,11 @@ def judged_ride(asked: Bent) -> JudgedByRuns:
     whole, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if whole is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
-    again = [_sure(whole.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
+    again = [_least_certain_change(whole.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
     return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 
-def _sure(full: np.ndarray, reduced: np.ndarray) -> float:
+def _least_certain_change(full: np.ndarray, reduced: np.ndarray) -> float:
     """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
     picked = np.random.default_rng(AGAIN).integers(len(full), size=(RESAMPLED, len(full)))
     changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full[picked].mean(axis=1)) - 1.0)
@@ -69,15 +69,15 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
     choices = [judged(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
-        *_kept(choices),
+        *_row_of_kept_tolerances(choices),
         _predictions(choices, quick),
         *(row for system in seeds for row in _saving(choices, system)),
     ]
     rows += [] if quick else [_refused()]
-    return rows, {"scenes": [_shown(each) for each in choices], "systems": list(seeds)}
+    return rows, {"scenes": [_summary_of_choice(each) for each in choices], "systems": list(seeds)}
 
 
-def _kept(choices: list[JudgedByRuns]) -> list[Row]:
+def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
     kept = float(np.mean([each.choice.within_tolerance and each.honest for each in choices]))
     return [
         Observed(
@@ -160,7 +160,7 @@ def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
     ]
 
 
-def _shown(judged_choice: JudgedByRuns) -> Saved:
+def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
     choice = judged_choice.choice
     return {
         "system": judged_choice.system,

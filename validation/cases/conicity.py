@@ -39,11 +39,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"standard": told}
 
 
-def _off(period: float, exact: float) -> float:
+def _relative_error(period: float, exact: float) -> float:
     return abs(period / exact - 1.0)
 
 
-def _exact(id: str, quantity: str, off: float, why: str) -> Row:
+def _closed_form_row(id: str, quantity: str, off: float, why: str) -> Row:
     return Observed(f"conicity.{id}", SYSTEM, quantity, off, "").at_most(ROUNDING, why, "closed form")
 
 
@@ -53,7 +53,7 @@ def _closed_forms() -> list[Row]:
     wave = klingel_wave(RollingRadiusTable(Y, 0.1 * Y + 1.0 * 0.1), 3.0)
     tread = np.where(np.abs(Y) < 3.0, 0.05 * Y, np.sign(Y) * (0.15 + 0.8 * (np.abs(Y) - 3.0)))
     bent = max(
-        _off(klingel_wave(RollingRadiusTable(Y, tread), a).period, two_slopes(0.05, 0.8, 3.0, a))
+        _relative_error(klingel_wave(RollingRadiusTable(Y, tread), a).period, two_slopes(0.05, 0.8, 3.0, a))
         for a in (3.1, 5.0, 7.9)
     )
     jump = klingel_wave(RollingRadiusTable(np.array([-5.0, 0.0, 0.0, 5.0]), np.array([-0.3, -0.3, 0.3, 0.3])), 2.0)
@@ -62,23 +62,35 @@ def _closed_forms() -> list[Row]:
     halves = math.pi / math.sqrt(left) + math.pi / math.sqrt(right)
     off_centre = 3.0 * (math.sqrt(right) - math.sqrt(left)) / (math.sqrt(right) + math.sqrt(left))
     return [
-        _exact("cone", "cones of 1/20 at three amplitudes, relative error", cone, "the cone's tangent"),
-        _exact(
+        _closed_form_row("cone", "cones of 1/20 at three amplitudes, relative error", cone, "the cone's tangent"),
+        _closed_form_row(
             "offset",
             "cones on wheels of unequal radii, relative error",
-            _off(wave.conicity, 0.05),
+            _relative_error(wave.conicity, 0.05),
             "the offset moves the centre alone",
         ),
-        _exact(
+        _closed_form_row(
             "offset.centre",
             "cones on wheels of unequal radii, centre of the wave",
             abs(wave.centre + 1.0),
             "where both radii are equal, -1 mm",
         ),
-        _exact("two_slopes", "period on tread and flange root, two slopes", bent, "two sines, matched at the bend"),
-        _exact("jump", "period with a jump in the middle", _off(jump.period, 4.0 * math.sqrt(4.0 / 0.3)), "parabolas"),
-        _exact("uneven", "period of a wheel steeper than the other", _off(uneven.period, halves), "two half sines"),
-        _exact(
+        _closed_form_row(
+            "two_slopes", "period on tread and flange root, two slopes", bent, "two sines, matched at the bend"
+        ),
+        _closed_form_row(
+            "jump",
+            "period with a jump in the middle",
+            _relative_error(jump.period, 4.0 * math.sqrt(4.0 / 0.3)),
+            "parabolas",
+        ),
+        _closed_form_row(
+            "uneven",
+            "period of a wheel steeper than the other",
+            _relative_error(uneven.period, halves),
+            "two half sines",
+        ),
+        _closed_form_row(
             "uneven.centre",
             "a wheel steeper than the other, centre of the wave",
             abs(uneven.centre + off_centre),
@@ -104,7 +116,7 @@ def _cubic() -> Row:
     errors = []
     for rows in (161, 321):
         y = np.linspace(-8.0, 8.0, rows)
-        errors.append(_off(klingel_wave(RollingRadiusTable(y, a * y + b * y**3), amplitude).period, exact))
+        errors.append(_relative_error(klingel_wave(RollingRadiusTable(y, a * y + b * y**3), amplitude).period, exact))
     order = math.log2(errors[0] / errors[1])
     why = "complete elliptic integral; lines between rows are off by the square of their distance"
     observed = Observed("conicity.cubic", SYSTEM, "order of the error in the spacing, dr = a y + b y^3", order, "")
@@ -112,7 +124,7 @@ def _cubic() -> Row:
 
 
 def _refused() -> Row:
-    """Tables without a wave."""
+    """Row: tables of rolling radii that have no periodic wave are refused."""
     refused = 0
     for y, dr, amplitude in ((Y, -Y, 3.0), (Y, 0.1 * Y + 1.0, 3.0), (Y, 0.1 * Y, 8.1), (Y, 0.1 * (Y + 6.0), 3.0)):
         try:

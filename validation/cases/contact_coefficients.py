@@ -105,16 +105,21 @@ def deviation(solved: Array) -> Array:
 def _node_rows(nodes: Array) -> list[Row]:
     off = np.abs(deviation(nodes))
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
-    rows = [_worst(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name]) for i, name in enumerate(NAMES)]
+    rows = [
+        _worst_difference_row(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name])
+        for i, name in enumerate(NAMES)
+    ]
     if not middle.all():
         rows += [
-            _worst(name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33")))
+            _worst_difference_row(
+                name, off[~middle, i], nodes[~middle], "a/b 0.1 and 10", BOUNDS[name] * (1 + (name == "C33"))
+            )
             for i, name in enumerate(NAMES)
         ]
     return rows
 
 
-def _worst(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
+def _worst_difference_row(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
     ratio, nu = nodes[int(off.argmax()), :2]
     return Observed(
         f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",

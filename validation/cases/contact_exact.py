@@ -12,7 +12,7 @@ from models.contact.material import Material, Pair
 from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
-from models.systems.contact.work_precision import Case
+from models.systems.contact.work_precision import ContactCase
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 
@@ -245,12 +245,12 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     ]
 
 
-def drawn_case(rng: np.random.Generator) -> tuple[Case, int]:
+def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
     """A contact of a/b 0.2 to 5 and Poisson's ratio 0 to 0.5 with spin, without its forces, and 60 to 120 cells."""
     ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
     body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
     x, y, spin = (float(part) for part in rng.normal(size=3))
-    case = Case(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, Pair(body, body), "drawn", (x, y, spin), level)
+    case = ContactCase(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, Pair(body, body), "drawn", (x, y, spin), level)
     return case, int(rng.integers(60, 121))
 
 
@@ -280,7 +280,7 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
         return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]
     lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
-    solved = [_beside(row, 20 if quick else 40) for row in table]
+    solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
     force, moment = (max(part[i] for part in solved) for i in (2, 3))
     return solved, [
         _row("sample", words, force, 0.01, "its own error and ours", side="native"),
@@ -295,7 +295,7 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     ]
 
 
-def _beside(row: dict[str, str], cells: int) -> list[Any]:
+def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
     """Kind, a/b, difference of the force by mu N and of the moment by mu N sqrt(ab); the file is in mm, N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]

@@ -98,8 +98,8 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     touching = [
         by_load(flat, steep, load, PAIR),
         by_approach(flat, steep, approach, PAIR),
-        _turned(by_load(steep, flat, load, PAIR)),
-        _turned(by_approach(steep, flat, approach, PAIR)),
+        _exchange_axes(by_load(steep, flat, load, PAIR)),
+        _exchange_axes(by_approach(steep, flat, approach, PAIR)),
     ]
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
@@ -111,7 +111,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     }
 
 
-def _turned(touching: Hertz) -> Hertz:
+def _exchange_axes(touching: Hertz) -> Hertz:
     """The contact with x and y exchanged."""
     return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import BEST, left, rolled
+from models.contact.accuracy import BEST, remaining_errors, rolled
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import answer
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
-from models.systems.contact.work_precision import Case, exact
+from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import FASTSIM, ROUNDING, SHARE, held, kept
 from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read, read_drawn, read_wide
@@ -66,12 +66,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *_program_rows(programs), _table_row(folder)], {"programs": programs}
 
 
-def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
+def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     """The kept forces against those that the exact theory gives now."""
     known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
     answers = []
     for key in REPEATED[:2] if quick else REPEATED:
-        now = exact(known[key], (20,) if quick else (40,))
+        now = with_exact_forces(known[key], (20,) if quick else (40,))
         answers.append(float(np.linalg.norm(now.force - known[key].force)))
     return [
         Observed(
@@ -84,7 +84,7 @@ def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
     ]
 
 
-def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
+def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     """Stated errors on the contacts of the set, and on drawn ones that the bands have never seen."""
     unseen, rows = read_drawn(JUDGED), []
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
@@ -110,7 +110,7 @@ def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
     return rows
 
 
-def _total_rows(cases: list[Case]) -> list[Row]:
+def _total_rows(cases: list[ContactCase]) -> list[Row]:
     """Rows: stated errors of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
@@ -134,7 +134,7 @@ def _total_rows(cases: list[Case]) -> list[Row]:
     ]
 
 
-def _moment_rows(cases: list[Case], unseen: list[Case], wide: list[Case]) -> list[Row]:
+def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list[ContactCase]) -> list[Row]:
     """Error of FASTSIM's moment against the exact theory."""
     rows = []
     range_of_set = [case for case in wide if RATIOS[0] <= case.a / case.b <= RATIOS[-1]]
@@ -163,11 +163,11 @@ def _moment_rows(cases: list[Case], unseen: list[Case], wide: list[Case]) -> lis
     return rows
 
 
-def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
+def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     """The errors that the cells are said to leave, against those found on many cells."""
     rows, some = [], cases[::9] if quick else cases
     for choices, cells in product(ALIKE[: 1 if quick else None], (21,) if quick else NETS):
-        share = _beyond(some, cells, choices)
+        share = _shares_beyond_stated(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
             rows.append(
@@ -184,14 +184,16 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
     return rows
 
 
-def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[float]:
+def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[str, str]) -> list[float]:
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
     answers = []
     for case in cases:
         contact = case.contact(Fastsim, **{**BEST, **choices})
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
-        answers.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
+        answers.append(
+            np.array(off) > np.array(remaining_errors(contact, case.motion, cells, fine)) + ROUNDING * case.limit
+        )
     return [float(value) for value in np.mean(answers, axis=0)]
 
 

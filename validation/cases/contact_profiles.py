@@ -43,14 +43,14 @@ FLANGE = 6.5
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on the built-in profiles and on the places of contact; in the full run at every shift, and with yaw."""
     shifts = QUICK_SHIFTS if quick else SHIFTS
-    data: dict[str, Any] = {"no yaw": [_at(float(shift), 0.0, not quick) for shift in shifts]}
+    data: dict[str, Any] = {"no yaw": [_right_wheel_contact(float(shift), 0.0, not quick) for shift in shifts]}
     if not quick:
-        data["yaw"] = [_at(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
+        data["yaw"] = [_right_wheel_contact(float(shift), 2.4e-3 * float(shift), False) for shift in shifts]
     rows = _file_rows() + _place_rows(data["no yaw"])
     return rows + ([] if quick else _benchmark_rows(data["no yaw"])), data
 
 
-def _at(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
+def _right_wheel_contact(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
     """Contact of the right wheel at a shift (mm) and yaw (rad): places, load and peak pressure."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=shift * 1e-3, yaw=yaw)
     pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)

@@ -12,7 +12,7 @@ import numpy as np
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
-from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
+from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, SimplifiedOptions, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
 from models.machine.timing import interleave
@@ -40,7 +40,7 @@ FULL = 36
 WAYS = {
     "elliptic": PLAIN,
     "paper": PAPER,
-    "elliptic, gradient": Options(fit="gradient"),
+    "elliptic, gradient": SimplifiedOptions(fit="gradient"),
     "paper, gradient": replace(PAPER, fit="gradient"),
     "elliptic, one net": replace(PLAIN, separate=False),
 }
@@ -64,13 +64,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     data["shapes"] = {shape.name: _against_exact(shape) for shape in formulas() + profiles()}
-    data["grown"] = {shape.name: _approach_of(shape) for shape in grown()} | _placed()
+    data["grown"] = {shape.name: _approach_of(shape) for shape in grown()} | _errors_on_rails()
     data["nets"] = {str(net): _hertz(5.0, replace(PLAIN, net=net)) for net in NETS}
     data["time"] = _times()
     return rows + _shape_rows(data["shapes"]) + _grown_rows(data["grown"]) + _time_rows(data["time"]), data
 
 
-def _hertz(ratio: float, options: Options) -> dict[str, float]:
+def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
     """Errors of approach, area and peak on Hertz's ellipse, as shares."""
     exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
     a, b = float(exact.a), float(exact.b)
@@ -108,7 +108,7 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
 def _against_exact(shape: Shape) -> dict[str, Any]:
     """Errors of every way, in shares of the exact figure and forces in % of mu N, and the exact figures."""
     contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
-    normal = exact_normal(shape, FULL, shape.box or _around(contacts["elliptic"]))
+    normal = exact_normal(shape, FULL, shape.box or _box_around(contacts["elliptic"]))
     motions = creepages(normal.area, shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
@@ -133,7 +133,7 @@ def _approach_of(shape: Shape) -> dict[str, float]:
     }
 
 
-def _placed() -> dict[str, dict[str, float]]:
+def _errors_on_rails() -> dict[str, dict[str, float]]:
     """Errors of wheels on rails, which have no common net, by the ways of fitting."""
     errors = {}
     for position in placed():
@@ -146,7 +146,7 @@ def _placed() -> dict[str, dict[str, float]]:
     return errors
 
 
-def _around(pressed: NormalContact) -> Box:
+def _box_around(pressed: NormalContact) -> Box:
     """The contact's box with a fifth more on every side."""
     x0, x1, y0, y1 = np.array([part.box for part in pressed.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
@@ -314,10 +314,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
     )
     return [
         *tables,
-        Table("Theory of 1983 against the exact contact", note + " " + _said(data["shapes"]), heads, rows),
+        Table("Theory of 1983 against the exact contact", note + " " + _errors_text(data["shapes"]), heads, rows),
         Table(
             "Size of the crude net",
-            "Errors on an ellipse with B/A = 5. " + _settled(data["nets"]),
+            "Errors on an ellipse with B/A = 5. " + _net_errors_text(data["nets"]),
             ("net", *heads[2:5]),
             nets,
         ),
@@ -332,7 +332,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def _said(shapes: dict[str, dict[str, Any]]) -> str:
+def _errors_text(shapes: dict[str, dict[str, Any]]) -> str:
     """Sentence on the errors of the ways of fitting: means over all shapes."""
 
     def mean(variant: str, key: str) -> str:
@@ -352,7 +352,7 @@ def _said(shapes: dict[str, dict[str, Any]]) -> str:
     )
 
 
-def _settled(nets: dict[str, dict[str, float]]) -> str:
+def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
     """Sentence on the errors by the size of the net."""
     sizes = (next(iter(nets)), str(PLAIN.net), list(nets)[-1])
     first, used, last = (100.0 * abs(nets[net]["approach"]) for net in sizes)

@@ -80,7 +80,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
     """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
-    members = {"noise": _noise, "interpolation": _between, "model": _models}[combination.source]
+    members = {"noise": _noise, "interpolation": _run_neighbours, "model": _models}[combination.source]
     predicted, measured = members(combination, folder, QUICK_PATHS if quick else PATHS)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile(np.array(measured), 0.5)
@@ -113,7 +113,7 @@ def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[flo
     return [noise(quiet, combination.size).passes()], times.tolist()
 
 
-def _between(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Neighbouring speeds, or seeds, each predicted and run."""
     speed = combination.road["speed"]
     roads = [

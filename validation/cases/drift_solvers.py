@@ -122,16 +122,16 @@ def _smoothing(folder: Path) -> list[Saved]:
     true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
     treatments = [
-        _treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
+        _record_of_solver(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
         for cutoff in CUTOFFS
     ]
     return treatments + [
-        _treated(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
+        _record_of_solver(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
         for method, order, step in SCHEMES
     ]
 
 
-def _treated(
+def _record_of_solver(
     name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
 ) -> Saved:
     forces = quiet.input
@@ -257,7 +257,14 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
 def tables(data: Saved) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
-        (each["input"], each["engine"], each["method"], f"{each['value']:g}", _when(each), f"{each['error']:.2e}")
+        (
+            each["input"],
+            each["engine"],
+            each["method"],
+            f"{each['value']:g}",
+            _drift_off_text(each),
+            f"{each['error']:.2e}",
+        )
         for each in data["solvers"]
     )
     note = (
@@ -287,5 +294,5 @@ def tables(data: Saved) -> list[Table]:
     return tables
 
 
-def _when(solver: Saved) -> str:
+def _drift_off_text(solver: Saved) -> str:
     return "never" if solver["drift-off"] >= DURATION else f"{solver['drift-off']:.2f}"

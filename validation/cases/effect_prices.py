@@ -102,14 +102,14 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
             machinery["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
-        slower(
+        ratio_row(
             f"effect_prices.ratio.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
             machinery["ratio"],
             why,
         ),
-        slower(
+        ratio_row(
             f"effect_prices.unchecked.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
             machinery["unchecked"],
@@ -118,7 +118,7 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
     ]
 
 
-def slower(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
+def ratio_row(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
     """A ratio of seconds with its interval."""
     value, low, high = ratio
     return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
@@ -136,7 +136,7 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        slower(
+        ratio_row(
             "effect_prices.ratio.wheelset",
             "ratio of the time of a bare wheelset to that of the hand-written one, whose path passes the same checks",
             ratio,
@@ -166,7 +166,7 @@ def _rides(quick: bool) -> list[Row]:
                 "the same vehicle on the same road; forces are summed in another order",
                 "none" if engine == "reference" else "native",
             ),
-            slower(
+            ratio_row(
                 f"effect_prices.ratio.ride.{engine}",
                 f"{engine}: ratio of the time of a bare ride to that of {WRITTEN[engine]}",
                 ratio,
@@ -192,7 +192,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "native"),
-        slower(
+        ratio_row(
             "effect_prices.ratio.handling",
             "MuJoCo: ratio of the time of a bare car of handling to that of the "
             "hand-written car, whose path passes the same guard",
@@ -203,7 +203,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
 
 
 def _stops(quick: bool) -> list[Row]:
-    """A truck that brakes in a turn on snow by the reference, against one that was written for that alone.
+    """Rows: a truck brakes in a turn on snow, by the reference and by code written for this stop alone.
 
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
@@ -218,7 +218,7 @@ def _stops(quick: bool) -> list[Row]:
             gap,
             "m, rad, m/s, rad/s, shares",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
-        slower(
+        ratio_row(
             "effect_prices.ratio.braking",
             "ratio of the time of a bare stop to that of the hand-written truck",
             ratio,
@@ -240,7 +240,7 @@ def _contact(quick: bool) -> list[Row]:
             gap,
             "",
         ).at_most(1e-13, "the same cells, sums in another order", "none"),
-        slower(
+        ratio_row(
             "effect_prices.ratio.contact",
             "ratio of the time of a call of FASTSIM on a bare ellipse to that of the hand-written FASTSIM",
             ratio,
@@ -250,7 +250,7 @@ def _contact(quick: bool) -> list[Row]:
 
 
 def _choice() -> Row:
-    """The choice of effects of a linear car, by the answer itself."""
+    """Row: time of choosing the effects of a linear car, divided by the time of its full covariance."""
     (ratio, low, high), told = price_of_choice()
     return Observed(
         "effect_prices.choice",

@@ -49,7 +49,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         job = noise_paths(scene, times, truth)
         if quick:
             return _quick(forces, scene, job, times), {}
-        large = _alone(_large, job, MANY, forces / "large")
+        large = _in_own_process(_large_ensemble, job, MANY, forces / "large")
         paths = large.pop("found")
         rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
         with processes(2) as pool:
@@ -132,7 +132,7 @@ def _interrupted_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
 
 def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     """Kill a run without warning once two of its blocks are there, then resume it."""
-    child = get_context("spawn").Process(target=_slowly, args=(job, blocks))
+    child = get_context("spawn").Process(target=_run_slow_job, args=(job, blocks))
     child.start()
     while child.is_alive() and len(list(blocks.glob("block*.npz"))) < 2:
         time.sleep(0.02)
@@ -151,17 +151,17 @@ def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     )
 
 
-def _slowly(job: NoisePaths, blocks: Path) -> None:
+def _run_slow_job(job: NoisePaths, blocks: Path) -> None:
     run_paths(job, SOME, blocks, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
 
 
-def _alone(function: Callable[..., Any], *args: Any) -> Any:
+def _in_own_process(function: Callable[..., Any], *args: Any) -> Any:
     """Value of a function run in a separate process, so that its memory can be measured alone."""
     with processes(1) as pool:
         return pool.submit(function, *args).result()
 
 
-def _large(job: NoisePaths, many: int, blocks: Path) -> Saved:
+def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
     """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
     import resource
 

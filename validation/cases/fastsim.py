@@ -67,7 +67,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     rows, data = _discretisation()
     rows += _invariants(2 if quick else 64, 10_000 if quick else 16_000, 0 if quick else 100)
-    rows += _limits() + _spun() + _derivatives() + _drawn()
+    rows += _limits() + _spun() + _derivatives() + _errors_on_random_contacts()
     if quick:
         return rows, data
     answers, data["model"] = _model()
@@ -248,7 +248,7 @@ def _derivatives() -> list[Row]:
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
     known, off = derivatives(RollingEllipse(**columns), PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
-        ends = [_moved(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
+        ends = [_with_changed_column(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
@@ -267,7 +267,7 @@ def _derivatives() -> list[Row]:
     ]
 
 
-def _moved(columns: Contacts, name: str, step: float) -> Array:
+def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
     """Forces and moments (n, 3) with one value changed; a load that grows takes the ellipse with it."""
     moved = {**columns, name: columns[name] + step}
     if name == "load":
@@ -277,7 +277,7 @@ def _moved(columns: Contacts, name: str, step: float) -> Array:
     return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 
-def _drawn() -> list[Row]:
+def _errors_on_random_contacts() -> list[Row]:
     """Error of the model on contacts drawn at random, on which nothing was calibrated."""
     error = held("blended intermediate", read_drawn(JUDGED)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"

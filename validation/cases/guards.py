@@ -52,7 +52,7 @@ def road() -> Assembly:
 
 
 @cache
-def _truth(duration: float) -> np.ndarray:
+def _tight_solution(duration: float) -> np.ndarray:
     """Tight solution at every millisecond."""
     return setups.tight(road(), 1e-3, duration).states
 
@@ -74,7 +74,7 @@ def _word(engine: str, name: str, step: float, duration: float, runner: Runner) 
         return "refused"
     except RunFailed:
         return "raised"
-    truth = _truth(duration)[:: round(step / 1e-3)]
+    truth = _tight_solution(duration)[:: round(step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
     return "right" if share <= WRONG else "SILENT"
 
@@ -106,7 +106,7 @@ def constrained_unchecked() -> dict[str, str]:
     return {name: ending(partial(setups.unchecked, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
-def _all(endings: dict[str, str], word: str) -> str:
+def _unexpected_endings(endings: dict[str, str], word: str) -> str:
     """The expected word if all runs ended so, else the ones that did not."""
     other = [f"{name}: {ended}" for name, ended in endings.items() if ended != word]
     return "; ".join(other) or word
@@ -126,7 +126,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 f"guards.constraint.exudyn.{name}",
                 SYSTEM,
                 f"an integrator that ignores the active constraint, Exudyn, all {len(endings_of)}{how}",
-                _all(endings_of, name),
+                _unexpected_endings(endings_of, name),
                 name,
                 "Exudyn's explicit solvers freeze or free the pitch without a word",
             )
@@ -212,7 +212,7 @@ def _input_rows(engine: str) -> list[Row]:
             f"guards.nan.{engine}",
             SYSTEM,
             f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine}",
-            _all(caught, "caught"),
+            _unexpected_endings(caught, "caught"),
             "caught",
             "Exudyn's explicit solvers return True with NaN",
         ),

@@ -349,10 +349,10 @@ def _repeat_tyres(times: int) -> None:
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST:] = 2e-8
-    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
+    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
 
 
 @njit(cache=True, error_model="numpy")
-def _many(contacts, slides, strips, cells, middle, forces, times):
+def _repeat_forces(contacts, slides, strips, cells, middle, forces, times):
     for _ in range(times):
         tyre_forces(contacts, slides, strips, cells, middle, forces)

@@ -27,7 +27,7 @@ EVERY = 24
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
-    for family, case in some(known) if quick else known:
+    for family, case in quick_cases(known) if quick else known:
         with TemporaryDirectory() as place:
             outcomes = {name: judge(case, name, Path(place)) for name in case.judged()}
             naive = case.naive(Path(place)) if case.naive else ""
@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def some(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+def quick_cases(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
     """The quick share: the last case of each family, and every EVERY-th before it."""
     families = dict.fromkeys(family for family, _ in known)
     return [pair for name in families for pair in [case for case in known if case[0] == name][::-EVERY]]
@@ -82,7 +82,7 @@ def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
 
 def tables(data: Saved) -> list[Table]:
     """The catalogue, counts by family, and the one table of hard cases."""
-    return [_catalogue(data), _counts(data), _all(data["cases"])]
+    return [_catalogue(data), _counts_by_family(data), _table_of_cases(data["cases"])]
 
 
 def _catalogue(data: Saved) -> Table:
@@ -103,7 +103,7 @@ def _catalogue(data: Saved) -> Table:
     )
 
 
-def _counts(data: Saved) -> Table:
+def _counts_by_family(data: Saved) -> Table:
     """Cases, those that were run and their outcomes, of every family and of all of them."""
     known = Counter(family for family, _ in data["known"])
     groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
@@ -125,7 +125,7 @@ def _counts(data: Saved) -> Table:
     )
 
 
-def _all(entries: list[Saved]) -> Table:
+def _table_of_cases(entries: list[Saved]) -> Table:
     """Every case: what is hard, what it is checked against, and what each implementation makes of it."""
     rows = tuple(
         (

@@ -69,10 +69,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
-    rows = [row for setting in settings for row in _ends(setting, measured, "reference")]
+    rows = [row for setting in settings for row in _rows_of_limits(setting, measured, "reference")]
     smallest: list[Any] = []
     if not quick:
-        rows += [row for engine in ("exudyn", "mujoco") for row in _ends(JUDGED[3], measured, engine)]
+        rows += [row for engine in ("exudyn", "mujoco") for row in _rows_of_limits(JUDGED[3], measured, engine)]
         smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD)]
         rows += [
             _found_row(i, name, stiffness, measured.predicted_stiffness) for i, (name, stiffness) in enumerate(smallest)
@@ -97,7 +97,7 @@ def _error(setting: Setting, stiffness: float, measured: FreeRuns, engine: str =
     return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - measured.pitch).max())
 
 
-def _ends(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
+def _rows_of_limits(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):

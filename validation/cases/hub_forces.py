@@ -15,7 +15,7 @@ from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTER, Comparison, compare
-from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
+from models.systems.hub_forces.measurement import HubForces, model, recorded, true_run, two_tracks
 from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
@@ -45,7 +45,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         _wrenches(car),
         *_gravity(car),
         _toppling(car),
-        _together(car, 0.2 if quick else 2.0),
+        _noisy_free_runs(car, 0.2 if quick else 2.0),
         *hub_inputs.rows(car, quick),
     ]
     if quick:
@@ -54,7 +54,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     scenes = {frame: _scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():
-        rows += [*_stabilised(frame, comparison), _exact(frame, comparison)]
+        rows += [*_stabilised(frame, comparison), _prescribed_truth(frame, comparison)]
     return rows + _faults(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
 
 
@@ -163,7 +163,7 @@ def _toppling(vehicle: CutVehicle) -> Row:
     ).within(expected, 0.02 * expected, "springs that give change it by less than one per cent", "closed form")
 
 
-def _together(vehicle: CutVehicle, duration: float) -> Row:
+def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
     """Free on noise in every engine."""
     steps = round(duration / STEP)
     hub_inputs = static(vehicle, steps + 1)
@@ -188,7 +188,7 @@ def _rough(vehicle: CutVehicle, duration: float) -> HubInputs:
 def _reproduced(vehicle: CutVehicle) -> list[Row]:
     """Hub forces of a road without noise bring the same motion back, but for what lies between samples."""
     duration = 2.0
-    true = truth("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
+    true = true_run("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
     off = {}
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
@@ -298,7 +298,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     return rows
 
 
-def _exact(frame: str, comparison: Comparison) -> Row:
+def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
     """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
     measurement = comparison.measurement
     assert measurement.truth is not None
@@ -324,8 +324,8 @@ def _faults(scene: HubScene) -> list[Row]:
     """
     vehicle, duration = r19(), 5.0
     hub_inputs = _rough(vehicle, duration)
-    clean, angles = recorded(truth("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
-    in_space, _ = recorded(truth("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
+    clean, angles = recorded(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
+    in_space, _ = recorded(true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
     parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {

@@ -80,7 +80,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         files = _drive(Path(name), 0.2 if quick else 4.0)
         gaps, laws = _gaps(files), _laws(files)
         walked = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files)  # from a start on the constraint
-        loose = _loose(_drive(Path(name), 1.0 if quick else 12.0))
+        loose = _unguided_pitch_errors(_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
         *_gap_rows(gaps, laws, files.duration),
         *_noise_rows(walked, loose),
@@ -124,7 +124,7 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
     return _paths(replace(guided, initial=start), files)
 
 
-def _loose(files: Files) -> dict[str, np.ndarray]:
+def _unguided_pitch_errors(files: Files) -> dict[str, np.ndarray]:
     """Pitch minus true pitch (n,) under noisy forces and no guidance, by the solvers of both engines."""
     noisy = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {

@@ -51,13 +51,13 @@ TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000
-    rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
+    rows = [*_attitude_from_exact_rates(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
     example, data = _ten_minutes(0 if quick else 60)
     recorded, seen = _recording(paths)
     return [*rows, *example, *recorded, *([] if quick else _section_forces())], {"ten minutes": data, "recording": seen}
 
 
-def _clean() -> list[Row]:
+def _attitude_from_exact_rates() -> list[Row]:
     """Attitude from exact rates: about a fixed axis in steps of any length, and on a cone at 1 kHz."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
     held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
@@ -68,13 +68,15 @@ def _clean() -> list[Row]:
     swept = "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error"
     order = "fourth order in the sampling period, without noise"
     return [
-        _small("clean.axis", fixed, apart(held[-1], turned), "rad", "each step is the exact exponential"),
-        _small("clean.cone", swept, apart(coned, true), "rad", order),
-        _small("clean.norm", "largest departure of the quaternion's norm from 1", off, "", "normalised in each step"),
+        _closed_form_row("clean.axis", fixed, apart(held[-1], turned), "rad", "each step is the exact exponential"),
+        _closed_form_row("clean.cone", swept, apart(coned, true), "rad", order),
+        _closed_form_row(
+            "clean.norm", "largest departure of the quaternion's norm from 1", off, "", "normalised in each step"
+        ),
     ]
 
 
-def _small(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
+def _closed_form_row(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
     """Row for an error beside a closed form."""
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(bound, why, "closed form")
 
@@ -99,7 +101,7 @@ def _one_axis(paths: int) -> list[Row]:
                 paths,
                 f"s^2 t; {paths:,} paths, seed {SEED}",
             ),
-            _small(
+            _closed_form_row(
                 f"one_axis.{axis + 1}.spill",
                 f"largest angle about the two axes without noise, noise about axis {axis + 1}",
                 spill,
@@ -153,14 +155,14 @@ def _three_axes(paths: int) -> list[Row]:
             mean_scalar(UNEQUAL, SPAN),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
-        _small(
+        _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
             abs(same - mean_trace(EQUAL, SPAN)),
             "",
             "both are exact",
         ),
-        _small(
+        _closed_form_row(
             "matrix",
             "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
             standard_errors(wandered, exact),
@@ -335,7 +337,7 @@ def _section_forces() -> list[Row]:
     pairs = ((guided, guided), (true, guided), (true, true))
     corrected, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
     return [
-        _small(
+        _closed_form_row(
             f"section.{name}",
             f"difference of {name} of a run guided by a pitch that goes wrong by {size} rad in 10 s from "
             "the true force turned by that angle, over the change",
@@ -372,7 +374,7 @@ def _recording(paths: int) -> CaseAnswer:
             float(off[-1]),
             "deg",
         ).beside("nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
-        _small(
+        _closed_form_row(
             "recording.law",
             "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
             standard_errors(wandered, law),

@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     if shutil.which("valgrind") is None:
         return [not_run(ID, SYSTEM, WHAT, "valgrind is not installed")], {"instructions": {}}
     try:
-        first, second = _counted(folder / "instructions")
+        first, second = _instructions(folder / "instructions")
     except (subprocess.SubprocessError, OSError) as error:
         reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
         return [not_run(ID, SYSTEM, WHAT, reason)], {"instructions": {}}
@@ -79,7 +79,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"instructions": dict(zip(CURVES, per_step.tolist(), strict=True))}
 
 
-def _counted(folder: Path) -> np.ndarray:
+def _instructions(folder: Path) -> np.ndarray:
     """Instructions (2 processes, methods, 2 numbers of steps), by the marks between the marches."""
     folder.mkdir()
     mass, damping, stiffness, *_ = linearised(assemble(road_scene()).vehicle)

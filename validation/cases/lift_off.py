@@ -13,7 +13,7 @@ from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
 from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
@@ -48,7 +48,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
     vehicles = VEHICLES[-1:] if quick else VEHICLES
     rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
-    rows += [*_exact(0.5 if quick else 2.0), _order(4 if quick else 6), *_energy(0.5 if quick else 2.0)]
+    rows += [
+        *_bounces_by_exponentials(0.5 if quick else 2.0),
+        _order(4 if quick else 6),
+        *_energy(0.5 if quick else 2.0),
+    ]
     return [*rows, *_pulls(quick), *_in_space(quick), *([] if quick else _above_a_cut())], {}
 
 
@@ -131,7 +135,7 @@ def _loads(run: Result) -> np.ndarray:
     "springs compressed",
     "tyres not flat",
 )
-def _exact(duration: float) -> list[Row]:
+def _bounces_by_exponentials(duration: float) -> list[Row]:
     """Bounces on the flat road beside matrix exponentials between the switches."""
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
@@ -294,7 +298,7 @@ def _above_a_cut() -> list[Row]:
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
-    runs = {engine: truth(engine, car, drive, "inertial", 1e-3, duration) for engine in ALL}
+    runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in ALL}
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.profile_files import read_profile
-from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, laid
+from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, rail_in_track
 from models.rail.contact_table import Placed
 from models.systems.wheel_rail.run import run
 from models.systems.wheel_rail.scene import Positions
@@ -43,7 +43,7 @@ WHEELS = {"right": 2, "left": 5}
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
     published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
-    placed, each = _placed("A-2", published[:, 0])
+    placed, each = _timed_positions("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     rows.append(
         Observed(
@@ -54,10 +54,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
-    data: dict[str, Any] = {"A-2": [_told(each) for each in placed], "published": published.tolist()}
+    data: dict[str, Any] = {"A-2": [_table_of_patches(each) for each in placed], "published": published.tolist()}
     if not quick:
-        static, each_still = _placed("A-1", CONTACT[::2, 0])
-        data["A-1"] = [_told(each) for each in static]
+        static, each_still = _timed_positions("A-1", CONTACT[::2, 0])
+        data["A-1"] = [_table_of_patches(each) for each in static]
         rows += [
             *_static_rows(static),
             *_split_rows(placed[10]),
@@ -69,7 +69,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, data
 
 
-def _placed(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
+def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
     """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
@@ -223,7 +223,7 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
         return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
-    rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
+    rail = rail_in_track(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = WheelAndRail(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
     other = replace(contact_of("A-2"), side=side)
     chosen = [(each, other.at(each.shift, each.yaw)) for each in placed if round(1e3 * each.shift, 6) in FILES]
@@ -255,7 +255,7 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
     ]
 
 
-def _told(placed: Placed) -> dict[str, Any]:
+def _table_of_patches(placed: Placed) -> dict[str, Any]:
     """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
     return {"shift": 1e3 * placed.shift} | {
         wheel: [

@@ -22,10 +22,10 @@ from validation.measured.planted import (
     Ride,
     clipped,
     drifting,
+    drop_samples,
+    errors_and_doubts,
     exchanged,
-    findings,
-    held,
-    lost,
+    hold_sample,
     measurement,
     planted,
     referred,
@@ -47,7 +47,7 @@ LATE = 3e-3
 QUICK = (
     Planted("3 ms late, one force", "shift", "fl_fz", LATE, "s", faults={"delay": {"fl_fz": LATE}}),
     Planted("left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged(("fl", "fr"))),
-    Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", lost("rr_fz", 3.0, 0.5)),
+    Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
 )
 AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
     ("3 ms late, one hub", "shift", "all channels of rr", LATE, "s", "delay", {"rr": LATE}),
@@ -107,8 +107,8 @@ FULL = (
         for name, (lever, hubs) in LEVERS.items()
     ),
     Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", clipped("fl_fz", 0.005)),
-    Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", held("rl_mx", 4.0, 0.3)),
-    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", held("fl_fz", 4.0, 0.06)),
+    Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", hold_sample("rl_mx", 4.0, 0.3)),
+    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", hold_sample("fl_fz", 4.0, 0.06)),
     Planted("spike of one sample", "spikes", "rl_my", 2e3, "N m", spiked("rl_my", 4.0, 2e3)),
     Planted("dead channel", "clipped", "rl_mx", 15.0, "s", times(0.0, "rl_mx")),
 )
@@ -122,9 +122,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         findings = planted(virtual, folder, fault.spoil, **fault.faults)
         rows += _rows(fault, findings)
         said[fault.name] = findings[0].text if findings else "nothing"
-    rows.append(_quiet("quick", [planted(virtual, folder)]))
+    rows.append(_clean_recordings_row("quick", [planted(virtual, folder)]))
     if not quick:
-        rows += [*_clean(folder), *_strangers(folder), *_together(virtual, folder), _spread(virtual, folder)]
+        rows += [
+            *_clean_recordings(folder),
+            *_wrong_vehicles(folder),
+            *_three_faults_rows(virtual, folder),
+            _spread(virtual, folder),
+        ]
         size = 1e6 * _size(drifting(virtual, 5e-4, folder), "drift")
         rows += [_sized("clocks", "drift between the clocks of two files", size, "1e-6", 500.0), *_moving_car(folder)]
     return rows, {"said": said}
@@ -142,7 +147,7 @@ def _sized(key: str, quantity: str, size: float, unit: str, wanted: float) -> Ro
     return Observed(id, SYSTEM, quantity, size, unit).within(wanted, SHARE * abs(wanted), why, "closed form")
 
 
-def _none(key: str, quantity: str, texts: list[str], why: str) -> Row:
+def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> Row:
     """Row of findings of which there must be none."""
     id, said = f"measured_checks.{key}", "; ".join(texts) or why
     return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
@@ -164,10 +169,10 @@ def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
     return rows
 
 
-def _quiet(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
+def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     """No error and no doubt in clean recordings."""
     what = f"errors and doubts in {len(recordings)} clean recordings"
-    return _none(
+    return _row_of_no_findings(
         f"clean.{name}",
         what,
         [finding.text for findings in recordings for finding in findings],
@@ -175,18 +180,22 @@ def _quiet(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     )
 
 
-def _clean(folder: Path) -> list[Row]:
+def _clean_recordings(folder: Path) -> list[Row]:
     """Four roads, two vehicles, two samples of noise each; recordings of 5 to 20 s."""
     return [
-        _quiet(vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)])
+        _clean_recordings_row(
+            vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)]
+        )
         for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
     ]
 
 
-def _strangers(folder: Path) -> list[Row]:
+def _wrong_vehicles(folder: Path) -> list[Row]:
     """A car that is not the one of the file, R19-free: heavier, or with other springs."""
     findings_by_car = {
-        name: findings(replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder)
+        name: errors_and_doubts(
+            replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder
+        )
         for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }
     errors = [
@@ -201,11 +210,11 @@ def _strangers(folder: Path) -> list[Row]:
     other = "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     return [
         Observed(id, SYSTEM, what, excess, "%").within(wanted, SHARE * 6.6, why, "closed form"),
-        _none("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
+        _row_of_no_findings("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
 
-def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
+def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: three faults at once are all named."""
     spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
     findings = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})

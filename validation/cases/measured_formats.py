@@ -175,7 +175,7 @@ def two_rates(path: Path, extension: str) -> Row:
 def forms(folder: Path) -> list[Row]:
     """CSV in the forms of loggers, spreadsheets and scripts, and files of other kinds: read to the bit, or refused."""
     files = (*csv_forms.FILES, *kinds.FILES)
-    ends = [_ended(odd, folder / f"form {i}") for i, odd in enumerate(files)]
+    ends = [_difference_or_error(odd, folder / f"form {i}") for i, odd in enumerate(files)]
     crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
     read = [(odd, end) for odd, end in zip(files, ends, strict=True) if odd.wanted != "refused"]
     errors = [end if isinstance(end, float) else float("inf") for _, end in read]
@@ -208,7 +208,7 @@ def forms(folder: Path) -> list[Row]:
     ]
 
 
-def _ended(odd: Odd, folder: Path) -> float | str | None:
+def _difference_or_error(odd: Odd, folder: Path) -> float | str | None:
     """Difference to the truth, None where a file is refused and says why; the error where there is another one."""
     try:
         return odd.error(folder)

@@ -44,7 +44,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         for engine, seconds in lasting.items()
         for method in ("none", "kalman", "prescribed")
     ]
-    return [*rows, _killed(folder), *_memory(folder), *_handed_on(folder)], {}
+    return [*rows, _run_killed_twice(folder), *_memory(folder), *_handed_on(folder)], {}
 
 
 def _guides(quick: bool) -> list[Row]:
@@ -154,7 +154,7 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
-def _killed(folder: Path) -> Row:
+def _run_killed_twice(folder: Path) -> Row:
     """A run killed twice, beside one that was left alone."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):

@@ -69,10 +69,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return _quick(folder), {}
     rows, data = list[Row](), dict[str, Any]()
     for proof in PROOFS:
-        proved, ratios = _proved(proof, folder / proof.name)
+        proved, ratios = _run_all_formats(proof, folder / proof.name)
         rows += proved
         data[proof.name] = ratios
-    return [*rows, *_trusted(), *_moving(folder / "moving")], data
+    return [*rows, *_trust_times(), *_moving(folder / "moving")], data
 
 
 def own_vehicle(folder: Path) -> str:
@@ -120,11 +120,11 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
 
 
 def held(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
-    """The run of a recording, to be made."""
+    """Set up the run of a recording, with the vehicle held as ``hold`` says; the run is not yet marched."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
-def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
+def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Ten samples through every format, held; the first one free and in the other engine, too."""
     folder.mkdir()
     own_vehicle(folder)
@@ -138,7 +138,7 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
             recording = recorded(true, samples, proof.vehicle, form, place)
             off[form] = max(off[form], _largest_channel_change(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
-            damage = next((damages for other, damages in known if _same(values, other)), None)
+            damage = next((damages for other, damages in known if _differ_by_rounding(values, other)), None)
             if damage is None:
                 damage = errors(march(held(recording, true.vehicle, proof.hold), place / "run"), true).damage
                 known.append((values, damage))
@@ -149,10 +149,10 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
     }
     rows = [row for form in proof.formats for row in _rows(proof, form, off[form], means[form])]
     first = recorded(true, true.samples(planted, SEED), proof.vehicle, "csv", folder / "beside")
-    return [*rows, *_beside(proof, first, true, folder)], means
+    return [*rows, *_rows_of_other_runs(proof, first, true, folder)], means
 
 
-def _same(first: np.ndarray, two: np.ndarray) -> bool:
+def _differ_by_rounding(first: np.ndarray, two: np.ndarray) -> bool:
     """Whether two recordings differ by nothing but the rounding of a unit, so that one run stands for both."""
     largest = np.maximum(np.nanmax(np.abs(first), axis=0), 1e-300)
     return bool(np.allclose(first / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
@@ -198,7 +198,7 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
     ]
 
 
-def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
+def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: the recording run free and held by both engines; the verdicts."""
     free = held(first, true.vehicle, Hold("none"))
     jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
@@ -247,7 +247,7 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
     return rows
 
 
-def _trusted() -> list[Row]:
+def _trust_times() -> list[Row]:
     """Predicted times of trust and the medians of ensembles."""
     vehicle, rows = cut(load_vehicle("r19_free"), "body"), list[Row]()
     bias = np.zeros(6 * len(vehicle.hubs))

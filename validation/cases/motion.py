@@ -53,17 +53,17 @@ BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
-    rows = [row for name in ARRAYS for row in _exact(name)]
+    rows = [row for name in ARRAYS for row in _rows_without_integration(name)]
     rows += [_plain(), _order(), _tilt()]
     gains, gain_rows = _gains(4000 if quick else 40_000)
     rows += gain_rows
     for engine in IMPLEMENTATIONS:
         rows += _engine(engine, 1.0 if quick else 5.0)
-    walked, curves = _walk(20 if quick else 300)
-    return [*rows, *walked, *_held(curves, quick)], {"gains": gains, "curves": curves}
+    walked, curves = _random_walk(20 if quick else 300)
+    return [*rows, *walked, *_symmetric_part_measured(curves, quick)], {"gains": gains, "curves": curves}
 
 
-def _exact(name: str) -> list[Row]:
+def _rows_without_integration(name: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are closed forms."""
     array = sensor_array(ARRAYS[name])
     clean = readings_on_path(array.positions)
@@ -208,8 +208,8 @@ def _engine(engine: str, duration: float) -> list[Row]:
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = quality(sensor_array(p.positions()), readings)
     return [
-        *_follows("accelerometers", engine, array, felt, run.states, None),
-        *_follows("gyro", engine, array, felt, run.states, turning),
+        *_recovered_errors("accelerometers", engine, array, felt, run.states, None),
+        *_recovered_errors("gyro", engine, array, felt, run.states, turning),
         Observed(
             f"motion.pitch_acceleration.{engine}",
             SYSTEM,
@@ -242,7 +242,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
     ]
 
 
-def _follows(
+def _recovered_errors(
     rule: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
 ) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
@@ -277,7 +277,7 @@ def _noise(path: int, count: int) -> np.ndarray:
     return NOISE * normal(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
 
 
-def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
+def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Integration alone: the rate walks off as the square root of time."""
     count, array = 6001, sensor_array(ARRAYS["5, one 1 m up"])
     errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
@@ -301,7 +301,7 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _held(curves: Saved, quick: bool) -> list[Row]:
+def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     """The symmetric part as a measurement: the error stays where it is."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)

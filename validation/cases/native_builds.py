@@ -62,12 +62,12 @@ def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
                 path_error(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
-            _counted(name, car, engine),
+            _row_of_native_parts(name, car, engine),
         ]
     return rows
 
 
-def _counted(name: str, car: CutVehicle, engine: str) -> Row:
+def _row_of_native_parts(name: str, car: CutVehicle, engine: str) -> Row:
     share = native_share(engine, car)
     shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
     return Observed(

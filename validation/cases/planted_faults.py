@@ -53,10 +53,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         **{campaign.id: campaign.measure(EVERY if quick else 1) for campaign in CAMPAIGNS},
     }
     rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
-    return [*rows, *([] if quick else [_enough(data)])], data
+    return [*rows, *([] if quick else [_row_of_fault_count(data)])], data
 
 
-def _enough(data: Saved) -> Row:
+def _row_of_fault_count(data: Saved) -> Row:
     caught = sum(line[3] != "none" for line in _lines(data))
     return Observed(
         "planted.count",

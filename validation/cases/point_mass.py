@@ -102,7 +102,7 @@ def _continuous_error(damped: float) -> float:
             [Decimal(0)] * 4,
         ]
         truth = [row[3] for row in _exponential(rates)]
-        return _worst(continuous(TIME, DEVIATION, STEP, MASS, eta), truth)
+        return _largest_relative_error(continuous(TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
 def _discrete_error(damped: float, steps: int) -> float:
@@ -119,10 +119,10 @@ def _discrete_error(damped: float, steps: int) -> float:
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
         truth = [row[3] for row in _power(recursion, steps)]
-        return _worst(discrete(steps, DEVIATION, step, MASS, eta), truth)
+        return _largest_relative_error(discrete(steps, DEVIATION, step, MASS, eta), truth)
 
 
-def _worst(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _largest_relative_error(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
     return max(
         float(abs(Decimal(float(value)) / true - 1))
         for value, true in zip(computed[[0, 0, 1], [0, 1, 1]], truth, strict=False)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.ride.covariance import stationary
-from models.ride.monte_carlo import along, at_constant_speed
+from models.ride.monte_carlo import at_constant_speed, variances_along_drive
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import REACH, quasi_stationary, varying_speed
@@ -150,7 +150,7 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     """The 19 freedoms along a drive: covariance, quasi-stationary, copies, and the seconds."""
     vehicle, road = ride("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
-    copies, slow = _timed(along, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
+    copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
     varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
     columns = [varied.names.index(point) for point in POINTS]

@@ -56,7 +56,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             follow, p = follower(scene, work), scene.vehicle_parameters()
             rows += _missing_mass(parameters, p, measured, follow, work)
             rows += _shifted_centre(parameters, p, measured, follow, work)
-        rows += [*_exact(follow, min(duration, 4.0)), _high_pass(follow), *_bandwidth(measured, follow, work)]
+        rows += [
+            *_dead_band_and_moment(follow, min(duration, 4.0)),
+            _high_pass(follow),
+            *_bandwidth(measured, follow, work),
+        ]
     return rows, {}
 
 
@@ -112,7 +116,7 @@ def _shifted_centre(parameters: str, p: Parameters, measured: Result, follow: Fo
     ]
 
 
-def _exact(follow: Follow, duration: float) -> list[Row]:
+def _dead_band_and_moment(follow: Follow, duration: float) -> list[Row]:
     """A dead band and an added moment in both engines against the reference."""
     assembly = assemble(follow({}, BAND))
     times = STEP * np.arange(round(duration / STEP) + 1)

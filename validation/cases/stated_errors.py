@@ -40,13 +40,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
     names = list(SYSTEMS)
     counts = QUICK if quick else dict.fromkeys(names, -(-COUNT // len(names)))
-    samples = [sample for of_system in _made(counts) for sample in of_system]
+    samples = [sample for of_system in _make_samples(counts) for sample in of_system]
     return [*_rows(samples, quick), *(row for name in counts for row in _of_system(name, samples))], {
         "samples": samples
     }
 
 
-def _made(counts: dict[str, int]) -> list[list[Saved]]:
+def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
     """Samples of each system, by as many processes as there are processors, two at most, where there are several."""
     if len(counts) == 1:
         return [samples(name, count) for name, count in counts.items()]
@@ -57,10 +57,10 @@ def _made(counts: dict[str, int]) -> list[list[Saved]]:
 def samples(name: str, count: int) -> list[Saved]:
     """Samples of a system as JSON keeps them."""
     drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
-    return [_saved(name, sample) for sample in drawn]
+    return [_sample_as_table(name, sample) for sample in drawn]
 
 
-def _saved(system: str, sample: Sample) -> Saved:
+def _sample_as_table(system: str, sample: Sample) -> Saved:
     """A sample as JSON keeps it; ``ratio`` : true by stated error, None where there is no number."""
     told = {
         "system": system,
@@ -92,8 +92,8 @@ def ratio(true: float, stated: float) -> float:
 def _rows(samples: list[Saved], quick: bool) -> list[Row]:
     """Rows on the stated errors of all systems together; shares of a quick run's few samples are only reported."""
     known = [sample for sample in samples if sample["ratio"] is not None]
-    right = _share(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
-    useless = _share(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
+    right = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
+    useless = _share_of_true(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
     silent = [sample for sample in known if sample["ratio"] > FAR and not (sample["warned"] or sample["rounding"])]
     costs = [_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
     near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
@@ -136,7 +136,7 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
     ]
 
 
-def _share(hits: Iterator[bool]) -> float:
+def _share_of_true(hits: Iterator[bool]) -> float:
     """Share of what is true; 1 of nothing."""
     counted = list(hits)
     return float(np.mean(counted)) if counted else 1.0
@@ -158,7 +158,7 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     of_system = [sample for sample in samples if sample["system"] == name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
     told = f"{name}, {len(known)} of {len(of_system)} samples"
-    near = _share(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
+    near = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
     shown = (

@@ -11,11 +11,11 @@ from models.rail import equations as eq
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import Equations
-from models.rail.limit_cycle import Orbit, attained, beside, refined, solved
+from models.rail.limit_cycle import Orbit, attained, guess_from_orbit, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.contact.drawn_wheelsets import HEAVY, SEED, STIFF, Speeds, criticals, drawn
 from validation.faults import wheelset as faults
@@ -149,7 +149,9 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         for wheelset in wheelsets.values():
             written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
             states = written.rest + LIVELY * draw.normal(size=(20, eq.STATES))
-            worst = max(worst, *(off(built.rates(state), written.rates(state)) for state in states))
+            worst = max(
+                worst, *(largest_relative_difference(built.rates(state), written.rates(state)) for state in states)
+            )
         rows.append(
             Observed(
                 f"wheelset.accelerations.{engine}",
@@ -163,7 +165,7 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     return rows
 
 
-def _usual(speeds: Speeds, name: str) -> float:
+def _speed_of_path(speeds: Speeds, name: str) -> float:
     """Speed (m/s) of a path: above the critical one, 60 where there is none."""
     critical = speeds[name]["reference"]
     return min(ABOVE * critical, 180.0) if critical is not None else 60.0
@@ -175,7 +177,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     positive = steps = 0
     for name, wheelset in wheelsets.items():
         paths: dict[str, Any] = {}
-        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", cells)
+        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", cells)
         step = _step(Equations(*setup))
         for engine in IMPLEMENTATIONS:
             equations = implementation(engine)(*setup)
@@ -226,10 +228,10 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
     for name, wheelset in wheelsets.items():
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
-        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", 11)
+        setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", 11)
         first = attained(Equations(*setup), step=_step(Equations(*setup)))
         if first is not None:
-            guesses = {engine: beside(first, implementation(engine)(*setup)) for engine in engines}
+            guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
             cycles[name] = {
                 engine: refined(solved(guess, "amplitude", precise=False), "amplitude")
                 for engine, guess in guesses.items()
@@ -308,9 +310,9 @@ def _fault_rows() -> list[Row]:
     """Rows: changes of the figures above by a small fault in one implementation."""
     equations, engine = Equations(CHOSEN, 60.0), implementation("mujoco")(CHOSEN, 60.0)
     state = equations.displaced(3e-3)
-    right = off(engine.rates(state), equations.rates(state))
+    right = largest_relative_difference(engine.rates(state), equations.rates(state))
     with faults.creeping(faults.spin_reversed)()():
-        spin = off(engine.rates(state), equations.rates(state))
+        spin = largest_relative_difference(engine.rates(state), equations.rates(state))
     softer = CHOSEN.changed(stiffness_x=0.99 * CHOSEN.stiffness_x)
     stiff, other = (critical_speed(wheelset, partial(growth, Equations)) for wheelset in (CHOSEN, softer))
     seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / stiff - 1.0) > 1e-6}

@@ -5,7 +5,7 @@ from pathlib import Path
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial_linear import preloads
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.written_equations import (
     bristles_gap,
@@ -54,7 +54,9 @@ def _laws(states: int) -> list[Row]:
     for name, car in rolling_cars().items():
         held = preloads(car.vehicle)
         plain = held_at_rest(car.vehicle, CARRIER)
-        gap = max(off(other, list(known.values())) for known, other in zip(held, plain, strict=True))
+        gap = max(
+            largest_relative_difference(other, list(known.values())) for known, other in zip(held, plain, strict=True)
+        )
         rows.append(
             _row(
                 f"preloads.{name}",

@@ -25,7 +25,7 @@ class Asked:
         return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
 
 
-def drawn(system: str, seed: int) -> Asked:
+def draw_scene(system: str, seed: int) -> Asked:
     """The scene of a system and a seed."""
     draw = np.random.default_rng([SEED, seed])
     table, quantities = DRAWN[system](draw)

@@ -46,14 +46,14 @@ class Sampled:
 
     def _shared(self, i: int, j: int) -> np.ndarray:
         """Covariances (q,) of what axle i moves with what axle j moves."""
-        seen, (by_i, by_j), late = self.march.motions[1], (self._by_road(i), self._by_road(j)), self._late(i, j)
+        seen, (by_i, by_j), late = self.march.motions[1], (self._by_road(i), self._by_road(j)), self._axle_lag(i, j)
         motions = np.einsum("ql,lm,qm->q", seen, self._motions(i, j), seen.conj())
         with_road = np.einsum("ql,lm,qm->q", seen, self._with_road(i, late), by_j)
         back = np.einsum("ql,lm,qm->q", seen, self._with_road(j, -late), by_i)
         road = np.einsum("ql,lm,qm->q", by_i, self._road(-late), by_j)
         return (motions + with_road + back + road).real
 
-    def _late(self, i: int, j: int) -> float:
+    def _axle_lag(self, i: int, j: int) -> float:
         """Time (s) by which the road of axle j is ahead of that of axle i."""
         return self._delays[i] - self._delays[j]
 
@@ -85,12 +85,12 @@ class Sampled:
         return self.march.read[:, at : at + m]
 
     @cached_property
-    def _grown(self) -> np.ndarray:
+    def _motion_covariance(self) -> np.ndarray:
         """R (n,) of the motions."""
         z = self.step * self.march.motions[0]
         return 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
 
-    def _moved(self, axle: int) -> list[np.ndarray]:
+    def _input_matrix(self, axle: int) -> list[np.ndarray]:
         """B (n, m) by share of the step."""
         rates, _, forced = self.march.motions
         h, z, m, road = self.step, (self.step * rates)[:, None], len(self._rate), self.march.reduced.excitation
@@ -109,45 +109,45 @@ class Sampled:
 
     def _driven(self, axle: int, late: float) -> np.ndarray:
         """A step's forces (n, m) by the filters ``late`` seconds after the step begins, in the axle's own time."""
-        parts = zip(self._moved(axle), SHARES, strict=True)
+        parts = zip(self._input_matrix(axle), SHARES, strict=True)
         return sum(B @ self._road(share * self.step - late) for B, share in parts)
 
     def _with_road(self, axle: int, after: float) -> np.ndarray:
         """x of an axle by the filters that it meets ``after`` seconds later (n, m); before, where that is negative."""
         steps = max(int(np.ceil(-after / self.step)), 0)
         begin = after + steps * self.step
-        value, given = self._now(axle) @ expm(self._rate.T * begin), np.zeros(())
+        value, given = self._state_by_filters(axle) @ expm(self._rate.T * begin), np.zeros(())
         sooner = np.linalg.solve(self._variance, self._road(self.step))
         for i in range(steps):
             given = given @ sooner if i > 1 else self._driven(axle, begin - i * self.step)
-            value = self._grown[:, None] * value + given
+            value = self._motion_covariance[:, None] * value + given
         return value
 
-    def _now(self, axle: int) -> np.ndarray:
+    def _state_by_filters(self, axle: int) -> np.ndarray:
         """x of an axle by the filters that it meets at that time (n, m)."""
         kept, given = expm(self._rate.T * self.step), self._driven(axle, self.step)
         return np.array(
             [
                 np.linalg.solve((np.eye(len(kept)) - grown * kept).T, row)
-                for grown, row in zip(self._grown, given, strict=True)
+                for grown, row in zip(self._motion_covariance, given, strict=True)
             ]
         )
 
     def _motions(self, i: int, j: int) -> np.ndarray:
         """x of axle i by x of axle j (n, n)."""
-        given = self._grown[:, None] * self._before(i, j)
-        given += (self._grown[:, None] * self._before(j, i)).conj().T
+        given = self._motion_covariance[:, None] * self._state_by_forces(i, j)
+        given += (self._motion_covariance[:, None] * self._state_by_forces(j, i)).conj().T
         given += sum(
-            B @ self._driven(j, share * self.step + self._late(j, i)).conj().T
-            for B, share in zip(self._moved(i), SHARES, strict=True)
+            B @ self._driven(j, share * self.step + self._axle_lag(j, i)).conj().T
+            for B, share in zip(self._input_matrix(i), SHARES, strict=True)
         )
-        return given / (1 - self._grown[:, None] * self._grown.conj())
+        return given / (1 - self._motion_covariance[:, None] * self._motion_covariance.conj())
 
-    def _before(self, i: int, j: int) -> np.ndarray:
+    def _state_by_forces(self, i: int, j: int) -> np.ndarray:
         """x of axle i at a step's begin by the forces of axle j in that step (n, n)."""
         return np.asarray(
             sum(
-                self._with_road(i, self._late(i, j) + share * self.step) @ B.conj().T
-                for B, share in zip(self._moved(j), SHARES, strict=True)
+                self._with_road(i, self._axle_lag(i, j) + share * self.step) @ B.conj().T
+                for B, share in zip(self._input_matrix(j), SHARES, strict=True)
             )
         )

@@ -39,10 +39,10 @@ class Bounces:
         """States (count + 1, 8) from the first (8,), every ``step`` seconds."""
         states = [np.append(start, 1.0)]
         for _ in range(count):
-            states.append(self._over(states[-1]))
+            states.append(self._state_after_step(states[-1]))
         return np.array(states)[:, :8]
 
-    def _over(self, x: np.ndarray) -> np.ndarray:
+    def _state_after_step(self, x: np.ndarray) -> np.ndarray:
         """The state (9,) a step later."""
         left, states = self.step, self._states(x)
         while True:

@@ -56,7 +56,7 @@ def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
     was = earlier["provenance"]
     old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
-    notes += [f"{name} {before} -> {now}" for name, before, now in _other(was, source)]
+    notes += [f"{name} {before} -> {now}" for name, before, now in _differing_environment(was, source)]
     return {
         "file": earlier["file"],
         "commit": str(was.get("commit", "unknown")),
@@ -65,7 +65,7 @@ def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
     }
 
 
-def _other(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
+def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
     """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
     for name in ("versions", "seeds"):
         old, new = was.get(name) or {}, source.get(name) or {}
@@ -86,7 +86,7 @@ def changes(before: dict[str, Saved], after: dict[str, Saved]) -> list[Change]:
     listed = [
         change
         for id in (*before, *(id for id in after if id not in before))
-        for change in _of(id, before.get(id), after.get(id))
+        for change in _changes_of_row(id, before.get(id), after.get(id))
     ]
     return sorted(listed, key=lambda entry: (KINDS.index(entry["kind"]), _rank(entry["after"]), -entry["size"]))
 
@@ -96,7 +96,7 @@ def _rank(status: Any) -> int:
     return STATUSES.index(status) if status in STATUSES else 0
 
 
-def _of(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
+def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
     row = new or old or {}
 
     def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
@@ -124,12 +124,12 @@ def _of(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
         yield change("value", old["value"], new["value"], size)
 
 
-def _number(value: Any) -> bool:
+def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _differ(old: Any, new: Any) -> bool:
-    if not (_number(old) and _number(new)):
+    if not (_is_number(old) and _is_number(new)):
         return old != new
     both_none = old != old and new != new  # neither is a number
     return not (both_none or old == new or abs(new - old) <= ROUNDING * max(abs(old), abs(new)))
@@ -140,9 +140,9 @@ def _size(old: Saved, new: Saved) -> float:
     was, now, tolerance = old["value"], new["value"], new["tolerance"]
     if not _differ(was, now):
         return 0.0
-    if not (_number(was) and _number(now)) or not abs(now - was) < float("inf"):
+    if not (_is_number(was) and _is_number(now)) or not abs(now - was) < float("inf"):
         return float("inf")
-    if tolerance and _number(tolerance):
+    if tolerance and _is_number(tolerance):
         share = abs(now - was) / tolerance
         return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE else share
     return abs(now - was) / max(abs(was), abs(now))
@@ -156,7 +156,7 @@ def lines(compared: Saved) -> list[str]:
     head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
     told = [
         f"  {change['kind']}: {change['id']}: {change['quantity']}: "
-        f"{_shown(change['before'])} -> {_shown(change['after'])}"
+        f"{_value_text(change['before'])} -> {_value_text(change['after'])}"
         f"{' ' + change['unit'] if change['kind'] == 'value' and change['unit'] else ''}"
         f"{': ' + change['reason'] if change['reason'] else ''}"
         for change in changed
@@ -164,5 +164,5 @@ def lines(compared: Saved) -> list[str]:
     return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *told]
 
 
-def _shown(value: Any) -> str:
-    return "-" if value is None else f"{value:.6g}" if _number(value) else str(value)
+def _value_text(value: Any) -> str:
+    return "-" if value is None else f"{value:.6g}" if _is_number(value) else str(value)

@@ -27,7 +27,7 @@ SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 
 
 def engine(name: str) -> Make:
-    """The unchanged engine by its name."""
+    """Return a function that builds an assembly in the engine of this name, without any planted fault."""
     return partial(build, name)
 
 
@@ -152,6 +152,6 @@ def by_hand(settings: Settings) -> Settings:
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
-def off(computed: Any, wanted: Any) -> float:
+def largest_relative_difference(computed: Any, wanted: Any) -> float:
     """Largest difference by the largest."""
     return float(np.abs(np.asarray(computed) - wanted).max() / np.abs(wanted).max())

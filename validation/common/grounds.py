@@ -42,14 +42,14 @@ class Grounds:
         """Take in a result that was judged."""
         if self.rested:
             self.breaches, self.rested, self.closed = [], False, False
-        self.part = _part()
+        self.part = _instruction_index()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED.get()
         for broken in broken_of(run):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY, "")))
 
     def rest(self, allowed: bool) -> str:
         """Text of the broken assumptions that the current row rests on, with or without leave."""
-        same_part = self.part == _part()
+        same_part = self.part == _instruction_index()
         self.rested, self.closed = True, self.closed or same_part
         return "" if self.closed and not same_part else self.told(allowed)
 
@@ -59,10 +59,10 @@ class Grounds:
         for each in self.breaches:
             if bool(each.why) == allowed:
                 by_name.setdefault(each.broken.name, []).append(each)
-        return "; ".join(_told(same) for same in by_name.values())
+        return "; ".join(_assumption_text(same) for same in by_name.values())
 
 
-def _told(same: list[Breach]) -> str:
+def _assumption_text(same: list[Breach]) -> str:
     worst = max(same, key=lambda each: each.broken.share)
     runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
     return f"{worst.broken.fact()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
@@ -88,7 +88,7 @@ def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
     return answer, "" if grounds.rested else grounds.told(allowed=False)
 
 
-def _part() -> int:
+def _instruction_index() -> int:
     """Index of the instruction of ``measure`` that is at work; ``measure`` may be decorated."""
     frame, outer = sys._getframe(), sys._getframe()
     while frame.f_back is not None and frame.f_code is not measured.__code__:

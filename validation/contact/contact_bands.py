@@ -17,7 +17,7 @@ from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.theories import Simplified
 from models.systems.contact.run import interpenetrating
-from models.systems.contact.work_precision import Case
+from models.systems.contact.work_precision import ContactCase
 from validation.contact.contact_set import FITTED, FRICTION, LOAD, read, read_drawn, read_wide
 
 CELLS = 101
@@ -62,7 +62,7 @@ class TheoryErrors:
         return TheoryErrors(*(getattr(self, part.name)[which] for part in fields(self)))
 
 
-def forces(name: str, cases: list[Case], cells: int) -> Array:
+def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
     """Force by mu N and moment by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or "simplified"."""
     axes, motions = _arrays(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
@@ -81,12 +81,12 @@ def forces(name: str, cases: list[Case], cells: int) -> Array:
     return moved / unit
 
 
-def _arrays(cases: list[Case]) -> tuple[Array, Array]:
+def _arrays(cases: list[ContactCase]) -> tuple[Array, Array]:
     """Semi-axes (2, n) and motions (3, n)."""
     return np.array([(c.a, c.b) for c in cases]).T, np.array([c.motion for c in cases]).T
 
 
-def groups(cases: list[Case]) -> Array:
+def groups(cases: list[ContactCase]) -> Array:
     """Number (n,) of the group of each contact, of which theories err in different ways: by Poisson's ratio, whether
     spin is against the lateral creepage, and whether the ellipse is longer across the rolling direction.
     """
@@ -94,7 +94,7 @@ def groups(cases: list[Case]) -> Array:
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
 
-def held(name: str, cases: list[Case], cells: int = CELLS) -> TheoryErrors:
+def held(name: str, cases: list[ContactCase], cells: int = CELLS) -> TheoryErrors:
     """A theory's forces, moments and errors."""
     answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays(cases)
@@ -119,10 +119,10 @@ def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[floa
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
     kinds = theory.spinning < 0.5, theory.spinning >= 0.5
-    return tuple([_largest(error, rows & some, theory.group) for some in within] for rows in kinds)
+    return tuple([_largest_quantile(error, rows & some, theory.group) for some in within] for rows in kinds)
 
 
-def _largest(error: Array, rows: Array, group: Array) -> float:
+def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
     """Largest quantile of a group with more than a few contacts; of all together where none has them."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
     told = [part for part in parts if part.size >= FEW] or [error[rows]]

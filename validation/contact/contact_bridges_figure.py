@@ -32,8 +32,8 @@ def figure(points: list[dict[str, Any]]) -> Figure:
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
     _laws(left, some)
-    _shares(middle, [(f"{NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS])
-    _shares(
+    _draw_stacked_shares(middle, [(f"{NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS])
+    _draw_stacked_shares(
         right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p) for p in best if p["main"]]
     )
     middle.set_title(f"Shares by law, {WHEELS} wheels")
@@ -75,7 +75,7 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
     axis.legend(fontsize=SMALL, loc="upper left", ncols=2)
 
 
-def _shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
+def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
     """A bar of 100 % for each; the parts of a bar are of its whole, none below zero."""
     labels, before = [label for label, _ in points], np.zeros(len(points))
     whole = np.array([sum(max(p[part], 0.0) for part, _, _ in PARTS) for _, p in points])

@@ -19,7 +19,7 @@ import numpy as np
 
 from models.contact.material import Material, Pair
 from models.systems.contact import work_precision
-from models.systems.contact.work_precision import Case, ellipse_cases, exact
+from models.systems.contact.work_precision import ContactCase, ellipse_cases, with_exact_forces
 
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 LEVELS = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)
@@ -48,27 +48,29 @@ ANSWERS = ("fx", "fy", "mz", "error")
 Ends = tuple[float, float]
 
 
-def cases() -> list[Case]:
+def cases() -> list[ContactCase]:
     """All contacts of the set, without their forces."""
     return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
 
 
-def drawn(part: int) -> list[Case]:
+def drawn(part: int) -> list[ContactCase]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
-    return _drawn(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
+    return _draw_contacts(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
 
 
-def wide(part: int) -> list[Case]:
+def wide(part: int) -> list[ContactCase]:
     """A part of the wide contacts, without their forces."""
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE[FITTED]) * part
     streams = enumerate(WIDE[part], first)
-    return [case for stream in streams for case in _drawn(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)]
+    return [
+        case for stream in streams for case in _draw_contacts(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)
+    ]
 
 
-def _drawn(
+def _draw_contacts(
     stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[Pair], absent: float = 0.0
-) -> list[Case]:
+) -> list[ContactCase]:
     """Contacts of a stream of numbers, of pairs in turn; each creepage is absent in a share of them, but never all."""
     rng = np.random.default_rng((SEED, stream))
     ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, sizes))
@@ -76,41 +78,41 @@ def _drawn(
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
     drawn = zip(ratio, level, parts, cycle(pairs), strict=False)
-    return [Case(*_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn]
+    return [ContactCase(*_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn]
 
 
 def _axes(ratio: float) -> tuple[float, float]:
     return SIZE * ratio**0.5, SIZE / ratio**0.5
 
 
-def read() -> list[Case]:
+def read() -> list[ContactCase]:
     """All contacts of the set with their forces."""
     return _read(FILE, cases())
 
 
-def read_drawn(part: int) -> list[Case]:
+def read_drawn(part: int) -> list[ContactCase]:
     """A part of the drawn contacts with their forces."""
     return _read(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
 
 
-def read_wide(part: int) -> list[Case]:
+def read_wide(part: int) -> list[ContactCase]:
     """A part of the wide contacts with their forces."""
     return _read(WIDE_FILE, wide(FITTED) + wide(JUDGED))[part * sum(WIDE[FITTED]) :][: sum(WIDE[part])]
 
 
-def _read(path: Path, asked: list[Case]) -> list[Case]:
+def _read(path: Path, asked: list[ContactCase]) -> list[ContactCase]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWERS} for row in rows]
     return [replace(case, **force) for case, force in zip(asked, forces, strict=True)]
 
 
-def write(path: Path, asked: list[Case]) -> None:
+def write(path: Path, asked: list[ContactCase]) -> None:
     """Compute the forces of all contacts asked for."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("ratio", "kind", "level", *ANSWERS))
-        for case in map(exact, asked):
+        for case in map(with_exact_forces, asked):
             numbers = (f"{getattr(case, name):.6f}" for name in ANSWERS)
             writer.writerow((round(case.a / case.b, 9), case.kind, round(case.level, 9), *numbers))
             file.flush()

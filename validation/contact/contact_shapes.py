@@ -44,19 +44,19 @@ class Shape:
     box: Box | None = None
 
 
-def _over(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
+def _shape_of_formula(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
     """A shape from a formula, its exact contact within -x..x and -y..y."""
     distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
     return Shape(name, distance, load, (-x, x, -y, y))
 
 
 def _hertz(name: str, ratio: float, x: float, y: float) -> Shape:
-    return _over(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
+    return _shape_of_formula(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
 
 
-def _well(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
+def _two_grooves(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
     """Two grooves ``half`` (m) to each side of the middle, a ridge (m) between, one of them ``tilt`` (m) higher."""
-    return _over(
+    return _shape_of_formula(
         name,
         lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2 + tilt * (v / half + 1.0) / 2.0,
         load,
@@ -72,17 +72,17 @@ def formulas() -> list[Shape]:
         _hertz("circle", 1.0, 0.0078, 0.0078),
         _hertz("ellipse, B/A = 5", 5.0, 0.0098, 0.0037),
         _hertz("ellipse, B/A = 1/5", 0.2, 0.0078, 0.0235),
-        _over("quartic in y", lambda u, v: CURVATURE * u**2 + 2e4 * v**4, 5e4, 0.0078, 0.0078),
-        _over("egg", lambda u, v: CURVATURE * u**2 + np.where(v > 0, 3.0, 0.7) * v**2, 5e4, 0.0072, 0.0088),
-        _over(
+        _shape_of_formula("quartic in y", lambda u, v: CURVATURE * u**2 + 2e4 * v**4, 5e4, 0.0078, 0.0078),
+        _shape_of_formula("egg", lambda u, v: CURVATURE * u**2 + np.where(v > 0, 3.0, 0.7) * v**2, 5e4, 0.0072, 0.0088),
+        _shape_of_formula(
             "two patches",
             lambda u, v: CURVATURE * u**2 + np.minimum(1.7 * (v - apart) ** 2, 1.7 * (v + apart) ** 2 + 5e-6),
             2e4,
             0.0058,
             0.0138,
         ),
-        _well("two grooves, apart", 1e-5, 1e4),
-        _well("two grooves, grown together", 1e-5, 1e5),
+        _two_grooves("two grooves, apart", 1e-5, 1e4),
+        _two_grooves("two grooves, grown together", 1e-5, 1e5),
     ]
 
 
@@ -103,7 +103,7 @@ def grown() -> list[Shape]:
         (10, 5, 80, 5),
     )
     shapes = [
-        _well(
+        _two_grooves(
             f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
             1e-6 * ridge,
             1e3 * load,
@@ -114,15 +114,17 @@ def grown() -> list[Shape]:
     ]
     return [
         *shapes,
-        _over(
+        _shape_of_formula(
             "two arcs that meet in an edge",
             lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2,
             6e4,
             0.012,
             0.012,
         ),
-        _over("two grooves along x", lambda u, v: 4.0 * v**2 + 6e-6 * ((u / 4e-3) ** 2 - 1.0) ** 2, 4e4, 0.011, 7.5e-3),
-        _over(
+        _shape_of_formula(
+            "two grooves along x", lambda u, v: 4.0 * v**2 + 6e-6 * ((u / 4e-3) ** 2 - 1.0) ** 2, 4e4, 0.011, 7.5e-3
+        ),
+        _shape_of_formula(
             "three grooves",
             lambda u, v: (
                 CURVATURE * u**2

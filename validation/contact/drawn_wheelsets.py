@@ -56,11 +56,13 @@ def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
     speeds: dict[str, float | None] = {}
     for engine in IMPLEMENTATIONS:
         of, first = partial(growth, implementation(engine)), speeds.get("reference")
-        speeds[engine] = _near(partial(of, wheelset), first) if near and first else critical_or_why(wheelset, of)[0]
+        speeds[engine] = (
+            _critical_speed_near(partial(of, wheelset), first) if near and first else critical_or_why(wheelset, of)[0]
+        )
     return speeds
 
 
-def _near(growth: Callable[[float], float], speed: float) -> float:
+def _critical_speed_near(growth: Callable[[float], float], speed: float) -> float:
     """The critical speed (m/s) within AROUND of another; an end of that, or a lower speed, where it is not in it."""
     low, high = (1.0 - AROUND) * speed, (1.0 + AROUND) * speed
     for below in np.geomspace(LOWEST_SPEED, low, BELOW):

@@ -37,7 +37,7 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
         "bound": (partial(_bound, values, REPEATS), marched),
         "plain": (partial(_plain, blocks, cells, REPEATS), marched),
-        "second": (partial(_second, blocks, cells, REPEATS), marched),
+        "second": (partial(_repeat_second_order, blocks, cells, REPEATS), marched),
         **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
         **{
             f"many {march}": (partial(fastsim, many, pair, march=march), CONTACTS * CELLS * (CELLS + 1))
@@ -112,6 +112,6 @@ def _plain(blocks, cells, repeats):
 
 
 @compiled
-def _second(blocks, cells, repeats):
+def _repeat_second_order(blocks, cells, repeats):
     for _ in range(repeats):
         march_second_order(blocks[0], cells)

@@ -78,24 +78,24 @@ def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) ->
     def unlike(name: str) -> float:
         factors, sizes = ALIKE[name]
         changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
-        return _most(np.abs(forces - relative(fastsim(RollingEllipse(**changed), pair, **options), sizes)))
+        return _largest_finite(np.abs(forces - relative(fastsim(RollingEllipse(**changed), pair, **options), sizes)))
 
     forces = relative(creep, (1.0, 1.0, 1.0))
     return {
         "finite": 0.0 if all(np.isfinite(values).all() for values in vars(creep).values()) else np.inf,
-        "bound": _most(np.hypot(forces[0], forces[1]) - 1.0),
-        "moment": _most((np.abs(creep.mz) - most_moment(columns, **net)) / (least * arm)),
-        "limit": _most((creep.dissipation - most_power(columns, **net)) / power),
+        "bound": _largest_finite(np.hypot(forces[0], forces[1]) - 1.0),
+        "moment": _largest_finite((np.abs(creep.mz) - most_moment(columns, **net)) / (least * arm)),
+        "limit": _largest_finite((creep.dissipation - most_power(columns, **net)) / power),
         "reversal": unlike("reversal"),
         "mirror": unlike("mirror"),
-        "power": _most(-creep.dissipation / power),
-        "zero": _most(np.abs(forces[:, still])),
+        "power": _largest_finite(-creep.dissipation / power),
+        "zero": _largest_finite(np.abs(forces[:, still])),
         "similarity": unlike("similarity"),
-        "stick": _most(np.abs(creep.stick - 0.5) - 0.5),
+        "stick": _largest_finite(np.abs(creep.stick - 0.5) - 0.5),
     }
 
 
-def _most(values: Array) -> float:
+def _largest_finite(values: Array) -> float:
     """The largest value, infinite if one is none; 0 if there are none, or all are below."""
     if not values.size:
         return 0.0

@@ -94,7 +94,7 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
             before, sunk = forces, forces[::-1] / (math.pi * contact.pair.modulus * away)
             forces = np.array(
                 [
-                    _alone(touch.patch.distance, approach * cosine - by, contact.pair)
+                    _load_of_patch(touch.patch.distance, approach * cosine - by, contact.pair)
                     for touch, cosine, by in zip(touches, cosines, sunk, strict=True)
                 ]
             )
@@ -105,7 +105,7 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
     return [float(force) for force in pressed(approach)]
 
 
-def _alone(distance: Distance, approach: float, pair: Pair) -> float:
+def _load_of_patch(distance: Distance, approach: float, pair: Pair) -> float:
     x, s = centres(60, 2e-4), centres(70, 1e-4)
     heights = distance.at(x[None, :], s[:, None])
     return solve_normal(heights, 2e-4, 1e-4, pair, approach=approach).load if heights.min() < approach else 0.0

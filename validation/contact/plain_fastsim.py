@@ -35,7 +35,7 @@ def constant(slip: float) -> float:
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class PlainEllipse:
     """One ellipse that rolls: a, b (m), load (N), mu, xi_x, xi_y, spin (1/m), flexibilities along x, y and in spin
     (m^3/N)."""
 
@@ -123,7 +123,7 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
     return along, across, max(math.pi * a * math.sqrt(a / b) / (4.0 * shear * c23), least)
 
 
-def stiffnesses(ellipse: Ellipse, peak: float, kind: str) -> Array:
+def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
     """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
     three, creep = 1.0 / np.array(ellipse.flexible), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
     if kind == "three" or not creep.any():
@@ -132,10 +132,10 @@ def stiffnesses(ellipse: Ellipse, peak: float, kind: str) -> Array:
         return np.full(3, np.linalg.norm(creep) / (np.abs(creep) @ ellipse.flexible))
     square = creep**2
     mean = square.sum() / (square @ ellipse.flexible)
-    return three + _part(ellipse, creep * ellipse.a * three / peak) * (mean - three)
+    return three + _flexibility_share(ellipse, creep * ellipse.a * three / peak) * (mean - three)
 
 
-def _part(ellipse: Ellipse, reach: Array) -> float:
+def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
     """Part of the one flexibility by the reach of the three creepages (3,)."""
     x, y, z = reach
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
@@ -146,7 +146,7 @@ def _part(ellipse: Ellipse, reach: Array) -> float:
     return 1.0 - math.exp(-begun - slides**3)
 
 
-def fastsim(ellipse: Ellipse, program: Program, left: Left = constant) -> tuple[Array, Array]:
+def fastsim(ellipse: PlainEllipse, program: Program, left: Left = constant) -> tuple[Array, Array]:
     """fx, fy (N), mz (N m), share of the area that sticks (4,), and the tractions of all cells (strips, cells), complex
     (Pa)."""
     a, b, n, power = ellipse.a, ellipse.b, program.cells, POWERS[program.bound]
@@ -165,7 +165,7 @@ def fastsim(ellipse: Ellipse, program: Program, left: Left = constant) -> tuple[
 
 
 def _strip(
-    ellipse: Ellipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
+    ellipse: PlainEllipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
 ) -> tuple[list[complex], list[bool]]:
     """Tractions of one strip at y with a half length (m) from the leading edge back, and whether each cell slips."""
     (y, half), n, power = place, program.cells, POWERS[program.bound]
@@ -187,7 +187,7 @@ def _strip(
         if abs(trial) <= bound(x):
             p, slipping = trial, False
         elif turns and slipping and i > 0:
-            p = bound(x) * _turned(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
+            p = bound(x) * _direction_after_step(p, rigid, k[2] * ellipse.spin, dx, bound(middle))
         else:
             p, slipping = bound(x) * trial / abs(trial), True
         tractions.append(p)
@@ -195,7 +195,7 @@ def _strip(
     return tractions, slips
 
 
-def _turned(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
+def _direction_after_step(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
     """Direction of a slipping traction after a step dx; rigid : slip by flexibility in the step's middle, ``turning``
     its lateral part's change per m of x, bound : Pa there.
 

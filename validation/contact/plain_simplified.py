@@ -19,7 +19,7 @@ from models.contact.half_space import Z, influence, offsets
 from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.simplified_kernels import FINER, LEAST
-from models.contact.simplified_theory import Options
+from models.contact.simplified_theory import SimplifiedOptions
 
 Box = tuple[float, float, float, float]
 
@@ -30,12 +30,12 @@ def hermite(nodes: Array, padded: Array) -> CubicHermiteSpline:
 
 
 def continued(rows: Array) -> Array:
-    """Rows with one more before and after, on the parabola through the three nearest."""
+    """Rows with an extra row at each end, extrapolated by the parabola through the three outermost."""
     return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
+class PlainBodies:
     """Undeformed distance: nodes x (nx,) and y (ny,), heights (ny, nx) and its lowest point (m)."""
 
     x: Array
@@ -66,12 +66,12 @@ class Bodies:
     def valleys(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """Along x and along y: lines, two for each spacing and one through the bottom, and the root of the least
         distance on each over the bottom."""
-        swapped = Bodies(self.y, self.x, self.height.T, self.bottom[::-1])
+        swapped = PlainBodies(self.y, self.x, self.height.T, self.bottom[::-1])
         return swapped._valley(), self._valley()
 
     def _valley(self) -> tuple[Array, Array]:
         lines = np.linspace(self.y[0], self.y[-1], 2 * self.y.size - 1)
-        least = np.array([_least(self.line(y)) for y in lines])
+        least = np.array([_lowest_value(self.line(y)) for y in lines])
         order = np.argsort(np.append(lines, self.bottom[1]), kind="stable")
         roots = np.append(np.sqrt(np.maximum(least - self.low, 0.0)), 0.0)
         return np.append(lines, self.bottom[1])[order], roots[order]
@@ -86,7 +86,7 @@ class Bodies:
         return ends[0], ends[1], ends[2], ends[3]
 
 
-def _least(line: CubicHermiteSpline) -> float:
+def _lowest_value(line: CubicHermiteSpline) -> float:
     """Least value of a spline within its nodes."""
     turning = line.derivative().roots(extrapolate=False)
     return float(min(line(line.x).min(), line(turning[np.isfinite(turning)]).min(initial=np.inf)))
@@ -97,7 +97,7 @@ def middles(low: float, high: float, count: int) -> Array:
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
-def overlap(depth: float, low: float, height: Array, options: Options) -> Array:
+def overlap(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
     """W times the pressure (m) at heights (m)."""
     over = np.maximum(depth - height, 0.0)
     return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
@@ -111,7 +111,7 @@ def spread(values: Array, step: tuple[float, float], pair: Pair, parts: Array) -
 
 
 @dataclass(frozen=True)
-class Pressed:
+class PlainPatch:
     """One patch at a depth: W times the load (m^3), stiffness 1/W (Pa/m), approach and box (m), covered shares."""
 
     depth: float
@@ -127,7 +127,7 @@ class Pressed:
         return self.stiffness * self.volume
 
 
-def at_depth(bodies: Bodies, depth: float, pair: Pair, options: Options) -> Pressed:
+def at_depth(bodies: PlainBodies, depth: float, pair: Pair, options: SimplifiedOptions) -> PlainPatch:
     """The fit on the crude net."""
     box, n = bodies.box(depth), options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
@@ -140,11 +140,11 @@ def at_depth(bodies: Bodies, depth: float, pair: Pair, options: Options) -> Pres
     approach = float(np.average(stiffness * u + height, weights=pressure))
     m = FINER * n
     fine = overlap(depth, bodies.low, bodies.at(middles(*box[:2], m), middles(*box[2:], m))[0], options)
-    return Pressed(depth, float(fine.sum() * step[0] * step[1] / FINER**2), stiffness, approach, box, cover)
+    return PlainPatch(depth, float(fine.sum() * step[0] * step[1] / FINER**2), stiffness, approach, box, cover)
 
 
 def fitted(
-    u: Array, p: Array, cover: Array, step: tuple[float, float], options: Options, by_height: bool = False
+    u: Array, p: Array, cover: Array, step: tuple[float, float], options: SimplifiedOptions, by_height: bool = False
 ) -> float:
     """Slope of u (k, n, n) against p by weighted least squares of all k, or of their slopes; ``by_height``: that of p
     against u, by differences along y too."""
@@ -164,7 +164,7 @@ def fitted(
     return float(squares / products if by_height else products / squares)
 
 
-def press(bodies: Bodies, approach: float, pair: Pair, options: Options) -> Pressed:
+def press(bodies: PlainBodies, approach: float, pair: Pair, options: SimplifiedOptions) -> PlainPatch:
     """The patch at a rigid approach (m)."""
     over = approach - bodies.low
 
@@ -185,7 +185,7 @@ class Strips:
     pressure: Array
 
 
-def strips(bodies: Bodies, pressed: Pressed, cells: int, options: Options) -> Strips:
+def strips(bodies: PlainBodies, pressed: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
     """Strips between the places where the distance passes the depth; one too short to hold a node or the middle
     between two nodes is none, as the package looks there for contact."""
     box, ends = pressed.box, []
@@ -235,7 +235,7 @@ def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
     return np.array([mean.real, mean.imag])
 
 
-def refitted(pressed: Pressed, net: Strips, tractions: Array, pair: Pair, options: Options) -> float:
+def refitted(pressed: PlainPatch, net: Strips, tractions: Array, pair: Pair, options: SimplifiedOptions) -> float:
     """W_1 = W_2 (m/Pa) of the tractions of a march."""
     n, box = options.net, pressed.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
@@ -250,13 +250,13 @@ def _common(low: Array, high: Array, edges: Array) -> Array:
 
 
 def roll(
-    bodies: Bodies,
-    pressed: Pressed,
+    bodies: PlainBodies,
+    pressed: PlainPatch,
     mu: float,
     motion: tuple[float, float, float],
     pair: Pair,
     cells: int,
-    options: Options,
+    options: SimplifiedOptions,
 ) -> tuple[Array, float]:
     """fx, fy (N), mz (N m) and the share of the area that sticks (4,), and W_1 (m/Pa)."""
     net = strips(bodies, pressed, cells, options)

@@ -11,29 +11,29 @@ from models.contact.simplified_theory import CELLS, PAPER, NormalContact, Rollin
 from models.machine.seconds import cost
 from models.machine.timing import interleave
 from models.systems.contact.run import interpenetrating
-from models.systems.contact.work_precision import Case
+from models.systems.contact.work_precision import ContactCase
 from validation.common.rows import Table
 
 ROUNDS = 5
 """Of timing."""
 
 
-def compare(cases: list[Case]) -> dict[str, Any]:
+def compare(cases: list[ContactCase]) -> dict[str, Any]:
     """Errors of both programs by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one evaluation."""
-    pressed = {(c.a, c.b): _pressed(c) for c in cases}
+    pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
-    def old(case: Case) -> Creep:
+    def old(case: ContactCase) -> Creep:
         return fastsim(RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **OLD)
 
-    def new(case: Case) -> Rolling:
+    def new(case: ContactCase) -> Rolling:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)
 
-    def error(case: Case, forces: Creep | Rolling) -> float:
+    def error(case: ContactCase, forces: Creep | Rolling) -> float:
         return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
 
     errors = {"1982": [error(case, old(case)) for case in cases], "1983": [error(case, new(case)) for case in cases]}
     normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
-    ways = {"1982": old, "press": _pressed, "1983": new}
+    ways = {"1982": old, "press": _normal_contact, "1983": new}
     jobs = [partial(way, cases[len(cases) // 2]) for way in ways.values()]
     seconds = dict(zip(ways, interleave(jobs, ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
@@ -43,11 +43,11 @@ OLD: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one",
 """The program of 1982, on as many cells as the fine net of the other one has."""
 
 
-def _pressed(case: Case) -> NormalContact:
+def _normal_contact(case: ContactCase) -> NormalContact:
     return interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
 
 
-def _normal(case: Case, pressed: NormalContact) -> dict[str, float]:
+def _normal(case: ContactCase, pressed: NormalContact) -> dict[str, float]:
     """Relative errors of approach, area and largest pressure."""
     hertz = by_axes(case.a, case.b, case.pair, load=case.load)
     exact = {"approach": float(hertz.approach), "area": np.pi * case.a * case.b, "peak": float(hertz.p0)}

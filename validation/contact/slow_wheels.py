@@ -24,7 +24,7 @@ STEPS = {1.0: (1e-3, 2e-3, 4e-3), 0.1: (1e-3, 4e-3), 0.05: (1e-3, 4e-3), 0.0: (1
 
 
 @dataclass(frozen=True)
-class Run:
+class SlowWheelsRun:
     """One run: its method, step (s), steps, force calls, and its error by what is left of the displacements."""
 
     speed: float
@@ -64,7 +64,7 @@ def longest(speed: float) -> float:
     return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
 
 
-def runs(speed: float, steps: tuple[float, ...]) -> list[Run]:
+def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
     """The explicit run at nearly its longest step, against one of half of it, and implicit ones of some steps (s)."""
     coarse = int(np.ceil(1.05 * DURATION / longest(speed)))
     true, _ = march(speed, "RK44", 2 * coarse)
@@ -72,11 +72,11 @@ def runs(speed: float, steps: tuple[float, ...]) -> list[Run]:
     for method, count in [("RK44", coarse)] + [(name, round(DURATION / step)) for name in METHODS for step in steps]:
         end, calls = march(speed, method, count)
         error = float(np.abs(end - true).max() / np.abs(true).max())
-        done.append(Run(speed, method, DURATION / count, count, calls, error))
+        done.append(SlowWheelsRun(speed, method, DURATION / count, count, calls, error))
     return done
 
 
-def rows(quick: bool) -> tuple[list[Row], list[Run]]:
+def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
     """Implicit steps at 1 m/s beside explicit ones, and what is said where none can be taken."""
     done = runs(1.0, (MORE * longest(1.0), *(() if quick else STEPS[1.0])))
     if not quick:

@@ -111,7 +111,7 @@ def _error(setting: Setting) -> float:
 
 
 @cache
-def _least(tolerance: float) -> int:
+def _fewest_calls(tolerance: float) -> int:
     """Fewest calls with which any setting holds the tolerance: all are run."""
     swing = Swing()
     return min(
@@ -122,7 +122,7 @@ def _least(tolerance: float) -> int:
     )
 
 
-def _found(tolerance: float) -> Recommendation:
+def _choice_for(tolerance: float) -> Recommendation:
     with ExitStack() as patched:
         for module in (recommendation, search, truth):
             patched.enter_context(patch.object(module, "time", CLOCK))
@@ -130,48 +130,56 @@ def _found(tolerance: float) -> Recommendation:
         return recommendation.recommend(Swing(), tolerance)
 
 
-def _worst(size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)) -> float:
+def _largest_winner(
+    size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)
+) -> float:
     """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
     return max(
         max(
-            (size(choice, tolerance) for (_, by), choice in _found(tolerance).winners.items() if by.startswith(kind)),
+            (
+                size(choice, tolerance)
+                for (_, by), choice in _choice_for(tolerance).winners.items()
+                if by.startswith(kind)
+            ),
             default=math.inf,
         )
         for tolerance in asked
     )
 
 
-def _held(choice: SettingChoice, tolerance: float) -> float:
+def _error_by_tolerance(choice: SettingChoice, tolerance: float) -> float:
     return _error(choice.tried.setting) / tolerance
 
 
-def _told(choice: SettingChoice, tolerance: float) -> float:
+def _log_error_ratio(choice: SettingChoice, tolerance: float) -> float:
     return abs(math.log(max(choice.error, 1e-300) / min(_error(choice.tried.setting), 1e300)))
 
 
-def _dear(choice: SettingChoice, tolerance: float) -> float:
-    return choice.calls / _least(tolerance) - 1.0
+def _excess_calls(choice: SettingChoice, tolerance: float) -> float:
+    return choice.calls / _fewest_calls(tolerance) - 1.0
 
 
 CHECKS = {
-    "held": Check("true error by the tolerance", "", 1.0, lambda: _worst(_held)),
-    "told": Check("logarithm of predicted by true error", "", 0.1, lambda: _worst(_told, "", (LOOSE, TIGHT))),
+    "held": Check("true error by the tolerance", "", 1.0, lambda: _largest_winner(_error_by_tolerance)),
+    "told": Check(
+        "logarithm of predicted by true error", "", 0.1, lambda: _largest_winner(_log_error_ratio, "", (LOOSE, TIGHT))
+    ),
     "calls": Check(
         "force calls beyond the fewest that hold the tolerance",
         "",
         1e-12,
-        lambda: _worst(_dear, "calls", (LOOSE, TIGHT)),
+        lambda: _largest_winner(_excess_calls, "calls", (LOOSE, TIGHT)),
     ),
     "seconds": Check(
         "the same of the setting recommended by seconds, where a call costs the same in all",
         "",
         recommendation.SLOWER - 1.0,
-        lambda: _worst(_dear, "seconds"),
+        lambda: _largest_winner(_excess_calls, "seconds"),
     ),
 }
 
 
-def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
+def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
     return attribute(f"models.advice.price.{module}:{name}", change)
 
 
@@ -189,7 +197,7 @@ def _by_error(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoi
     return min(timed, key=lambda choice: choice.error, default=None)
 
 
-def _dearest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
+def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
     return max(timed, key=lambda choice: choice.calls, default=None)
 
 
@@ -208,27 +216,41 @@ def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, r
 
 
 FAULTS = (
-    Fault("predicted error a tenth of what was measured", "recommendation", _in("_resolved", _tenth)),
-    Fault("the most accurate setting wins, not the cheapest", "recommendation", _in("_cheapest", lambda _: _by_error)),
-    Fault("the dearest setting wins", "recommendation", _in("_cheapest", lambda _: _dearest)),
+    Fault("predicted error a tenth of what was measured", "recommendation", _in_module("_resolved", _tenth)),
+    Fault(
+        "the most accurate setting wins, not the cheapest",
+        "recommendation",
+        _in_module("_cheapest", lambda _: _by_error),
+    ),
+    Fault("the dearest setting wins", "recommendation", _in_module("_cheapest", lambda _: _dearest_choice)),
     Fault(
         "the engine's default dropped from the race",
         "recommendation",
-        _in("_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default]),
+        _in_module(
+            "_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default]
+        ),
     ),
-    Fault("the default kept whatever it costs", "recommendation", _in("_slower", lambda _: lambda one, best: False)),
+    Fault(
+        "the default kept whatever it costs", "recommendation", _in_module("_slower", lambda _: lambda one, best: False)
+    ),
     Fault(
         "judged over the part that is searched alone",
         "recommendation",
-        _in("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners)),
+        _in_module("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners)),
     ),
-    Fault("mean difference for the largest", "truth", _in("Truth.error", lambda _: _mean, "truth")),
-    Fault("what is no number left out of the error", "truth", _in("Truth.error", lambda _: _numbers_alone, "truth")),
-    Fault("the reference's first step taken for the truth", "truth", _in("_settled", lambda _: _first_rung, "truth")),
+    Fault("mean difference for the largest", "truth", _in_module("Truth.error", lambda _: _mean, "truth")),
+    Fault(
+        "what is no number left out of the error", "truth", _in_module("Truth.error", lambda _: _numbers_alone, "truth")
+    ),
+    Fault(
+        "the reference's first step taken for the truth",
+        "truth",
+        _in_module("_settled", lambda _: _first_rung, "truth"),
+    ),
     Fault(
         "a tolerance three times too wide",
         "search",
-        _in("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+        _in_module("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
     ),
 )
 

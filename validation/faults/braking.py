@@ -45,11 +45,11 @@ LEVEL = stops.steady(stops.FRONT, DRY, 0.004)[1]
 
 def _light() -> float:
     """Quarter vehicle, light braking on dry road: way against the exact one."""
-    return abs(stops.stop(stops.FRONT, stops.met("dry"), LEVEL, 11.11).distance / _way() - 1.0)
+    return abs(stops.stop(stops.FRONT, stops.met("dry"), LEVEL, 11.11).distance / _exact_distance() - 1.0)
 
 
 @cache
-def _way() -> float:
+def _exact_distance() -> float:
     """The exact stopping distance (m)."""
     return exact(stops.FRONT, DRY, LEVEL, 11.11)
 
@@ -104,7 +104,7 @@ def _nodes() -> float:
     return float(np.abs(np.interp(DRY.slips, tables.slips, tables.mu_x[0, 0, 0]) - DRY.mu_x[0, 0]).max())
 
 
-def _settled() -> float:
+def _distance_at_steady_slip() -> float:
     """Quarter vehicle at a slip that stays: way against m v^2 / (2 F), as in the hard case of that name."""
     return float(wheels.steady(wheels.DRY, 0.02)("reference", Path()))
 
@@ -118,7 +118,9 @@ def _code() -> float:
 
 CHECKS = {
     "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light),
-    "slip that stays": Check("stopping distance at a slip that stays, closed form", "relative", 1e-6, _settled),
+    "slip that stays": Check(
+        "stopping distance at a slip that stays, closed form", "relative", 1e-6, _distance_at_steady_slip
+    ),
     "code": Check("largest error of converted signals, half a code", "relative", 1e-3, _code),
     "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _transfer),
     "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split),
@@ -146,7 +148,7 @@ def _brakes(change: Callable[[Any], Any]) -> Patch:
     return attribute("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
 
 
-def _literal(real: Any) -> Any:
+def _force_of_step_start(real: Any) -> Any:
     """The vehicle driven by the force of the start of each step."""
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
@@ -184,7 +186,11 @@ def _one_bit_less(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("force of the start of the step", "step", attribute("validation.braking.quarter_stops:stop", _literal)),
+    Fault(
+        "force of the start of the step",
+        "step",
+        attribute("validation.braking.quarter_stops:stop", _force_of_step_start),
+    ),
     Fault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
     Fault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
     Fault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),

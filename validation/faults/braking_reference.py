@@ -80,23 +80,23 @@ def _rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
     return handling.numbers[begin : begin + width * rows].reshape(rows, width)
 
 
-def _parts(handling: Handling) -> np.ndarray:
+def _rows_of_parts(handling: Handling) -> np.ndarray:
     return _rows(handling, at.OF_PARTS, at.PARTS, PER_PART)
 
 
 def _exchanged(handling: Handling) -> None:
     """Stiffness and damping of the first spring."""
-    first = _parts(handling)[0]
+    first = _rows_of_parts(handling)[0]
     first[[STIFFNESS, DAMPING]] = first[[DAMPING, STIFFNESS]]
 
 
 def _without_bars(handling: Handling) -> None:
-    _parts(handling)[len(handling.vehicle.springs) :, STIFFNESS] = 0.0
+    _rows_of_parts(handling)[len(handling.vehicle.springs) :, STIFFNESS] = 0.0
 
 
 def _neighbour(handling: Handling) -> None:
     """Parts read from one row too late."""
-    parts = _parts(handling)
+    parts = _rows_of_parts(handling)
     parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
 
 
@@ -113,11 +113,11 @@ def _damped_tyre(handling: Handling) -> None:
 
 
 def _smooth(handling: Handling) -> None:
-    _parts(handling)[:, FRICTION] = 0.0
+    _rows_of_parts(handling)[:, FRICTION] = 0.0
 
 
 def _straight(handling: Handling) -> None:
-    _parts(handling)[:, ON_TRAVEL] = 0.0
+    _rows_of_parts(handling)[:, ON_TRAVEL] = 0.0
 
 
 def _dragged(handling: Handling) -> None:
@@ -222,7 +222,7 @@ def _quick_valves(real: Any) -> Any:
     return planted
 
 
-def _longer(real: Any) -> Any:
+def _longer_relaxation(real: Any) -> Any:
     """Relaxation lengths 1 % too long."""
     return lambda state, time, steer, slope, length, lag: real(state, time, steer, slope, 1.01 * length, lag)
 
@@ -274,7 +274,7 @@ FAULTS = (
     Fault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
     Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
     Fault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
-    Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer)),
+    Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer_relaxation)),
 )
 
 CAMPAIGN = Campaign("planted.braking_reference", "braking on the suspension", "anti-lock", CHECKS, FAULTS)

@@ -19,7 +19,7 @@ SYSTEM: System = "hard-cases"
 
 @dataclass(frozen=True)
 class Check:
-    """measure() -> size; what exceeds ``tolerance`` is seen."""
+    """A check by which faults are looked for: it sees a fault if ``measure()`` exceeds ``tolerance``."""
 
     title: str
     unit: str
@@ -57,9 +57,15 @@ class Campaign:
         """Size over tolerance of every check, without a fault first and then with each, or with every such one."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
         planted = self.faults[::every]
-        return [clean, *({"fault": fault.name, "place": fault.place, "ratios": self._with(fault)} for fault in planted)]
+        return [
+            clean,
+            *(
+                {"fault": fault.name, "place": fault.place, "ratios": self._ratios_with_fault(fault)}
+                for fault in planted
+            ),
+        ]
 
-    def _with(self, fault: Fault) -> dict[str, float]:
+    def _ratios_with_fault(self, fault: Fault) -> dict[str, float]:
         with fault.inside()():
             return self._ratios()
 
@@ -69,13 +75,15 @@ class Campaign:
     def rows(self, records: list[Record]) -> list[Row]:
         """Caught, false alarms, and what one check alone catches."""
         clean, *faulty = records
-        single = [f"{record['fault']} ({seen(record)[0]})" for record in faulty if len(seen(record)) == 1]
+        single = [
+            f"{record['fault']} ({seeing_checks(record)[0]})" for record in faulty if len(seeing_checks(record)) == 1
+        ]
         return [
             Observed(
                 f"{self.id}.caught",
                 SYSTEM,
                 f"faults planted in {self.what} that a check catches",
-                sum(bool(seen(record)) for record in faulty),
+                sum(bool(seeing_checks(record)) for record in faulty),
                 "faults",
             ).within(
                 len(faulty),
@@ -87,7 +95,7 @@ class Campaign:
                 f"{self.id}.false_alarms",
                 SYSTEM,
                 f"alarms of the checks of {self.what} without a fault",
-                len(seen(clean)),
+                len(seeing_checks(clean)),
                 "alarms",
             ).within(0, 0, "a check that cries without a fault is no check", "native"),
             Observed(
@@ -106,7 +114,7 @@ class Campaign:
                 record["fault"],
                 record["place"],
                 self._sizes(record),
-                ", ".join(name for name in self.checks if name not in seen(record)),
+                ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
             for record in records[1:]
         )
@@ -126,16 +134,18 @@ class Campaign:
                 self.system,
                 self.what,
                 record["fault"],
-                ", ".join(seen(record)) or "none",
-                ", ".join(name for name in self.checks if name not in seen(record)),
+                ", ".join(seeing_checks(record)) or "none",
+                ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
             for record in records[1:]
         ]
 
     def _sizes(self, record: Record) -> str:
-        return ", ".join(f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seen(record))
+        return ", ".join(
+            f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seeing_checks(record)
+        )
 
 
-def seen(record: Record) -> list[str]:
+def seeing_checks(record: Record) -> list[str]:
     """Checks that see a fault."""
     return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]

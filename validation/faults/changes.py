@@ -13,7 +13,7 @@ from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
 Change = Callable[[Assembly], Assembly]
 
 
-def same(assembly: Assembly) -> Assembly:
+def unchanged(assembly: Assembly) -> Assembly:
     """No change."""
     return assembly
 
@@ -43,13 +43,14 @@ def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
     return vehicle(changed)
 
 
-def moved(place: Callable[[float, float, float], float]) -> Change:
+def with_moved_points(place: Callable[[float, float, float], float]) -> Change:
     """Suspension points and axles at place(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
         p, changed_vehicle = assembly.parameters, assembly.vehicle
         held = tuple(
-            replace(strut, upper=_at(strut.upper, place(strut.upper.x, p.a, p.b))) for strut in changed_vehicle.struts
+            replace(strut, upper=_point_moved_to(strut.upper, place(strut.upper.x, p.a, p.b)))
+            for strut in changed_vehicle.struts
         )
         axles = tuple(replace(axle, x=place(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
         return replace(assembly, vehicle=replace(changed_vehicle, struts=held, axles=axles))
@@ -57,7 +58,7 @@ def moved(place: Callable[[float, float, float], float]) -> Change:
     return changed
 
 
-def _at(point: Point, x: float) -> Point:
+def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
@@ -123,7 +124,7 @@ class Altered:
     """A signal read ``late`` (s) and passed through ``change``, values (n, channels) -> values."""
 
     signal: Any
-    late: float = 0.0
+    with_late_input: float = 0.0
     change: Values = field(default=lambda values: values)
 
     def __getattr__(self, name: str) -> Any:
@@ -155,13 +156,13 @@ class OtherTrack(Altered):
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, 4)."""
-        return self.signal.sample(start, step, count) + self._beside().sample(start, step, count)
+        return self.signal.sample(start, step, count) + self._other_profile().sample(start, step, count)
 
     def at(self, time: float) -> np.ndarray:
         """Road at one time (s), shape (4,): heights under the front and the rear wheel (m), then their rates (m/s)."""
-        return self.signal.at(time) + self._beside().at(time)
+        return self.signal.at(time) + self._other_profile().at(time)
 
-    def _beside(self) -> Any:
+    def _other_profile(self) -> Any:
         return replace(self.signal, profile=iso8608_road("A", 1))
 
 
@@ -217,7 +218,7 @@ def moment(periods: float, change: Values = lambda values: values) -> Change:
     return changed
 
 
-def late(periods: float, step: float = 1e-3) -> Change:
+def with_late_input(periods: float, step: float = 1e-3) -> Change:
     """Input late by a part of its sampling period, or of a step of 1 ms where it has none."""
     return driven(("road", "force", "pitch"), lambda signal: Altered(signal, periods * (signal.period or step)))
 

@@ -17,7 +17,7 @@ from models.advice.ride_choice.choose import Chooser as LinearChooser
 from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import Asked
-from validation.choice.drawn_scenes import drawn as drawn_run
+from validation.choice.drawn_scenes import draw_scene as drawn_run
 from validation.choice.judged import JudgedByRuns, asked, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import attribute
@@ -73,8 +73,8 @@ def _variances() -> float:
     return float(np.abs(by_frequency - choice.confirmed).max())
 
 
-def _kept() -> float:
-    """Change by frequency of what is reported as kept, by the tolerance that was asked for."""
+def _reported_change() -> float:
+    """Largest change of the quantities reported as within tolerance, by frequency, divided by the tolerance."""
     choice, by_frequency, _ = _by_frequency()
     return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear().tolerance
 
@@ -87,7 +87,7 @@ def _predicted() -> float:
     return float(np.nan_to_num(octaves, nan=np.inf))
 
 
-def _nearby() -> float:
+def _unreported_change() -> float:
     """Largest change at random speeds and parameters, by the largest one that is reported."""
     choice, _, nearby = _by_frequency()
     return nearby / float(np.abs(choice.off).max())
@@ -107,9 +107,9 @@ def _runs_kept() -> float:
 
 CHECKS = {
     "frequencies": Check("quarter car: confirmed changes, spectra summed", "of a deviation", 1e-6, _variances),
-    "tolerance": Check("quarter car: its change by the tolerance asked for", "times", 1.01, _kept),
+    "tolerance": Check("quarter car: its change by the tolerance asked for", "times", 1.01, _reported_change),
     "predictions": Check("quarter car: predictions by the changes", "octaves", 1.0, _predicted),
-    "nearby": Check("quarter car: its change nearby by the largest one reported", "times", 1.01, _nearby),
+    "nearby": Check("quarter car: its change nearby by the largest one reported", "times", 1.01, _unreported_change),
     "two runs": Check("half car: confirmed changes, run once more", "of a deviation", 1e-9, _runs),
     "tolerance of runs": Check("half car: its change by the tolerance asked for", "times", 1.0, _runs_kept),
 }

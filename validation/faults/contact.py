@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import NormalSolution, centres
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -37,7 +37,7 @@ def _ball() -> tuple[float, float, float]:
 def _hertz() -> float:
     """Hertz's ball: radius, approach, greatest pressure."""
     answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
-    return off(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
+    return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
 
 
 def _ellipse() -> float:
@@ -47,7 +47,7 @@ def _ellipse() -> float:
     return balanced if answer.b > answer.a else np.inf
 
 
-def _pressed() -> NormalSolution:
+def _normal_solution() -> NormalSolution:
     y, x = centres(CELLS[0], DY), centres(CELLS[1], DX)
     away = (x**2 + y[:, None] ** 2) / (2.0 * RADIUS)
     return normal_problem.solve_normal(away, DX, DY, PAIR, load=LOAD)
@@ -55,8 +55,8 @@ def _pressed() -> NormalSolution:
 
 def _normal() -> float:
     """Ball on cells against the closed form: approach and greatest pressure."""
-    answer = _pressed()
-    return off(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
+    answer = _normal_solution()
+    return largest_relative_difference(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
 
 
 def _published() -> float:
@@ -67,25 +67,25 @@ def _published() -> float:
     answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, motion[0], motion[1], motion[2]), soft)
     c11, c22, c23 = PUBLISHED
     wanted = -shear * a * a * np.array([c11 * 1e-7, c22 * 1e-7, c23 * a * 1e-4])
-    return off(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
+    return largest_relative_difference(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
 
 
-def _linear() -> float:
+def _against_linear_theory() -> float:
     """Small creepages on an ellipse against the linear theory: all of them, 41 cells."""
     motion = (1e-7, 0.7e-7, 2e-5)
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=41)
-    return off(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
+    return largest_relative_difference(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
 
 
 def _sliding() -> float:
     """Gross sliding against mu N, and its direction."""
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, 0.03, 0.04, 0.0), PAIR)
-    return off(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
+    return largest_relative_difference(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
 
 
 def _theories() -> float:
     """Exact theory and FASTSIM under creepages that slip in part, by mu N."""
-    pressed, a = _pressed(), _ball()[0]
+    pressed, a = _normal_solution(), _ball()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
     exact = rolling_problem.solve_rolling(pressed, MU, *motion, PAIR)
     answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, *motion), PAIR)
@@ -100,8 +100,8 @@ def _stuck() -> Array:
 
 def _exact_linear() -> float:
     """Exact theory under small creepages against the linear one."""
-    exact = rolling_problem.solve_rolling(_pressed(), MU, 2e-5, 1e-5, 0.0, PAIR)
-    return off(np.array([exact.fx, exact.fy]), _stuck())
+    exact = rolling_problem.solve_rolling(_normal_solution(), MU, 2e-5, 1e-5, 0.0, PAIR)
+    return largest_relative_difference(np.array([exact.fx, exact.fy]), _stuck())
 
 
 CHECKS = {
@@ -109,7 +109,7 @@ CHECKS = {
     "ellipse": Check("load of an ellipse by its pressure", "relative", 1e-9, _ellipse),
     "cells": Check("pressure of a ball on cells in closed form", "relative", 2e-3, _normal),
     "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _published),
-    "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _linear),
+    "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _against_linear_theory),
     "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding),
     "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_linear),
     "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theories),

@@ -15,7 +15,7 @@ from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import SensorArray, in_space, sensor_array
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -49,7 +49,7 @@ def _variance() -> float:
     return abs(float(np.mean(stream**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
 
 
-def _again() -> float:
+def _stream_difference() -> float:
     """Difference between a stream read in pieces and read whole."""
     parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
@@ -66,12 +66,14 @@ def _damage() -> float:
 def _pairs() -> float:
     """Range pairs of the standard's load by its printed cycles."""
     counts = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
-    return off(counts, np.array([3.5, 3.5, 0.5]))
+    return largest_relative_difference(counts, np.array([3.5, 3.5, 0.5]))
 
 
 def _crossings() -> float:
     """Crossings of the standard's load: through 0, 2 and 4.5, counted by hand."""
-    return off(counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0]))
+    return largest_relative_difference(
+        counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
+    )
 
 
 def _units() -> float:
@@ -103,7 +105,7 @@ def _sections() -> float:
     """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
     forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
     have = np.concatenate([forces[name] for name in score.CHANNELS])
-    return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
+    return largest_relative_difference(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
 
 @cache
@@ -124,7 +126,10 @@ def _motion() -> float:
     array, read, _, heave = _turning()
     moved_body = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
-    return max(off(moved_body.rates[:, 1], rate), off(moved_body.acceleration[:, 2], heave))
+    return max(
+        largest_relative_difference(moved_body.rates[:, 1], rate),
+        largest_relative_difference(moved_body.acceleration[:, 2], heave),
+    )
 
 
 def _rigid() -> float:
@@ -148,7 +153,7 @@ def _levels() -> float:
 CHECKS = {
     "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _streams),
     "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance),
-    "pieces": Check("a stream in pieces is the whole", "", 1e-15, _again),
+    "pieces": Check("a stream in pieces is the whole", "", 1e-15, _stream_difference),
     "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage),
     "pairs": Check("range pairs by the same", "of the largest", 1e-12, _pairs),
     "crossings": Check("crossings counted by hand", "of the largest", 1e-12, _crossings),
@@ -175,7 +180,7 @@ def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
     )
 
 
-def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
+def _change_resampling(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
     return attribute(
         "models.measured.resampling:onto",
         lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
@@ -189,7 +194,7 @@ def _factor(name: str, factor: float) -> Patch:
     )
 
 
-def _counted(change: Callable[[Any], Any]) -> Patch:
+def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
     """Spans, means and counts of the cycles changed."""
     return attribute("models.fatigue.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
 
@@ -228,9 +233,11 @@ FAULTS = (
             lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
         ),
     ),
-    Fault("residue counted as whole cycles", "counting", _counted(lambda own: (own[0], own[1], np.ceil(own[2])))),
-    Fault("residue lost", "counting", _counted(lambda own: (own[0], own[1], np.floor(own[2])))),
-    Fault("amplitude for range", "counting", _counted(lambda own: (own[0] / 2.0, own[1], own[2]))),
+    Fault(
+        "residue counted as whole cycles", "counting", _change_rainflow(lambda own: (own[0], own[1], np.ceil(own[2])))
+    ),
+    Fault("residue lost", "counting", _change_rainflow(lambda own: (own[0], own[1], np.floor(own[2])))),
+    Fault("amplitude for range", "counting", _change_rainflow(lambda own: (own[0] / 2.0, own[1], own[2]))),
     Fault(
         "pairs beyond a range, not from it on",
         "counting",
@@ -244,8 +251,8 @@ FAULTS = (
     Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
     Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
     Fault("sign of one channel", "units", _factor("mm", -1.0)),
-    Fault("a sample late", "clock", _onto(1.0)),
-    Fault("half a sample late", "clock", _onto(0.5)),
+    Fault("a sample late", "clock", _change_resampling(1.0)),
+    Fault("half a sample late", "clock", _change_resampling(0.5)),
     Fault(
         "gaps bridged",
         "clock",

@@ -20,7 +20,7 @@ Pair = tuple[float, float]
 """Forces (N) at the front and the rear."""
 
 
-def nothing() -> Context:
+def no_fault() -> Context:
     """No fault."""
     return nullcontext
 

@@ -55,15 +55,15 @@ PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equat
 
 def seen(record: Saved, check: str, vehicle: str = TWIN) -> bool:
     """Whether a check sees the fault in every engine that it was planted in."""
-    return all(ratio is None or ratio > 1 for ratio in _of(record, check, vehicle))
+    return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(record, check, vehicle))
 
 
 def least(record: Saved, check: str, vehicle: str) -> float:
     """Smallest size over tolerance among the engines; infinite for refused runs."""
-    return min(math.inf if ratio is None else ratio for ratio in _of(record, check, vehicle))
+    return min(math.inf if ratio is None else ratio for ratio in _ratios_of_check(record, check, vehicle))
 
 
-def _of(record: Saved, check: str, vehicle: str) -> list[float | None]:
+def _ratios_of_check(record: Saved, check: str, vehicle: str) -> list[float | None]:
     return [ratios[check] for ratios in record["ratios"][vehicle].values()]
 
 
@@ -102,14 +102,14 @@ def rows(data: Saved) -> list[Row]:
             alarms,
             "alarms",
         ).within(0, 0, "a check that cries without a fault is no check", "native"),
-        *([_hidden(faulty)] if _both(data) else []),
+        *([_hidden(faulty)] if _has_symmetric_vehicle(data) else []),
         Observed("planted.single", SYSTEM, "planted faults that a single check catches", len(single), "faults").beside(
             "few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"
         ),
     ]
 
 
-def _both(data: Saved) -> bool:
+def _has_symmetric_vehicle(data: Saved) -> bool:
     """Whether the symmetric vehicle ran, too."""
     return all(SYMMETRIC in record["ratios"] for record in data["faults"])
 
@@ -148,7 +148,7 @@ def _check_table(data: Saved) -> Table:
             ratio or 0.0
             for record in data["clean"]
             for vehicle in record["ratios"]
-            for ratio in _of(record, name, vehicle)
+            for ratio in _ratios_of_check(record, name, vehicle)
         )
         catches = sum(seen(record, name) for record in data["faults"])
         limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
@@ -175,7 +175,7 @@ def _fault_table(data: Saved) -> Table:
             f"{record['place']} ({', '.join(record['engines'])})",
             ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
             ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
-            "not run" if not _both(data) else "no" if caught(record, SYMMETRIC) else "yes",
+            "not run" if not _has_symmetric_vehicle(data) else "no" if caught(record, SYMMETRIC) else "yes",
         )
         for record in data["faults"]
     )
@@ -203,7 +203,7 @@ def _size(record: Saved, name: str) -> str:
 
 def draw(data: Saved) -> Drawn:
     """How far above its tolerance each check stands, fault by fault, on both vehicles where both ran."""
-    if not _both(data):
+    if not _has_symmetric_vehicle(data):
         return []
     from validation.faults.figure import fault_map
 

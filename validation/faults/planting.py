@@ -35,8 +35,8 @@ class Fault:
 
     name: str
     engines: tuple[str, ...]
-    change: Change = change.same
-    inside: Patch = patches.nothing
+    change: Change = change.unchanged
+    inside: Patch = patches.no_fault
     settings: Callable[[Settings], Settings] = _as_asked
 
 
@@ -82,8 +82,8 @@ def _euler(settings: Settings) -> Settings:
 CLEAN = (Fault("no fault", (*BOTH, *HAND)), Fault("no fault, equations interpreted", HAND, inside=rewritten()))
 
 DESCRIPTION = (
-    Fault("a and b swapped", BOTH, change.moved(lambda x, a, b: a if x > 0 else -b)),
-    Fault("sign of pitch mirrored", BOTH, change.moved(lambda x, a, b: -x)),
+    Fault("a and b swapped", BOTH, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
+    Fault("sign of pitch mirrored", BOTH, change.with_moved_points(lambda x, a, b: -x)),
     Fault("front and rear suspension swapped", BOTH, change.swapped("suspension3", "suspension4")),
     Fault("front and rear tyre swapped", BOTH, change.swapped("tyre1", "tyre2")),
     Fault("front and rear wheel mass swapped", BOTH, change.bodies(change.swapped_wheel)),
@@ -102,8 +102,8 @@ DESCRIPTION = (
 """In the description that an engine is built from."""
 
 INPUT = (
-    Fault("input half a sample late", BOTH, change.late(0.5)),
-    Fault("input a whole sample late", BOTH, change.late(1.0)),
+    Fault("input half a sample late", BOTH, change.with_late_input(0.5)),
+    Fault("input a whole sample late", BOTH, change.with_late_input(1.0)),
     Fault("road held at the middle stages", BOTH, change.driven(("road",), change.HeldStages)),
     Fault("rear wheel ahead of the front one", BOTH, change.road(wheelbase=-1.0)),
     Fault("rear delay missing", BOTH, change.road(wheelbase=0.0)),

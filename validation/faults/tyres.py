@@ -10,7 +10,7 @@ from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import bodies_energy
 from models.systems.handling.run import build
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import cornering_error, mirrored
@@ -43,7 +43,9 @@ def _by_exudyn() -> np.ndarray:
 
 
 def _mirror() -> float:
-    return off(mirrored(turning()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco"))
+    return largest_relative_difference(
+        mirrored(turning()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco")
+    )
 
 
 def _read(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +78,7 @@ CHECKS = {
         "accelerations in a turn by Exudyn",
         "of the largest",
         1e-10,
-        lambda: off(_accelerations("mujoco"), _by_exudyn()),
+        lambda: largest_relative_difference(_accelerations("mujoco"), _by_exudyn()),
     ),
     "mirror": Check("accelerations of the mirror image", "of the largest", 1e-10, _mirror),
     "balance": Check("change of energy by the powers", "of the tyres'", 1e-6, _balance),

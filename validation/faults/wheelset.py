@@ -18,7 +18,7 @@ from models.rail.energy import energies, rates_and_powers
 from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.wheelset import CHOSEN
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
@@ -55,16 +55,22 @@ def by_engine() -> Array:
 
 
 def _engine() -> float:
-    return max(off(equations().rates(state), rates) for state, rates in zip(states(), by_engine(), strict=True))
+    return max(
+        largest_relative_difference(equations().rates(state), rates)
+        for state, rates in zip(states(), by_engine(), strict=True)
+    )
 
 
 def _mirror() -> float:
     rates = equations().rates
-    return max(off(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
+    return max(largest_relative_difference(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
 
 
 def _balance() -> float:
-    """Change of the energies of motion, springs and weight, by differences along the motion, less the powers."""
+    """Largest error of the balance of energy, divided by the largest power.
+
+    The change of kinetic, spring and potential energy is taken by central differences along the motion.
+    """
     written, there = equations(), states()
     rates, powers = rates_and_powers(written, there)
     ahead, behind = (np.sum(energies(written, there + part * TINY * rates), axis=0) for part in (1.0, -1.0))
@@ -86,7 +92,7 @@ def _friction() -> float:
     return float(np.abs(np.hypot(report["fx"], report["fy"]) / bound - 1.0).max())
 
 
-def _rest() -> float:
+def _spin_and_load_at_rest() -> float:
     """Spin and carried load at rest."""
     rest = equations().rest
     report = _report(rest)
@@ -99,7 +105,9 @@ def _linear() -> float:
     report = _report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
-    return max(off(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True))
+    return max(
+        largest_relative_difference(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True)
+    )
 
 
 CHECKS = {
@@ -113,7 +121,7 @@ CHECKS = {
         1e-3,
         lambda: abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0),
     ),
-    "rest": Check("spin and load at rest", "relative", 1e-5, _rest),
+    "rest": Check("spin and load at rest", "relative", 1e-5, _spin_and_load_at_rest),
     "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear),
 }
 

@@ -19,7 +19,7 @@ from models.multibody.parts import FRAME, PER_PART
 from models.systems.handling.run import REFERENCE, build
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.faults.tyres import ALL, tyre
@@ -32,14 +32,14 @@ def _on_tyres(name: str = "twin") -> float:
     """Accelerations of a car, steered and braked on a rough slope, in MuJoCo and by the plain equations."""
     car = rolling_cars()[name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
-    return off(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
+    return largest_relative_difference(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
 
 
 def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
     """Accelerations of the cut twin in MuJoCo and by the plain equations."""
     vehicle = cut_cars()["twin"]
     hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
-    return off(
+    return largest_relative_difference(
         *(hub_model(engine, vehicle, hub_inputs, STEP, STEP).acceleration(0.0, q, v) for engine in ("mujoco", PLAIN))
     )
 

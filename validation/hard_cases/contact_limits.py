@@ -36,7 +36,7 @@ def few_cells_naive(folder: Path) -> str:
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
-def _drawn(count: int = 400) -> np.ndarray:
+def _draw_creepages(count: int = 400) -> np.ndarray:
     """Creepages and spin (3, count) from sticking to sliding."""
     draw = np.random.default_rng(8)
     return draw.uniform(-1.0, 1.0, (3, count)) * 10.0 ** draw.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
@@ -44,7 +44,7 @@ def _drawn(count: int = 400) -> np.ndarray:
 
 def reversed_signs(implementation: str, folder: Path) -> float:
     """All creepages turned round: forces that do not turn round exactly, by mu N."""
-    along, across, spin = _drawn()
+    along, across, spin = _draw_creepages()
     ellipses = (RollingEllipse(A, B, LOAD, MU, s * along, s * across, s * spin) for s in (1.0, -1.0))
     first, second = (fastsim(ellipse, PAIR) for ellipse in ellipses)
     return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
@@ -52,14 +52,14 @@ def reversed_signs(implementation: str, folder: Path) -> float:
 
 def mirrored(implementation: str, folder: Path) -> float:
     """Left and right exchanged: lateral creepage, spin and lateral force change their sign; by mu N."""
-    along, across, spin = _drawn()
+    along, across, spin = _draw_creepages()
     first, second = (fastsim(RollingEllipse(A, B, LOAD, MU, along, s * across, s * spin), PAIR) for s in (1.0, -1.0))
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def power(implementation: str, folder: Path) -> float:
     """Most power gained per metre, by mu N times the creepage, 21 cells."""
-    along, across, spin = _drawn()
+    along, across, spin = _draw_creepages()
     size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
     lost = fastsim(RollingEllipse(A, B, LOAD, MU, along, across, spin), PAIR).dissipation
     return float(max(np.max(-lost / size), 0.0))

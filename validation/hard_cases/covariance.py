@@ -8,7 +8,7 @@ import numpy as np
 from models.core.signals import Sampled
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
-from models.systems.pitch_plane.tangent import carried
+from models.systems.pitch_plane.tangent import noise_covariances
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 
@@ -39,7 +39,7 @@ def held_noise(engine: str, folder: Path) -> float:
 def _recursion() -> np.ndarray:
     assembly = _base(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
-    return carried(ErrorPath(assembly, assembly.input, round(PERIOD / STEP), SAMPLES), 1.0)[-1]
+    return noise_covariances(ErrorPath(assembly, assembly.input, round(PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
 def van_loan_naive(folder: Path) -> str:

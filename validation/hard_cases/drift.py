@@ -107,13 +107,13 @@ def graded_naive(folder: Path) -> str:
 
 
 @cache
-def _walk() -> np.ndarray:
+def _random_walk() -> np.ndarray:
     return np.random.default_rng(2).standard_normal(500).cumsum()
 
 
 def broken_load(engine: str, folder: Path) -> float:
     """One sample that is not a number."""
-    load = _walk().copy()
+    load = _random_walk().copy()
     load[250] = np.nan
     return pseudo_damage(load)
 
@@ -122,10 +122,10 @@ def broken_load_naive(folder: Path) -> str:
     """Damage of a load with a value that is no number, by the rainflow library."""
     from rainflow import extract_cycles
 
-    load = _walk().copy()
+    load = _random_walk().copy()
     load[250] = np.nan
     damage = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
-    return f"rainflow alone finds {damage / pseudo_damage(_walk()):.2g} times the damage of the whole load"
+    return f"rainflow alone finds {damage / pseudo_damage(_random_walk()):.2g} times the damage of the whole load"
 
 
 def empty_load(engine: str, folder: Path) -> float:
@@ -135,7 +135,7 @@ def empty_load(engine: str, folder: Path) -> float:
 
 def constant_truth(engine: str, folder: Path) -> float:
     """A true load that never varies: nothing can be compared to its damage."""
-    return damage_ratio(_walk(), np.full(500, 3.0))
+    return damage_ratio(_random_walk(), np.full(500, 3.0))
 
 
 def huge_load(engine: str, folder: Path) -> float:
@@ -171,11 +171,11 @@ def before_drift(engine: str, folder: Path) -> float:
     scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY}})
     other = "mujoco" if engine == "reference" else "reference"
     first, two = (simulate(scene, name) for name in (engine, other))
-    held = slice(None, _off(first, measured()))
+    held = slice(None, _first_row_off(first, measured()))
     return largest(first.states[held] - two.states[held]) / largest(two.states[held])
 
 
-def _off(run: Result, truth: Result) -> int | None:
+def _first_row_off(run: Result, truth: Result) -> int | None:
     """First row at which the run is OFF from the measured pitch; None where it never is."""
     far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > OFF)
     return int(far[0]) if len(far) else None
@@ -188,7 +188,7 @@ def before_drift_naive(folder: Path) -> str:
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
-    before = gap[: _off(coarse, truth)].max()
+    before = gap[: _first_row_off(coarse, truth)].max()
     return f"two step sizes of the reference differ by {before:.0e} rad before, {gap.max():.0e} after"
 
 

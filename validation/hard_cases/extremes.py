@@ -16,14 +16,14 @@ TOLERANCE = 1e-6
 """Of the adaptive solvers; at a tenth of it LSODA, too, chases that rounding, in 140,000 steps instead of 300."""
 
 
-def _off(base: Assembly) -> Assembly:
+def _raised_vehicle(base: Assembly) -> Assembly:
     """The vehicle with its chassis 10 mm above its equilibrium."""
     return replace(base, initial=base.initial - np.array([0, 0, 0.01, 0, 0, 0, 0, 0]))
 
 
-def _settled(engine: str, base: Assembly, integrator: str = "") -> float:
+def _distance_from_equilibrium(engine: str, base: Assembly, integrator: str = "") -> float:
     """Distance from the equilibrium after 3 s, relative to the start's."""
-    end = run(engine, _off(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
+    end = run(engine, _raised_vehicle(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
     return largest(end - base.initial) / 0.01
 
 
@@ -39,7 +39,7 @@ def _ringing(engine: str, integrator: str = "") -> float:
 
 def _undamped() -> tuple[Assembly, np.ndarray]:
     """The vehicle without dampers, off its equilibrium, and its states over 1 s."""
-    base = _off(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    base = _raised_vehicle(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
     return base, exact(base, 1e-3, 1000)
 
 
@@ -60,28 +60,28 @@ def undamped_euler(engine: str, folder: Path) -> float:
 
 def light_wheel(engine: str, folder: Path) -> float:
     """Wheels of 0.75 g under 750 kg at the recommended setting: poles of -1.4e7 1/s."""
-    return _settled(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
+    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
 
 
 def light_wheel_implicit(engine: str, folder: Path) -> float:
     """Error of the light wheel by an implicit integrator."""
-    return _settled(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
+    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
 
 
 def stiff_tyre(engine: str, folder: Path) -> float:
     """Tyres of 1e9 N/m at the recommended setting: wheels at 8,200 rad/s."""
-    return _settled(engine, vehicle(k1=1e9, k2=1e9))
+    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9))
 
 
 def stiff_tyre_implicit(engine: str, folder: Path) -> float:
     """Error on the stiff tyre by an implicit integrator."""
-    return _settled(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
+    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
 
 
 def stiff_tyre_naive(folder: Path) -> str:
     """Two steps past the check."""
     base = vehicle(k1=1e9, k2=1e9)
-    end = unchecked("mujoco", _off(base), 1e-3, 2e-3).states[-1]
+    end = unchecked("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
     return f"MuJoCo past the check: {largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
 
 

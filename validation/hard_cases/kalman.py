@@ -27,7 +27,7 @@ SLOW = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
 
 
-def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
+def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
     """Largest pitch error by its stated deviation of a vehicle at rest, its pitch unknown in the ``lost`` samples.
 
     The filter starts from a pitch that is ``turn`` (rad) wrong.
@@ -63,7 +63,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options:
 
 def outage(engine: str, folder: Path) -> float:
     """Three and a half seconds without a number."""
-    return _drawn(engine, folder, slice(200, 900))
+    return _largest_pitch_error(engine, folder, slice(200, 900))
 
 
 def outage_naive(folder: Path) -> str:
@@ -76,7 +76,7 @@ def outage_naive(folder: Path) -> str:
 
 def wrong_start(engine: str, folder: Path) -> float:
     """A start that is wrong by one stated deviation."""
-    return _drawn(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
+    return _largest_pitch_error(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
 
 
 def sure(engine: str, folder: Path) -> float:
@@ -104,10 +104,10 @@ def sure(engine: str, folder: Path) -> float:
 
 def nothing(engine: str, folder: Path) -> float:
     """A column without a single number."""
-    return _drawn(engine, folder, slice(None))
+    return _largest_pitch_error(engine, folder, slice(None))
 
 
-def _exact() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW."""
     a, b = relative(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
@@ -121,13 +121,13 @@ def stiff(engine: str, folder: Path) -> float:
     forces = Sampled(static_forces(base, 2, SLOW).values, SLOW, held=True)
     step = PitchStep(driven(base, forces), SLOW, 1)
     early = step.advance(np.append(RELATIVE @ base.initial, 0.0), 0)[2][:6]
-    wanted = _exact()[2]
+    wanted = _exact_response()[2]
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
 
 
 def stiff_naive(folder: Path) -> str:
     """The stiff case by filterpy's own discretisation."""
-    a, b, wanted = _exact()
+    a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW), SLOW)[1]
     times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
     return (

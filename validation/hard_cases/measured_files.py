@@ -8,7 +8,7 @@ from models.measured.formats.mdf4 import opened as mdf4_opened
 from models.measured.formats.tdms import Bounded, opened
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
-from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, raw
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, Odd, raw
 
 CHECKS = {
     "right": "times, values and names as they were written",
@@ -62,7 +62,7 @@ def of_file(odd: Odd) -> Case:
     )
 
 
-def of_sweep(sweep: Sweep) -> Case:
+def of_sweep(sweep: CutSweep) -> Case:
     """The hard case of a file that is cut off at many places."""
     return Case(
         name=f"{sweep.extension} cut off at {sweep.cuts} places",
@@ -78,5 +78,5 @@ def of_sweep(sweep: Sweep) -> Case:
 
 CASES = (
     *(of_file(odd) for module in (csv, csv_forms, kinds, mdf4, rpc3, tdms) for odd in module.FILES),
-    *(of_sweep(Sweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
+    *(of_sweep(CutSweep(extension)) for extension in (".csv", ".mf4", ".rsp", ".tdms")),
 )

@@ -78,7 +78,7 @@ CASES = (
                 "value held for 0.06 s",
                 "shorter than a gap that is bridged: a straight line at any height",
                 "length and place",
-                spoilt("clipped", "fl_fz", 0.06, bench.held("fl_fz", 2.0, 0.06)),
+                spoilt("clipped", "fl_fz", 0.06, bench.hold_sample("fl_fz", 2.0, 0.06)),
             ),
             (
                 "dead channel",
@@ -102,7 +102,7 @@ CASES = (
                 "gap of half a second",
                 "interpolated it is a road without roughness",
                 "length and place",
-                spoilt("gaps", "rr_fz", 0.5, bench.lost("rr_fz", 3.0, 0.5)),
+                spoilt("gaps", "rr_fz", 0.5, bench.drop_samples("rr_fz", 3.0, 0.5)),
             ),
         )
     ),

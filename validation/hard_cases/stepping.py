@@ -10,7 +10,7 @@ from models.core.signals import Sampled
 from models.engines import exudyn as exudyn_engine
 from models.engines import mujoco as mujoco_engine
 from models.engines.exudyn_system import solve
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_quiet import without_warnings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
@@ -83,7 +83,7 @@ def reset_naive(folder: Path) -> str:
     data = mujoco.MjData(model)
     data.qpos[:] = _pushed("exact").initial[:4]
     resets, before = 0, 0.0
-    with quiet():
+    with without_warnings():
         for _ in range(250):
             mujoco.mj_step(model, data)
             resets, before = resets + (data.time <= before), data.time

@@ -60,14 +60,14 @@ def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[st
 
 
 @spoiling
-def lost(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
     """Make a channel NaN from ``begin`` (s) on, for ``length`` (s)."""
     first = round(begin / virtual.period)
     samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
 
 
 @spoiling
-def held(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
     """A channel that keeps its value from a time on, for another (s)."""
     first, (column,) = round(begin / virtual.period), columns(virtual, name)
     samples[first : first + round(length / virtual.period), column] = samples[first, column]
@@ -143,7 +143,7 @@ def _sprung(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVe
     return replace(vehicle, springs=springs)
 
 
-def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
+def errors_and_doubts(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts of samples (m, signals)."""
     spoilt = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
     places = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
@@ -159,7 +159,7 @@ def planted(
     for change in spoil:
         if change is not None:
             change(virtual, samples)
-    return findings(virtual, samples, folder)
+    return errors_and_doubts(virtual, samples, folder)
 
 
 def drifting(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
@@ -169,4 +169,4 @@ def drifting(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Fi
     for i in (i for i, s in enumerate(virtual.signals) if s.quantity not in driving):
         samples[:, i] = make_interp_spline(clock, samples[:, i])(np.minimum(clock / (1 + fast), clock[-1]))
     signals = tuple(replace(s, file="wheels" if s.quantity in driving else "inertial") for s in virtual.signals)
-    return findings(replace(virtual, signals=signals), samples, folder)
+    return errors_and_doubts(replace(virtual, signals=signals), samples, folder)

@@ -20,11 +20,11 @@ def energies_apart(handling: Handling, count: int) -> float:
     """
     draw, n = np.random.default_rng(1), len(handling.vehicle.coordinates())
     states = [(draw.uniform(-0.3, 0.3, n), draw.uniform(-3.0, 3.0, n)) for _ in range(count)]
-    pairs = np.array([(_of_mujoco(handling, *each), _described(handling, *each)) for each in states])
+    pairs = np.array([(_of_mujoco(handling, *each), _energy_by_description(handling, *each)) for each in states])
     return float(np.abs(np.diff(pairs, axis=1)).max() / np.abs(pairs).max())
 
 
-def _places() -> dict[str, tuple[str, str]]:
+def _coordinate_names() -> dict[str, tuple[str, str]]:
     """Coordinates of the description by the joints of the file."""
     places = {"engine roll": ("engine joint 1", "rx"), "engine bounce": ("engine", "z")}
     for name in CORNERS:
@@ -45,7 +45,7 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
     data.qpos[:3], data.qvel[:3] = motion.centre - arm, motion.shift @ v - np.cross(turning, arm)
     mujoco.mju_mat2Quat(data.qpos[3:7], motion.rotation.ravel())
     data.qvel[3:6] = motion.rotation.T @ turning
-    for name, place in _places().items():
+    for name, place in _coordinate_names().items():
         joint, sign = model.joint(name), -1.0 if name in BACKWARDS else 1.0
         i = [*coordinates].index(place)  # type: ignore[arg-type]
         data.qpos[joint.qposadr], data.qvel[joint.dofadr] = sign * q[i], sign * v[i]
@@ -56,7 +56,7 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
     return float(data.energy[0] + 0.5 * data.qvel @ mass @ data.qvel)
 
 
-def _described(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+def _energy_by_description(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
     """J, by the description; springs without the preloads that the file does not have."""
     places, springs = handling.vehicle.coordinates(), 0.0
     for e in handling.vehicle.joint_elements:

@@ -150,15 +150,15 @@ def _front(ax: Axes, measured: Measured, kind: str) -> None:
 
 def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
     """Ring and name each engine's default setting, where the panel is emptiest."""
-    taken, names = _drawn(ax), list[np.ndarray]()
+    taken, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured.defaults.items():
         if p.status != "ok":
             continue
         place = (p.cost(kind), measured.error(p))
         ax.plot(*place, "o", **ring, zorder=5)
-        around = _within(ax, [place])[0]
-        corner = _emptiest(taken, around, names)
+        around = _fractions_of_panel(ax, [place])[0]
+        corner = _emptiest_corner(taken, around, names)
         names.append(corner + LABEL * np.array([0.5, 0.0]))
         way = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
         taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
@@ -175,21 +175,21 @@ def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
         )
 
 
-def _within(ax: Axes, places: Any) -> np.ndarray:
+def _fractions_of_panel(ax: Axes, places: Any) -> np.ndarray:
     """Fractions of the panel (n, 2) of places in its units (n, 2)."""
     return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(places, float)))
 
 
-def _drawn(ax: Axes) -> np.ndarray:
+def _line_points(ax: Axes) -> np.ndarray:
     """Places along all lines of a panel, in its fractions (n, 2)."""
     points = [np.empty((0, 2))]
     for line in ax.get_lines():
-        ends = _within(ax, line.get_xydata())
+        ends = _fractions_of_panel(ax, line.get_xydata())
         points += [a + (b - a) * np.linspace(0.0, 1.0, 9)[:, None] for a, b in pairwise(ends)] + [ends]
     return np.vstack(points)
 
 
-def _emptiest(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
+def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
     """The corner of CORNERS at which a name covers nothing, near its own place where several do.
 
     names : middles of names that stand already, through which no line to this one shall lead.
@@ -242,7 +242,7 @@ def _who(failed: list[Point], status: str) -> str:
 
 
 def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
-    """A handle per curve, then what is not a curve."""
+    """Handles of the legend: those of the curves first, then those of the other marks."""
     names = sorted(styles, key=named)
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))

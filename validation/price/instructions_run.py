@@ -1,4 +1,4 @@
-"""Marches whose instructions ``instructions`` counts, by themselves in a process: no kernel that would be compiled.
+"""A process that only marches, so that valgrind counts the instructions of a march without any compilation.
 
 The linear pitch-plane vehicle with all forces from one Python function, in both engines, method after method. Once
 everything is loaded, two copies of the process march, one after the other: to load it all twice would take most of the
@@ -100,12 +100,12 @@ def main(given: dict[str, Any]) -> None:
     gc.disable()
     for march in marches:
         march(given["steps"][0])
-    begin()
+    start_counting()
     for _ in range(2):
         copied(marches, given["steps"])
 
 
-def begin() -> None:
+def start_counting() -> None:
     """Have valgrind count from here on: what it does not count, it runs several times as fast."""
     asking = subprocess.Popen(
         ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

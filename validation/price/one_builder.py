@@ -112,11 +112,11 @@ def _raised(plane: Vehicle) -> SpatialVehicle:
 def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
     """A vehicle on a flat road for the free vehicles' builder, all its forces compiled."""
     tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
-    numbers = _numbers(tree, vehicle)
+    numbers = _force_table(tree, vehicle)
     return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
 
 
-def _numbers(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
+def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     """The table of the compiled forces: every axis is fixed in space, and tyres begin on the ground."""
     springs = [
         _element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)

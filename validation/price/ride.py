@@ -56,7 +56,7 @@ class RoutePoint:
 
 
 @dataclass(frozen=True)
-class Ride:
+class PricedRide:
     """The vehicle, the road in the paper's five cases, and the true standard deviations of the third."""
 
     vehicle: LinearVehicle
@@ -78,26 +78,26 @@ class Ride:
         }
 
 
-def problem() -> Ride:
+def problem() -> PricedRide:
     """R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
     roads = five_cases(vehicle.wheels)
     true = quadrature(vehicle, roads["3"], SPEED)
-    return Ride(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
+    return PricedRide(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 
 
-def direct(ride: Ride) -> np.ndarray:
+def direct(ride: PricedRide) -> np.ndarray:
     """Standard deviations by a Lyapunov equation."""
     return stationary(excited(ride.vehicle, ride.road, SPEED)).deviation
 
 
-def fast(ride: Ride, count: int) -> np.ndarray:
+def fast(ride: PricedRide, count: int) -> np.ndarray:
     """Five cases at ``count`` speeds by eigenvectors; those at SPEED."""
     speeds = [*np.linspace(5.0, 50.0, count - 1), SPEED]
     return sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
-def grid(ride: Ride, count: int, last: float, even: bool = False) -> np.ndarray:
+def grid(ride: PricedRide, count: int, last: float, even: bool = False) -> np.ndarray:
     """Standard deviations by the trapezoidal rule on a grid of frequencies up to ``last`` (Hz), in their logarithm or
     evenly."""
     frequency = np.linspace(last / count, last, count) if even else np.geomspace(LOWEST, last, count)
@@ -109,7 +109,7 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     """All routes; counts and errors are judged, seconds are not."""
     ride = problem()
     swept = 3 if quick else SWEPT
-    points = [_lyapunov(ride), _swept(ride, swept)]
+    points = [_lyapunov(ride), _route_point_of_sweep(ride, swept)]
     jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
     for count, last, even in (*((*net, False) for net in GRIDS[quick]), (*UNIFORM, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
@@ -131,7 +131,7 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
 
-def _lyapunov(ride: Ride) -> RoutePoint:
+def _lyapunov(ride: PricedRide) -> RoutePoint:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
@@ -139,7 +139,7 @@ def _lyapunov(ride: Ride) -> RoutePoint:
     return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
-def _swept(ride: Ride, speeds: int) -> RoutePoint:
+def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes", wraps=module.modes) as made:
@@ -149,7 +149,7 @@ def _swept(ride: Ride, speeds: int) -> RoutePoint:
     )
 
 
-def judged(ride: Ride, points: list[RoutePoint]) -> list[Row]:
+def judged(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
     """Errors and counts against what they must be."""
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]

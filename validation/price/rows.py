@@ -42,7 +42,7 @@ def rows_of(problem: Problem, measured: Measured, quick: bool) -> list[Row]:
             [_label(p) for p in repeated if p.changed],
             "exact: all counts, and errors to the last digit",
         ),
-        _promises(problem, measured),
+        _rows_of_promises(problem, measured),
         *([] if quick else [_sweep(measured)]),
         *_losses(measured),
     ]
@@ -98,13 +98,13 @@ def _orders(measured: Measured) -> list[Row]:
     ]
 
 
-def _promises(problem: Problem, measured: Measured) -> Row:
+def _rows_of_promises(problem: Problem, measured: Measured) -> Row:
     """Run the winners of the table of cheapest settings: their error must be what the table promises."""
     worst = 0.0
     for target in problem.tolerances:
         best = cheapest(measured.reaches(target, measured.costs[0]))
         if best is not None:
-            point = attempt(problem, _runnable(problem, measured, *best))
+            point = attempt(problem, _runnable_setting(problem, measured, *best))
             worst = max(worst, point.errors.get(measured.quantity, float("inf")) / target)
     return Observed(
         f"price.{problem.key}.cheapest",
@@ -120,7 +120,7 @@ def _promises(problem: Problem, measured: Measured) -> Row:
     )
 
 
-def _runnable(problem: Problem, measured: Measured, curve: str, least: Reach) -> Setting:
+def _runnable_setting(problem: Problem, measured: Measured, curve: str, least: Reach) -> Setting:
     """The setting that the table names, a fixed step as the nearest one that divides the run."""
     like = measured.curves()[curve][0].setting
     value = least.value if like.adaptive else problem.duration / round(problem.duration / least.value)

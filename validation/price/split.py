@@ -89,7 +89,9 @@ def _road_exudyn() -> Runs:
 def _road_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assemble(road_excited.scene()), settings)
-    return [partial(_within, counted, compiled.coast) for counted in (empty_law(), kernel_law(damper), law())]
+    return [
+        partial(_run_with_callback, counted, compiled.coast) for counted in (empty_law(), kernel_law(damper), law())
+    ]
 
 
 def _wheel_exudyn() -> Runs:
@@ -104,7 +106,7 @@ def _wheel_mujoco() -> Runs:
     wheels, steps, step = _wheels()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
-        partial(_within, law, partial(marcher.run, start, steps))
+        partial(_run_with_callback, law, partial(marcher.run, start, steps))
         for law in (empty_law(), kernel_law(damper), kernel_law(forces))
     ]
 
@@ -113,7 +115,7 @@ def _wheels() -> tuple[Wheels, int, float]:
     return Wheels(1, cells=wheelset.CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 
-def _within(callback: Any, run: Callable[[], Any]) -> None:
+def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:
     with installed(callback):
         run()
 

@@ -39,8 +39,8 @@ def cheapest(measured: Measured) -> Table:
     rows = []
     for target in measured.tolerances:
         calls, seconds = (measured.reaches(target, kind) for kind in measured.costs)
-        timed = (_won(measured, seconds, among, "ms") for among in ("", *rivals))
-        rows.append((f"{target:g}", _won(measured, calls, "", work.split()[-1], groups), *timed))
+        timed = (_text_of_winner(measured, seconds, among, "ms") for among in ("", *rivals))
+        rows.append((f"{target:g}", _text_of_winner(measured, calls, "", work.split()[-1], groups), *timed))
     note = (
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
         "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
@@ -74,7 +74,7 @@ def rounds_of(points: list[Point]) -> str:
     )
 
 
-def _won(
+def _text_of_winner(
     measured: Measured, reaches: Reaches, among: str, unit: str, groups: list[tuple[str, ...]] | None = None
 ) -> str:
     best = runner.cheapest(reaches, among)
@@ -97,7 +97,7 @@ def losses(measured: Measured) -> Table:
         (
             f"{target:g}",
             *(
-                _lost(measured.loss(target, kind, usual.setting.curve, among))
+                _text_of_loss(measured.loss(target, kind, usual.setting.curve, among))
                 for usual in owners.values()
                 for among in (usual.setting.engine, "")
                 for kind in measured.costs
@@ -126,7 +126,7 @@ def losses(measured: Measured) -> Table:
     return Table("Factor that a default setting loses", note, (f"{measured.quantity} error at most", *heads), rows)
 
 
-def _lost(loss: Loss | None) -> str:
+def _text_of_loss(loss: Loss | None) -> str:
     if loss is None:
         return "-"
     factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.factor, loss.low, loss.high))
@@ -147,8 +147,8 @@ def every_curve(measured: Measured) -> Table:
             f"{measured.error(points[0]):.2g} to {measured.error(points[-1]):.2g}",
             "-" if math.isnan(orders[curve]) else f"{orders[curve]:.2f}",
             str(points[0].setting.order or "varies"),
-            _number(calls.get(curve), 1, ",.0f"),
-            _once(points, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
+            _cost_text(calls.get(curve), 1, ",.0f"),
+            _mark_of_single_runs(points, seconds.get(curve)) + _cost_text(seconds.get(curve), 1e3, ".3g"),
             named(curve, groups).partition(" = ")[2] or "-",
         )
         for curve, points in measured.curves().items()
@@ -173,12 +173,12 @@ def every_curve(measured: Measured) -> Table:
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
-def _once(points: list[Point], least: Reach | None) -> str:
+def _mark_of_single_runs(points: list[Point], least: Reach | None) -> str:
     """A mark for what rests on a setting that has no rounds."""
     return "~" if least is not None and any(p.changed is None for p in runner.resting(points, least)) else ""
 
 
-def _number(least: Reach | None, scale: float, form: str) -> str:
+def _cost_text(least: Reach | None, scale: float, form: str) -> str:
     return "not met" if least is None else format(scale * least.cost, form) + _coarsest(least)
 
 

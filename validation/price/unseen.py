@@ -132,12 +132,12 @@ def _release(rng: Random, folder: Path, number: int) -> Kind:
 
 def _forces(rng: Random, folder: Path, number: int) -> Kind:
     how, period = str(rng.choice(["linear", "held", "smooth"])), float(rng.choice([1e-2, 5e-3, 2e-3]))
-    file = _written(rng, folder, number, period)
+    file = _write_wheel_forces(rng, folder, number, period)
     return f"{how} forces", {"wheel_forces": {"file": file, "interpolation": how}}, {"duration": 0.2}
 
 
 def _guided(rng: Random, folder: Path, number: int) -> Kind:
-    file, pitch = _written(rng, folder, number, 5e-3), f"pitch{number}.csv"
+    file, pitch = _write_wheel_forces(rng, folder, number, 5e-3), f"pitch{number}.csv"
     times = 5e-3 * np.arange(101)
     wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
     write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
@@ -159,7 +159,7 @@ KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
 )
 
 
-def _written(rng: Random, folder: Path, number: int, period: float) -> str:
+def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -> str:
     """A file of wheel forces: the weight, two waves and noise of each sample."""
     times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
     forces = {
@@ -213,7 +213,7 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
         parts = {setting: _fine(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
-    exact = {n: Truth(_exact(scene, scene.base / n), 0.0, "", 0, scene.kink_period) for n in set(parts.values())}
+    exact = {n: Truth(_exact_answer(scene, scene.base / n), 0.0, "", 0, scene.kink_period) for n in set(parts.values())}
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
@@ -222,7 +222,7 @@ def _fine(scene: PricedPitchPlane, parts: int) -> int:
     return parts * math.ceil(scene.base / parts / LONGEST * (1 - 1e-9))
 
 
-def _exact(scene: PricedPitchPlane, spacing: float) -> Answer:
+def _exact_answer(scene: PricedPitchPlane, spacing: float) -> Answer:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TIGHT)))
 
 
@@ -232,7 +232,7 @@ def slower(recommendation: Recommendation, key: tuple[str, str], choice: Setting
     rivals = [attempt for attempt in _defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)
-    return any(_loses(recommendation, choice, rival) for rival in rivals)
+    return any(_is_slower_in_pairs(recommendation, choice, rival) for rival in rivals)
 
 
 def _defaults(recommendation: Recommendation) -> list[Tried]:
@@ -252,7 +252,7 @@ def _defaults(recommendation: Recommendation) -> list[Tried]:
     return list({each.setting.curve: each for each in able}.values())
 
 
-def _loses(recommendation: Recommendation, choice: SettingChoice, rival: Tried) -> bool:
+def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: Tried) -> bool:
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
     jobs = [

@@ -109,14 +109,16 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 
     def error(setting: Setting) -> float:
         exact = (
-            _exact(scene, setting) if isinstance(scene, MeshedScene) else scene.answer(scene.solve(finer, scene.whole))
+            _exact_answer(scene, setting)
+            if isinstance(scene, MeshedScene)
+            else scene.answer(scene.solve(finer, scene.whole))
         )
         return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
 
     return {setting: error(setting) for setting in settings}
 
 
-def _exact(scene: MeshedScene, setting: Setting) -> Answer:
+def _exact_answer(scene: MeshedScene, setting: Setting) -> Answer:
     cells = min(MOST, max(LEAST, FINER * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))

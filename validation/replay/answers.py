@@ -50,20 +50,20 @@ def answer(job: Job, command: str, folder: Path) -> CommandAnswer:
     given = {path.name for path in folder.iterdir()}
     now = CommandAnswer([], "", 0.0)
     for words in job.commands:
-        _ask([command, *words], folder, now)
-    now.arrays |= dict(_saved(folder, given))
+        _run_command([command, *words], folder, now)
+    now.arrays |= dict(_arrays_of_files(folder, given))
     shutil.rmtree(folder)
     return now
 
 
-def _ask(words: list[str], folder: Path, now: CommandAnswer) -> None:
+def _run_command(words: list[str], folder: Path, now: CommandAnswer) -> None:
     """Run one command, and add what it says."""
     begun = time.monotonic()
     code, said, wrong = _run(words, folder)
     now.seconds += time.monotonic() - begun
     printed = _json(said)
     if printed is not None:
-        now.arrays |= {f": {len(now.codes)}{place}": np.array(value) for place, value in _leaves(printed)}
+        now.arrays |= {f": {len(now.codes)}{place}": np.array(value) for place, value in _values_with_places(printed)}
         said = ""
     now.codes.append(code)
     now.message += _masked(said + wrong)
@@ -94,12 +94,12 @@ def _json(said: str) -> Any:
         return None
 
 
-def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, float | str]]:
+def _values_with_places(value: Any, place: str = "") -> Iterator[tuple[str, float | str]]:
     """Numbers and texts of a printed table with their places."""
     if isinstance(value, dict | list):
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             if key not in UNWATCHED:
-                yield from _leaves(inner, f"{place}/{key}")
+                yield from _values_with_places(inner, f"{place}/{key}")
     elif isinstance(value, bool | int | float):
         yield place, float(value)
     elif value is not None:
@@ -112,7 +112,7 @@ def _masked(text: str) -> str:
     return text
 
 
-def _saved(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+def _arrays_of_files(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
     """Arrays of all files in the folder but those that were given."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
@@ -132,7 +132,7 @@ def _netcdf(path: Path) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _csv(path: Path) -> Iterator[tuple[str, np.ndarray]]:
-    """Columns of a table with one line of names, as they are written."""
+    """Yield name and values of each column of a CSV file, whose first line holds the names."""
     with path.open(newline="") as file:
         lines = [line for line in csv.reader(file) if line]
     if lines:

@@ -40,7 +40,7 @@ class Job:
 
 def jobs(command: str) -> list[Job]:
     """All jobs; ``command``: the twinrig that lists the shipped scenes."""
-    return [Job("list", (("list",),)), *_shipped(command), *_written(), *_bases(), *_varied()]
+    return [Job("list", (("list",),)), *_shipped(command), *_written_jobs(), *_bases(), *_varied()]
 
 
 def _shipped(command: str) -> Iterator[Job]:
@@ -55,7 +55,7 @@ def _shipped(command: str) -> Iterator[Job]:
         yield Job(f"shipped-{name}", (("show", name), ("run", name, *less, "--json", "--out", "out")))
 
 
-def _written() -> Iterator[Job]:
+def _written_jobs() -> Iterator[Job]:
     for job in tomllib.loads(COMMANDS.read_text())["jobs"]:
         yield Job(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
 
@@ -80,10 +80,10 @@ def _varied() -> Iterator[Job]:
     for i in range(VARIED):
         base = bases[i % len(bases)]
         random = np.random.default_rng([SEED, i])
-        yield _drawn(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
+        yield _draw_scene(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
 
 
-def _drawn(name: str, scene: Table, random: np.random.Generator) -> Job:
+def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> Job:
     """A base scene less some tables, with other numbers, another engine, perhaps a mistake."""
     from tomli_w import dumps
 
@@ -91,7 +91,7 @@ def _drawn(name: str, scene: Table, random: np.random.Generator) -> Job:
     engine = str(random.choice(engines)) if engines else ""
     _drop(scene, random)
     if random.random() < CHANGED:
-        for place in random.permutation(list(_numbers(scene)))[:3]:
+        for place in random.permutation(list(_places_of_numbers(scene)))[:3]:
             _change(scene, str(place), float(random.uniform(*FACTORS)))
     if random.random() < MISTAKEN:
         engine = _mistake(scene, engine, random)
@@ -106,16 +106,16 @@ def _drop(scene: Table, random: np.random.Generator) -> None:
                 del table[key]
 
 
-def _numbers(table: Table, above: str = "") -> Iterator[str]:
+def _places_of_numbers(table: Table, above: str = "") -> Iterator[str]:
     """Places (keys joined by /) of all numbers that are not whole."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _numbers(value, f"{above}{key}/")
+            yield from _places_of_numbers(value, f"{above}{key}/")
         elif isinstance(value, float):
             yield f"{above}{key}"
 
 
-def _at(scene: Table, place: str) -> tuple[Table, str]:
+def _table_and_key(scene: Table, place: str) -> tuple[Table, str]:
     *above, key = place.split("/")
     for part in above:
         scene = scene[part]
@@ -123,20 +123,20 @@ def _at(scene: Table, place: str) -> tuple[Table, str]:
 
 
 def _change(scene: Table, place: str, factor: float) -> None:
-    table, key = _at(scene, place)
+    table, key = _table_and_key(scene, place)
     table[key] = float(f"{factor * table[key]:.4g}")
 
 
 def _mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
     """Spoil a scene as users do; the engine that is asked for then."""
     before = copy.deepcopy(scene)
-    places = sorted(_numbers(before))
+    places = sorted(_places_of_numbers(before))
     kind = int(random.integers(5))
     if kind == 0 or not places:
         scene["vehicel"] = {}
     elif kind == 4:
         return "exodyn"
     else:
-        table, key = _at(scene, str(random.choice(places)))
+        table, key = _table_and_key(scene, str(random.choice(places)))
         table[key] = {1: "a text", 2: -abs(table[key]) - 1.0, 3: float("nan")}[kind]
     return engine

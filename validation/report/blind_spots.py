@@ -19,14 +19,14 @@ def blind_spots(path: Path = KEPT) -> Saved:
     lines = read(path)
     names = dict.fromkeys((*(line.function for line in lines), *compiled_functions()))
     return {
-        "lines": [_told(line) for line in lines],
+        "lines": [_function_record(line) for line in lines],
         "modules": _modules(lines),
         "commits": [commit for commit, _ in Counter(line.commit for line in lines).most_common()],
         "uncovered": uncovered(lines, names),
     }
 
 
-def _told(line: Line) -> Saved:
+def _function_record(line: Line) -> Saved:
     rows, tests = (text.split(JOINED) if text else [] for text in (line.rows, line.tests))
     return {
         "function": line.function.replace(".<locals>", ""),

@@ -53,7 +53,7 @@ def shares(results: Saved) -> list[Saved]:
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
     """
-    counted = _counted(results["rows"])
+    counted = _row_counts(results["rows"])
     main = {case: systems.most_common(1)[0][0] for case, systems in counted.items()}
     return [
         _line(system, counted, main, results["provenance"]["seconds"])
@@ -80,7 +80,7 @@ def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], s
     }
 
 
-def _counted(rows: list[Saved]) -> dict[str, Counter[str]]:
+def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
     """Rows of each case by system."""
     counted: dict[str, Counter[str]] = {}
     for row in rows:
@@ -98,7 +98,7 @@ def keep(folder: Path) -> None:
         raise InputError(folder / "results.json", "provenance.quick", True, "the results of a full report")
     new = {
         case: {"rows": dict(systems), "seconds": round(source["seconds"][case], 1), "commit": source["commit"]}
-        for case, systems in _counted(results["rows"]).items()
+        for case, systems in _row_counts(results["rows"]).items()
         if case in source["seconds"]
     }
     write_whole(KEPT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())

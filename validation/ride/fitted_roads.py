@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from models.core.noise import normal
-from models.road.fitted import FittedRoad, fit
+from models.road.fitted import FittedRoad, fit_road
 from models.road.iso8608 import level_of_class
 from models.road.isotropic import isotropic_like
 from models.road.measured_tracks import MeasuredTracks, read_tracks
@@ -31,9 +31,9 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
     """A road made from the two filters, exactly at its stations, and fitted: the filters must come back."""
     road, step = road_of_level(HALF_TRACK), 0.05
     noise = normal(SEED, 0, round(length / step), 2)
-    mean, roll = (_passed(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
+    mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
     tracks = MeasuredTracks(mean + HALF_TRACK * roll, mean - HALF_TRACK * roll, step, HALF_TRACK, "made")
-    fitted = fit(tracks, min(200.0, length / 4.5))
+    fitted = fit_road(tracks, min(200.0, length / 4.5))
     if fitted.roll is None:
         raise RuntimeError("a roll process that was put in was not found")
     rows = [
@@ -52,10 +52,10 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
         for name, true, process in (("mean", road.mean, fitted.mean), ("roll", road.roll, fitted.roll))
         for what in ("corner", "intensity")
     ]
-    return rows, _shown(tracks, fitted)
+    return rows, _figure_numbers(tracks, fitted)
 
 
-def _passed(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
+def _first_order_samples(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
     """Samples of a first-order process from unit noise, exact at the stations, stationary from the first on."""
     kept = math.exp(-f.corner * step)
     driven = noise * math.sqrt((1.0 - kept**2) * f.intensity / (2.0 * f.corner))
@@ -71,7 +71,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
     rows, shown = [], []
     for name, (first, last) in DATA.items():
         tracks = read_tracks(data / name, first=first, last=last)
-        fitted = fit(tracks)
+        fitted = fit_road(tracks)
         if name == "belgian_block.crg":
             rows.append(
                 Observed(
@@ -82,7 +82,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
                     "",
                 ).within(-0.38, 0.01, "as another reader of the file found", "published")
             )
-        shown.append(_shown(tracks, fitted))
+        shown.append(_figure_numbers(tracks, fitted))
         why = f"{tracks.length:.4g} m; " + "; ".join(fitted.notes)
         rows.append(
             Observed(
@@ -96,7 +96,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
     return rows, shown
 
 
-def _shown(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
+def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any]:
     """Saved numbers for the figure and the table."""
     spectra = fitted.spectra
     some = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1

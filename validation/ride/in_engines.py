@@ -49,7 +49,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
         )
         for engine in ENGINES
     }
-    rows = [_apart("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
+    rows = [_engine_difference_row("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
     if quick:
         return rows
     linear = statistically_linear(vehicle, excitation_, SPEED)
@@ -81,7 +81,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
     return rows
 
 
-def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
+def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
     first, other = (runs[engine].run for engine in ENGINES)
     gap = max(np.abs(first.positions - other.positions).max(), np.abs(first.rates - other.rates).max())
     return Observed(
@@ -101,7 +101,7 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     linear = linearise(vehicle)
     exact = stationary(excited(linear, excitation_, SPEED))
     errors = standard_errors(linear, excitation_, SPEED, DRIVEN - SKIPPED)
-    rows = [_apart("r19_ride", f"r19_ride under gravity, {DRIVEN:g} s", runs)]
+    rows = [_engine_difference_row("r19_ride", f"r19_ride under gravity, {DRIVEN:g} s", runs)]
     for engine, run in runs.items():
         mean = run.outputs.mean(axis=0) / errors[0]
         square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]

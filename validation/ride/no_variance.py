@@ -8,7 +8,7 @@ from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import FINITE, stationary
 from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.marginal import Unstable, parts
+from models.ride.marginal import Unstable, split_marginal
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -83,7 +83,7 @@ def _free_rows() -> list[Row]:
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)
     system = excited(vehicle, road, 20.0)
-    split, covariance = parts(system.A), stationary(system)
+    split, covariance = split_marginal(system.A), stationary(system)
     same = np.array_equal(_with_slycot(system), covariance.variance)
     steer = {"fl": 0.05, "fr": 0.05}
     forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)

@@ -80,7 +80,7 @@ def samples(vehicle: CutVehicle) -> HubForces:
 
 
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
-    """Largest distance (m) along any axis of the centre of mass from its closed form, from sample to sample."""
+    """Largest error (m) of the centre of mass on any axis: at the samples, against the closed form."""
     forces, how = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
     moved = centres(vehicle, run.positions[::EVERY])

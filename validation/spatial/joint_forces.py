@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from models.engines.mujoco_quiet import quiet
-from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.engines.mujoco_quiet import without_warnings
+from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.systems.measured.sections import guided
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
@@ -87,9 +87,9 @@ class _Loaded:
             spec.body(number).add_site(name=number)
             for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
                 spec.add_sensor(name=f"{kind} {number}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=number)
-        with quiet():
+        with without_warnings():
             self.model = spec.compile()
-            weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
+            set_masses(self.model, MujocoIndices(vehicle.tree, self.model), vehicle.tree.bodies)
             self.data = mujoco.MjData(self.model)
             self.ids = {name: int(self.model.body(number).id) for name, number in names.items()}
             self.data.qpos[:], self.data.qvel[:] = q, v

@@ -26,7 +26,7 @@ from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
 from models.vehicles.spatial import Curve, SpatialVehicle, hitch_of
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.checks import off
+from validation.common.checks import largest_relative_difference
 from validation.spatial.cars import anywhere, static, twin
 from validation.spatial.trains import caravan, train
 
@@ -87,7 +87,9 @@ def rolling_gap(car: Handling, engine: str, count: int) -> float:
     """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
     plain, model = build(REFERENCE, car), build(engine, car)
     states = rolling_states(car, count)
-    return max(off(model.acceleration(t, q, v), plain.acceleration(t, q, v)) for t, q, v in states)
+    return max(
+        largest_relative_difference(model.acceleration(t, q, v), plain.acceleration(t, q, v)) for t, q, v in states
+    )
 
 
 def report_gap(car: Handling, count: int) -> float:
@@ -142,7 +144,7 @@ def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
         for seed in range(i, count, len(input_sets)):
             q, v = cut_state(vehicle, seed)
             time = 0.5 * STEP * (seed % 3)
-            worst = max(worst, off(*(model.acceleration(time, q, v) for model in models)))
+            worst = max(worst, largest_relative_difference(*(model.acceleration(time, q, v) for model in models)))
     return worst
 
 

@@ -26,7 +26,7 @@ class Sample:
 
     @property
     def printed(self) -> str:
-        """The channel that the screen names: that of the largest share."""
+        """Name of the channel whose error is printed: the one with the largest share (``Estimate.share``)."""
         return max(self.told, key=lambda channel: self.told[channel].share)
 
     @property

@@ -30,7 +30,7 @@ class Touch(NamedTuple):
     along: float
 
 
-class Axle(NamedTuple):
+class PlainAxle(NamedTuple):
     """Motion of the wheelset: its centre from the middle of the track (m), velocity with that of travel (m/s), unit
     vectors along the axle and horizontally ahead, angular velocity, spin included (rad/s)."""
 
@@ -49,17 +49,17 @@ class PatchForces(NamedTuple):
     told: dict[str, float]
 
 
-def axle_of(state: np.ndarray, speed: float) -> Axle:
+def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
     """Vectors of a state (10,) of ``models.rail.equations``."""
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     axle = np.cos(roll) * np.array([-np.sin(yaw), np.cos(yaw), 0.0]) + np.array([0.0, 0.0, np.sin(roll)])
     frame = roll_rate * ahead + np.array([0.0, 0.0, yaw_rate])
     turning = frame + (spin - frame @ axle) * axle
-    return Axle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, ahead, turning)
+    return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, ahead, turning)
 
 
-def touch(wheelset: Wheelset, side: float, axle: Axle) -> Touch:
+def touch(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
     """Where a cone touches its rail; side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
@@ -113,7 +113,7 @@ def creeping(
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch(wheelset: Wheelset, side: float, axle: Axle, law: str, cells: int) -> PatchForces:
+def patch(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
     """What one rail does to the wheelset."""
     w, speed, at = wheelset, axle.velocity[0], touch(wheelset, side, axle)
     across = np.cross(at.normal, np.array([1.0, 0.0, 0.0]))

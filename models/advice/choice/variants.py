@@ -12,7 +12,7 @@ from models.advice.choice.answer import Answer
 from models.core.assumptions import Broken, breaches, watching
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
-from models.core.scene_effects import absent, beside, module_of, named, own_table, rebuilt, without
+from models.core.scene_effects import absent_effects, module_of, named, own_table, rebuilt, with_effects, without
 from models.core.systems import modules_of
 
 Set = frozenset[str]
@@ -72,11 +72,11 @@ class Variants:
     @property
     def absent(self) -> tuple[str, ...]:
         """Effects that the scene does not name."""
-        return tuple(self.scene.absent) if self._opened else absent(self.scene)
+        return tuple(self.scene.absent) if self._opened else absent_effects(self.scene)
 
     def beside(self, name: str) -> Any:
         """The scene with one of these at its usual values; InputError where it cannot be."""
-        return self.scene.beside(name) if self._opened else beside(self.scene, name)
+        return self.scene.beside(name) if self._opened else with_effects(self.scene, name)
 
     def says(self, name: str) -> str:
         """Sentence on what an effect is, or what leaving it out means."""

@@ -14,7 +14,7 @@ from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import confirmed
 from models.core.errors import InputError
 from models.core.runge_kutta import step_on
-from models.core.scene_effects import absent, beside, listing
+from models.core.scene_effects import absent_effects, listing, with_effects
 from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import told_by
 from models.systems.ride.omissions import effects_of
@@ -33,7 +33,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
         whole = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
         effects = effects_of(whole.scene)
         rests = {effect.name: _rest(whole, effect) for effect in effects}
-    more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
+    more = {name: _beside(scene, name, whole.speed) for name in absent_effects(scene)}
     systems = {name: rest for name, rest in ({"": whole.full} | rests | more).items() if isinstance(rest, Reduced)}
     micros = _turns(systems)
     says = listing(scene.system)
@@ -64,7 +64,7 @@ def _rest(full_scene: FullScene, effect: Effect) -> Reduced | str:
 def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
     """The scene with one more effect at its usual values, or why there is none."""
     try:
-        return FullScene(ReducedScene.complete(beside(scene, name)), speed).full
+        return FullScene(ReducedScene.complete(with_effects(scene, name)), speed).full
     except InputError as error:
         return error.allowed
 

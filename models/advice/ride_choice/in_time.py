@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import absent, beside
+from models.core.scene_effects import absent_effects, with_effects
 from models.core.strict import LARGEST, Strict, quantity
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import EVERY, CopiesMarch, forgotten, usual_step
@@ -89,11 +89,11 @@ class InTime:
     @property
     def absent(self) -> tuple[str, ...]:
         """Effects that the scene does not name."""
-        return absent(self.scene.ride)
+        return absent_effects(self.scene.ride)
 
     def beside(self, name: str) -> "InTime":
         """The scene with an absent effect at its usual values; InputError where the effect cannot be added."""
-        scene = ReducedScene.complete(beside(self.scene.ride, name))
+        scene = ReducedScene.complete(with_effects(self.scene.ride, name))
         _check(scene)
         return replace(self, scene=scene)
 

@@ -20,7 +20,7 @@ from models.advice.ride_choice.reduced import Reduced
 from models.core.errors import InputError
 from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import parts
+from models.ride.marginal import split_marginal
 
 SLOWEST = 1e-9
 """Decay, by the fastest rate, below which a motion counts as one that does not die out."""
@@ -39,7 +39,7 @@ class Solved:
 
 def solve(system: DelayedSystem, rows: list[int]) -> Solved:
     """P and L of a system whose every motion dies out; InputError for one with a motion that nothing pulls back."""
-    split = parts(system.A)
+    split = split_marginal(system.A)
     if split.marginal:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
     noise = noise_of(system)

@@ -19,7 +19,7 @@ from models.brake.controllers.five_phase import FivePhase, end_of, rate
 from models.brake.wheel_step import Grip, StepInput, Wheel, node_force, wheel_step
 from models.core.errors import InputError, RunFailed
 from models.machine.compiled import njit
-from models.tyre.tyre_table import Cells, TyreTable, place, stacked
+from models.tyre.tyre_table import Cells, TyreTable, cell_and_share, stacked
 
 LONGEST_PHASE = 1.0
 """Time (s) after which a phase is taken never to end."""
@@ -81,7 +81,7 @@ class Frozen:
     @cached_property
     def driven(self) -> Driven:
         """The frozen vehicle as compiled functions take it."""
-        tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
+        tables, (j, q) = stacked([self.tyre]), cell_and_share(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
 
@@ -95,7 +95,7 @@ def rim(state, driven):
     """Acceleration (m/s^2) of the wheel's rim."""
     radius, inertia = driven.radius, driven.inertia
     slip = min(max(1.0 - radius * state.turning / driven.vehicle_speed, 0.0), 1.0)
-    k, share = place(driven.grip.slips, slip)
+    k, share = cell_and_share(driven.grip.slips, slip)
     low, high = node_force(k, driven.grip), node_force(k + 1, driven.grip)
     return radius * (radius * (low + share * (high - low)) - state.torque) / inertia
 

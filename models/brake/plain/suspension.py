@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.brake.sprung import Sprung
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of
 
@@ -52,7 +52,7 @@ class Suspension:
     def __init__(self, vehicle: Sprung) -> None:
         free = vehicle.handling.vehicle
         self.bodies, self.tyres = Bodies(free), free.tyres
-        self.parts = Parts(self.bodies, free, CARRIER)
+        self.parts = PlainParts(self.bodies, free, CARRIER)
         self.held, self.loads = held_at_rest(free, CARRIER)
         self._gravity = -free.gravity * UP
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
@@ -70,12 +70,12 @@ class Suspension:
         """Number of coordinates of the suspended vehicle."""
         return self.bodies.size
 
-    def contacts(self, motion: Motion, steer: np.ndarray) -> list[TyreContact]:
+    def contacts(self, motion: PlainMotion, steer: np.ndarray) -> list[TyreContact]:
         """Contact of every tyre, whose wheels are steered (W,) in rad."""
         hubs, heading = motion.at(self._hubs), motion.axes(self._carrier)[PLACE]
         return [self._contact(i, hub, motion, heading, float(steer[i])) for i, hub in enumerate(hubs)]
 
-    def _contact(self, i: int, hub: np.ndarray, motion: Motion, heading: np.ndarray, steer: float) -> TyreContact:
+    def _contact(self, i: int, hub: np.ndarray, motion: PlainMotion, heading: np.ndarray, steer: float) -> TyreContact:
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         along = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
@@ -102,14 +102,14 @@ class Suspension:
         accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
 
-    def _by_air(self, motion: Motion) -> np.ndarray:
+    def _by_air(self, motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of drag at the chassis' centre, against its speed where the vehicle heads."""
         centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
         speed = float(centre[RATE] @ ahead)
         forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
         return forces
 
-    def _by_tyres(self, motion: Motion, constant: WheelForces) -> np.ndarray:
+    def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:
         """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to the chassis."""
         hubs, total = motion.at(self._hubs), np.zeros(self.size)
         for i, contact in enumerate(self.contacts(motion, constant.steer)):

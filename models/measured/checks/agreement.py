@@ -102,7 +102,7 @@ class Agreement:
     @cached_property
     def expected(self) -> np.ndarray:
         """Powers (f, k) of the expected readings."""
-        return np.einsum("fkc,fkc->fk", self._told, self.response.conj()).real
+        return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
     @property
     def left(self) -> np.ndarray:
@@ -140,7 +140,7 @@ class Agreement:
         """All faults, the worst first, and what is left without them."""
         now, faults = self, list[MeasurementFault]()
         while len(faults) < FAULTS:
-            worst = max(now._offers(), key=lambda fault: fault.fall, default=None)
+            worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
             if worst is None:
                 break
             faults.append(worst)
@@ -162,26 +162,26 @@ class Agreement:
             return replace(self, response=response + fault.size * self._levers(hubs))
         turn = 2j * np.pi * self.frequencies
         wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
-        forces, index = self._picked(fault.signals)
+        forces, index = self._indices_of(fault.signals)
         response[index] *= (1 / wrong if forces else wrong)[:, None, None]
         return replace(self, response=response)
 
-    def _picked(self, signals: tuple[Signal, ...]) -> tuple[bool, Any]:
+    def _indices_of(self, signals: tuple[Signal, ...]) -> tuple[bool, Any]:
         """Whether signals are forces, and the index of what is theirs in the response (f, k, c)."""
         forces = signals[0] in self.inputs
         pick = [(self.inputs if forces else self.outputs).index(s) for s in signals]
         return forces, (slice(None), slice(None), pick) if forces else (slice(None), pick)
 
-    def _offers(self) -> Iterator[MeasurementFault]:
+    def _explaining_faults(self) -> Iterator[MeasurementFault]:
         """Every single fault that would explain more and is large enough to be named."""
         weights = self.weights
         for group in self.groups():
-            for fault in (*self._late(group, weights), *self._wrong(group, weights)):
-                if self._worth(self.without(fault), weights):
+            for fault in (*self._delay_faults(group, weights), *self._factor_faults(group, weights)):
+                if self._is_worth_correcting(self.without(fault), weights):
                     yield fault
         yield from self._swapped(weights)
         yield from self._pairs(weights)
-        yield from self._about(weights)
+        yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
         """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
@@ -199,12 +199,12 @@ class Agreement:
                         yield SignalGroup(name, forces, of_name)
 
     @cached_property
-    def _told(self) -> np.ndarray:
+    def _expected_times_forces(self) -> np.ndarray:
         """Expected readings times conj(forces), (f, k, c)."""
         return self.response @ self.forces
 
     @cached_property
-    def _turns(self) -> np.ndarray:
+    def _delay_factors(self) -> np.ndarray:
         """exp(i omega t) (t, f) of all delays."""
         return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
 
@@ -213,19 +213,19 @@ class Agreement:
         pick = list(group.members)
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
-            rest = self.between[:, :, pick] - self._told[:, :, pick] + response @ among
+            rest = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ among
             return np.einsum("fkc,fkc->fk", rest, response.conj()), _power(response, among)
         cross, power = np.zeros((2, *self.readings.shape), complex)
         response = self.response[:, pick]
         cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
-        power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], response.conj())
+        power[:, pick] = np.einsum("fkc,fkc->fk", self._expected_times_forces[:, pick], response.conj())
         return cross, power.real
 
-    def lateness(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
+    def delay_of(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
         """Delay (s) of a group, its standard error, infinite if nothing tells, and the fall of chi square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
-        likely = (self._turns @ line).real
+        likely = (self._delay_factors @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
         late = float(TIMES[best] + GRID * _vertex(*likely[best - 1 : best + 2]))
         turn = 2j * np.pi * self.frequencies
@@ -233,12 +233,12 @@ class Agreement:
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
         return late, steep**-0.5 if steep > 0 else float("inf"), fall
 
-    def _late(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        late, error, fall = self.lateness(group, weights)
+    def _delay_faults(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
+        late, error, fall = self.delay_of(group, weights)
         if fall > CERTAIN and abs(late) > max(SMALL_DELAY, 4 * error):
             yield MeasurementFault("late", group.name, self._signals(group), late, error, fall)
 
-    def _wrong(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _factor_faults(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
         cross, power = ((weights * part).sum() for part in self.share(group))
         ratio = float(cross.real / power) if power > 0 else 0.0
         if ratio == 0.0:
@@ -250,7 +250,7 @@ class Agreement:
                 "factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall
             )
 
-    def _about(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _moment_point_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Moments about another point than the hub, above or below, of one hub, of two, or of all alike."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
@@ -258,11 +258,11 @@ class Agreement:
             power = float((weights * _power(levers, self.forces)).sum())
             if not power > 0:
                 continue
-            rest = self.between - self._told
+            rest = self.between - self._expected_times_forces
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
             fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
             large = fault.fall > CERTAIN and abs(size) > max(SMALL_LEVER, 4 * fault.error)
-            if large and self._worth(self.without(fault), weights):
+            if large and self._is_worth_correcting(self.without(fault), weights):
                 yield fault
 
     def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
@@ -294,14 +294,18 @@ class Agreement:
     def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Two channels that each have what the other one measured."""
         for pair, other in self._exchanges():
-            fall = self._better(other, weights)
+            fall = self._certain_improvement(other, weights)
             if fall:
                 yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
     def blind(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments of one axis that might be exchanged without being named."""
         alike = ((pair, other) for pair, other in self._exchanges() if len({s.component for s in pair}) == 1)
-        return [pair for pair, other in alike if pair[0] in self.inputs and not other._better(self, other.weights)]
+        return [
+            pair
+            for pair, other in alike
+            if pair[0] in self.inputs and not other._certain_improvement(self, other.weights)
+        ]
 
     def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
         """Pairs of channels of one quantity, of one place or of one axis, and this with them exchanged."""
@@ -311,15 +315,15 @@ class Agreement:
                 if what == 1 and (at == 1 or axis == 1):
                     yield pair, self._crossed(pair)
 
-    def _better(self, other: "Agreement", weights: np.ndarray) -> float:
+    def _certain_improvement(self, other: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
         fall = float((weights * (self.left - other.left)).sum())
-        return fall if fall > CERTAIN and self._worth(other, weights) else 0.0
+        return fall if fall > CERTAIN and self._is_worth_correcting(other, weights) else 0.0
 
     def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
         """The agreement with two channels exchanged, both of the forces or both of the readings."""
         response = self.response.copy()
-        response[self._picked(pair)[1]] = self.response[self._picked(pair[::-1])[1]]
+        response[self._indices_of(pair)[1]] = self.response[self._indices_of(pair[::-1])[1]]
         return replace(self, response=response)
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
@@ -336,12 +340,15 @@ class Agreement:
     def seen(self) -> dict[str, tuple[float, float]]:
         """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
-        rest, smallest = WORTH * self._rest(weights), {}
+        rest, smallest = WORTH * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
             for group in (group for group in self.groups() if len(group.members) == 1):
                 power = weights * self.share(group)[1]
                 late, wrong = square @ power, power.sum(axis=0)
-                smallest[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
+                smallest[group.name] = (
+                    _smallest_certain_size(late, rest, SMALL_DELAY),
+                    _smallest_certain_size(wrong, rest, SMALL_FACTOR),
+                )
         return smallest
 
     def factor(self, signal: Signal) -> tuple[float, float]:
@@ -350,19 +357,19 @@ class Agreement:
         cross, power = ((self.weights * part).sum() for part in self.share(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
 
-    def _rest(self, weights: np.ndarray) -> np.ndarray:
+    def _unexplained_power(self, weights: np.ndarray) -> np.ndarray:
         """Weighted power (k,) of every reading that neither forces nor noise explain."""
         return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)
 
-    def _worth(self, other: "Agreement", weights: np.ndarray) -> bool:
+    def _is_worth_correcting(self, other: "Agreement", weights: np.ndarray) -> bool:
         """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
-        return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._rest(weights)))
+        return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._unexplained_power(weights)))
 
     def _signals(self, group: SignalGroup) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.members)
 
 
-def _least(power: np.ndarray, rest: np.ndarray, small: float) -> float:
+def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) -> float:
     """Smallest size that is certain and worth its name, where (k,) power times its square falls on (k,) readings."""
     if not power.sum() > 0:
         return float("inf")

@@ -35,12 +35,12 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
             "map names another channel. Leave it out or name the right one."
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
-    measured = len(good) and np.ptp(good) > ROUNDED * _largest(evidence, signal)
+    measured = len(good) and np.ptp(good) > ROUNDED * _largest_of_quantity(evidence, signal)
     findings = [_clipped(signal, values, good, end, period) for end in ends(values)] if measured else []
     return findings or _stuck(signal, values, period)
 
 
-def _largest(evidence: Evidence, signal: Signal) -> float:
+def _largest_of_quantity(evidence: Evidence, signal: Signal) -> float:
     """Largest value of any channel of the signal's quantity."""
     alike = [other for other in evidence.recording.signals if other.quantity == signal.quantity]
     return max(float(np.nanmax(np.abs(evidence.recording.samples(other)), initial=0.0)) for other in alike)

@@ -64,7 +64,7 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
 def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
     of_file = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
     signals = tuple(s.name for s in evidence.inertial if s.file == name)
-    late = np.array([part.lateness(SignalGroup(name, False, of_file), part.weights)[:2] for _, part in windows])
+    late = np.array([part.delay_of(SignalGroup(name, False, of_file), part.weights)[:2] for _, part in windows])
     slope, error = _slope(np.array([at for at, _ in windows]), *late.T)
     apart = slope * evidence.recording.duration
     if abs(slope) > CERTAIN * error and abs(apart) > SMALL:

@@ -9,7 +9,7 @@ import numpy as np
 from models.measured.checks.agreement import Agreement, MeasurementFault
 from models.measured.checks.response import AXES, SensorResponse, number
 from models.measured.checks.spectra import Spectra, mean, noise, spectra
-from models.measured.ratios import wrong
+from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -71,12 +71,12 @@ class Evidence:
             return f"the vertical force of {', '.join(bare)}"
         if not self.inertial:
             return "an accelerometer or gyro whose place on the vehicle is known"
-        if self.dead:
-            return f"life in {', '.join(self.dead)}"
+        if self.constant_signals:
+            return f"life in {', '.join(self.constant_signals)}"
         return "" if self._spectra is not None else "a few seconds at 5 Hz or more without a gap in any channel"
 
     @cached_property
-    def dead(self) -> tuple[str, ...]:
+    def constant_signals(self) -> tuple[str, ...]:
         """Names of forces and inertial signals all of whose measured samples are one value."""
         samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial))
         known = ((name, values[np.isfinite(values)]) for name, values in samples)
@@ -91,7 +91,11 @@ class Evidence:
         loads = dict(zip(self.vehicle.hubs, self.vehicle.loads, strict=True)) if self.vehicle else {}
         ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items() if not self.empty(s)}
         ratios |= {s: self.mean(s) / GRAVITY for s in self.recording.find("acceleration", "", "z") if s.gravity}
-        return {s: ratio for s, ratio in ratios.items() if wrong(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT}
+        return {
+            s: ratio
+            for s, ratio in ratios.items()
+            if probable_mistake(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT
+        }
 
     def mean(self, signal: Signal) -> float:
         """Mean of all samples, under a window."""

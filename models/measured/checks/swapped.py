@@ -18,7 +18,7 @@ def check(evidence: Evidence) -> list[Finding]:
         return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
     findings = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
     findings += [_pair(fault) for fault in evidence.faults if fault.kind == "crossed"]
-    return [*findings, _rest(evidence), _blind(evidence)]
+    return [*findings, _remaining_disagreement(evidence), _indistinguishable_hubs(evidence)]
 
 
 def _finding(fault: MeasurementFault) -> Finding:
@@ -38,7 +38,7 @@ def _pair(fault: MeasurementFault) -> Finding:
     return Finding(PAIR, "doubt", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
-def _blind(evidence: Evidence) -> Finding:
+def _indistinguishable_hubs(evidence: Evidence) -> Finding:
     """Finding on pairs of hubs that move the vehicle too much alike to be told apart."""
     assert evidence.searched is not None
     pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
@@ -51,7 +51,7 @@ def _blind(evidence: Evidence) -> Finding:
     return Finding(PAIR, "note", "", text, float(len(pairs)), "pairs")
 
 
-def _rest(evidence: Evidence) -> Finding:
+def _remaining_disagreement(evidence: Evidence) -> Finding:
     """Finding on how well forces and motion agree once all faults are taken out."""
     assert evidence.searched is not None
     left = evidence.searched[0]

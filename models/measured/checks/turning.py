@@ -53,9 +53,9 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     transfer = cross[:, 1, 0] / (1j * omega * cross[:, 0, 0].real)
     weight = squared / np.maximum(1 - squared, 1e-6)
     ratio = float((weight @ transfer).real / weight.sum())
-    late, error = _late(transfer, omega, weight * pair_spectra.averages, ratio)
+    late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
-    if wrong in ("sign", "unit") and _alike(transfer, weight) < ALIKE:
+    if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < ALIKE:
         text = (
             f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "
             "another axis or body; check their names."
@@ -77,13 +77,13 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     return Finding(NAME, "note", names, text, ratio, "1", both)
 
 
-def _alike(transfer: np.ndarray, weight: np.ndarray) -> float:
+def _rate_ratio(transfer: np.ndarray, weight: np.ndarray) -> float:
     """Part of what a rate has at coherent lines that is in phase with the derivative of the angle, by one factor."""
     whole = float(weight.sum() * (weight @ np.abs(transfer) ** 2))
     return float((weight @ transfer).real ** 2) / whole if whole > 0 else 0.0
 
 
-def _late(transfer: np.ndarray, omega: np.ndarray, weight: np.ndarray, ratio: float) -> tuple[float, float]:
+def _delay_by_phase(transfer: np.ndarray, omega: np.ndarray, weight: np.ndarray, ratio: float) -> tuple[float, float]:
     """Delay (s) by the slope of the phase through 0 Hz, and its standard error by the scatter of the lines."""
     phase = np.angle(transfer * np.sign(ratio))
     steep = float(weight @ omega**2)

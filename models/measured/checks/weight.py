@@ -59,9 +59,9 @@ def check(evidence: Evidence) -> list[Finding]:
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
     signals = tuple(of_hub[hub] for hub in vehicle.hubs)
-    numbers, means = _numbers(evidence, vehicle), mean(_columns(evidence, vehicle))
+    numbers, means = _component_numbers(evidence, vehicle), mean(_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
-    coarse = [_coarse(evidence, *each) for each in zip(signals, loads, at, strict=True)]
+    coarse = [_wrong_sign_or_unit(evidence, *each) for each in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
     return [_fine(evidence, _balance(vehicle, numbers, *means), signals, at)]
@@ -71,9 +71,9 @@ def moments(evidence: Evidence) -> np.ndarray:
     """Moments (2,) of the hub forces about x and y, N m, on average, that the measured rates of roll and pitch do not
     bear out: of offsets, gains, or a load that is not in the vehicle file; 0 where they may be chance, or not known."""
     vehicle, none = evidence.vehicle, np.zeros(2)
-    if vehicle is None or evidence.frame == "inertial" or not _turns(evidence, vehicle):
+    if vehicle is None or evidence.frame == "inertial" or not _angular_acceleration_readers(evidence, vehicle):
         return none
-    balanced = _balance(vehicle, _numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
+    balanced = _balance(vehicle, _component_numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
     left, sure = balanced.left[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
     return left if (np.abs(left) > SURE * sure).any() else none
 
@@ -81,10 +81,10 @@ def moments(evidence: Evidence) -> np.ndarray:
 def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
     """Readers of all hub forces, and of the angular accelerations."""
     forces: list[Callable[[], np.ndarray]] = [partial(evidence.recording.samples, s) for s in evidence.forces]
-    return forces + _turns(evidence, vehicle)
+    return forces + _angular_acceleration_readers(evidence, vehicle)
 
 
-def _turns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
+def _angular_acceleration_readers(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
     """Readers of the angular accelerations of roll and pitch by the chassis' gyros; none where one is missing."""
     recording = evidence.recording
 
@@ -95,12 +95,12 @@ def _turns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndar
     return [partial(slope, gyro) for (gyro,) in gyros] if all(gyros) else []
 
 
-def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
+def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
     """Numbers (k,) of the components among all hubs'."""
     return [number(s, vehicle.hubs.index(evidence.hub(s))) for s in evidence.forces]
 
 
-def _coarse(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
+def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
     kind, text = (
         ("size", counted_from_load(signal.name, load, static))
         if abs(load) < EMPTY * static and evidence.empty(signal)

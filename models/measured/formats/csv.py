@@ -78,7 +78,7 @@ def open_csv(path: Path) -> CsvFile:
         units, more = find_units(path, top, head, clock)
         layout, notes = find_layout(path, top, head, clock, units)
         rows, count, left = find_rows(path, layout)
-        findings += notes + more + _ends(path, layout, remarks, count, left)
+        findings += notes + more + _findings_on_end(path, layout, remarks, count, left)
         factor = 1.0 if layout.stamps else _factor(path, head, clock, units[clock])
         start, notes = zoned(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
@@ -130,7 +130,7 @@ def unit_of(text: str) -> str:
     return bracketed[1].strip() if quantities(bracketed[1]) else ""
 
 
-def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
+def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
     """Findings on whether the file ends as a complete file does."""
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")

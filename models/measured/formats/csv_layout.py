@@ -295,10 +295,10 @@ def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, 
         counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
         weight = "note" if counts else "doubt"
         said.append(notice(path, weight, f"column {i + 1} has no name and is left out"))
-    return layout, said + [notice(path, "note", text) for text in _how(layout, list(numbers))]
+    return layout, said + [notice(path, "note", text) for text in _layout_remarks(layout, list(numbers))]
 
 
-def _how(layout: Layout, cells: list[str]) -> Iterator[str]:
+def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
     """Sentences on whatever is not commas between columns of numbers with decimal points."""
     stamps = layout.stamps
     if stamps is not None:

@@ -67,7 +67,7 @@ class Layout:
 
 
 def narrow(data: bytes, unit: np.dtype) -> bytes:
-    """Text with one byte per character; a character that needs two becomes one that is never part of a number."""
+    """Recode text to one byte per character; a wide character becomes a byte that no number can contain."""
     if unit.itemsize == 1:
         return data
     codes = np.frombuffer(data[: len(data) // unit.itemsize * unit.itemsize], unit)
@@ -111,7 +111,7 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
     first stamp where times are those of the clock."""
     line = layout.line + 1 + first
     text = _unquoted(path, layout, narrow(data, layout.unit).replace(b"\r\n", b"\n"), line)
-    _even(path, layout, text, line)
+    _refuse_uneven_row(path, layout, text, line)
     times = None
     if layout.stamps is not None:
         stamps = [cell.replace(_WRONG, layout.separator) for cell in _read(layout, text, [layout.clock], str)[:, 0]]
@@ -169,13 +169,13 @@ def _unquoted(path: Path, layout: Layout, text: bytes, line: int) -> bytes:
     ends = np.flatnonzero(codes == ord("\n"))
     if inside[ends].any():
         row = int(np.argmax(inside[ends]))
-        raise _at(path, line, text, int(ends[row]), "a quote is opened and not closed in this line")
+        raise _error_at_byte(path, line, text, int(ends[row]), "a quote is opened and not closed in this line")
     decimal = layout.separator == layout.decimal == ","
     codes[inside & (codes == ord(layout.separator))] = ord("." if decimal else _WRONG)
     return codes[~quotes].tobytes()
 
 
-def _even(path: Path, layout: Layout, text: bytes, line: int) -> None:
+def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line: int) -> None:
     """Refuse a row that has more or fewer columns than the header."""
     data = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero(data == ord("\n"))
@@ -186,7 +186,9 @@ def _even(path: Path, layout: Layout, text: bytes, line: int) -> None:
         width = int(cells[wrong[0]])
         doubled = width in (2 * layout.width, 2 * layout.width - 1) and layout.separator == ","
         hint = "; where commas are decimal signs, semicolons must part the columns" if doubled else ""
-        raise _at(path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {width}{hint}")
+        raise _error_at_byte(
+            path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {width}{hint}"
+        )
 
 
 def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError | None:
@@ -219,7 +221,7 @@ def _remedy(layout: Layout, cell: str) -> str:
     return "a number is needed; where nothing was measured, leave the cell empty"
 
 
-def _at(path: Path, line: int, text: bytes, place: int, allowed: str) -> InputError:
+def _error_at_byte(path: Path, line: int, text: bytes, place: int, allowed: str) -> InputError:
     """Error at one byte of some rows."""
     begin, end = text.rfind(b"\n", 0, place) + 1, text.find(b"\n", place)
     row = text[begin : len(text) if end < 0 else end].decode("utf-8", errors="backslashreplace")

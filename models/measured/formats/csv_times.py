@@ -44,13 +44,13 @@ class Stamps:
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
         try:
-            stamps = np.array([self._written(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
+            stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
             raise self._culprit(path, cells, line, name) from None
         passed = stamps - self.zero
         return np.asarray((passed % DAY if self.form == "hh:mm:ss.fff" else passed) / 1e9)
 
-    def _written(self, cell: str) -> str:
+    def _cell_for_numpy(self, cell: str) -> str:
         """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
         matched = FORMS[self.form].fullmatch(cell.strip())
         if matched is None or (matched.groupdict().get("zone") or "") != self.zone:
@@ -61,7 +61,7 @@ class Stamps:
         """Error at the first cell that is no time in this notation."""
         for i, cell in enumerate(cells):
             try:
-                np.datetime64(self._written(cell), "ns")
+                np.datetime64(self._cell_for_numpy(cell), "ns")
             except ValueError:
                 where = f" with the zone {self.zone}" if self.zone else ""
                 return InputError(

@@ -138,14 +138,14 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
             raise InputError(
                 path, f"group {g + 1}", records.cycles_nr, "the file is too short for what its records need"
             )
-        why = _useless(mdf, g, version)
+        why = _why_group_unusable(mdf, g, version)
         if why:
             left.add(why, f"group {g + 1}")
             continue
         for i, channel in enumerate(group.channels):
             if i == mdf.masters_db.get(g):
                 continue
-            why = _unusable(group, i, version)
+            why = _why_channel_unusable(group, i, version)
             if why:
                 left.add(why, repr(channel.name))
             else:
@@ -184,7 +184,7 @@ def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
     return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
 
 
-def _useless(mdf: Any, g: int, version: int) -> str:
+def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
     """Why a group cannot be used; empty where it can."""
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
@@ -195,10 +195,10 @@ def _useless(mdf: Any, g: int, version: int) -> str:
         return "no clock"
     if version == 4 and group.channels[master].sync_type != SECONDS:
         return "its clock does not count seconds"
-    return "" if _inside(group, group.channels[master], version) else "its clock lies outside the records"
+    return "" if _bits_within_record(group, group.channels[master], version) else "its clock lies outside the records"
 
 
-def _unusable(group: Any, i: int, version: int) -> str:
+def _why_channel_unusable(group: Any, i: int, version: int) -> str:
     """Why a channel is no number per sample; empty where it is."""
     channel = group.channels[i]
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
@@ -207,10 +207,10 @@ def _unusable(group: Any, i: int, version: int) -> str:
     numbers = channel.channel_type == 0 and channel.data_type in PLAIN[version] and conversion in CONVERSIONS[version]
     if not numbers or group.channel_dependencies[i]:
         return "no numbers"
-    return "" if _inside(group, channel, version) else "bits outside the records (a damaged file has such)"
+    return "" if _bits_within_record(group, channel, version) else "bits outside the records (a damaged file has such)"
 
 
-def _inside(group: Any, channel: Any, version: int) -> bool:
+def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
     """Whether a channel's bits are within its records: the library copies unchecked, and may take the process down."""
     records, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:

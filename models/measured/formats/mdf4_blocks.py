@@ -25,7 +25,7 @@ VLSD = 1
 
 
 @dataclass(frozen=True)
-class Block:
+class MdfBlock:
     """Kind, links and the bytes after the links (the first hundred)."""
 
     kind: bytes
@@ -43,7 +43,7 @@ def check_blocks(path: Path) -> list[Finding]:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
             text = "the recorder did not finish this file: let its software finalise it, or asammdf save it anew"
             raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), text)
-        blocks = dict(_walk(path, data, size))
+        blocks = dict(_linked_blocks(path, data, size))
         if blocks[FIRST].kind != b"##HD":
             raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
     _chains(path, blocks)
@@ -51,7 +51,7 @@ def check_blocks(path: Path) -> list[Finding]:
     return [finding for place, block in groups for finding in _records(path, place, block, blocks)]
 
 
-def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
+def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, MdfBlock]]:
     """Every block that a link leads to, with its place."""
     seen, ahead, cut = {FIRST}, [FIRST], f"; the file has {size} bytes: it is cut off or damaged"
     while ahead:
@@ -64,13 +64,13 @@ def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]
             raise InputError(path, f"byte {place}", None, text)
         links = struct.unpack_from(f"<{count}Q", data, place + HEAD)
         rest = place + HEAD + 8 * count
-        yield place, Block(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
+        yield place, MdfBlock(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
         new = {link for link in links if link} - seen
         seen |= new
         ahead += sorted(new)
 
 
-def _chains(path: Path, blocks: dict[int, Block]) -> None:
+def _chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
     """Refuse a chain that leads back into itself."""
     ended: set[int] = set()
     for place in blocks:
@@ -83,7 +83,7 @@ def _chains(path: Path, blocks: dict[int, Block]) -> None:
         ended |= set(chain)
 
 
-def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> list[Finding]:
+def _records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
     """Refuse channel groups that announce more records than their data group has bytes for; say where it has more."""
     there = sum(_length(path, at, blocks) for at in _data(path, group.links[2], blocks))
     id_size = group.data[0]
@@ -104,7 +104,7 @@ def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> 
     return []
 
 
-def _data(path: Path, place: int, blocks: dict[int, Block]) -> list[int]:
+def _data(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
     """Places of the data blocks behind a link to them or to a list of them."""
     places, ahead = list[int](), [place]
     while ahead:
@@ -118,7 +118,7 @@ def _data(path: Path, place: int, blocks: dict[int, Block]) -> list[int]:
     return places
 
 
-def _length(path: Path, place: int, blocks: dict[int, Block]) -> int:
+def _length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
     """Bytes of records in a data block, unpacked."""
     block = blocks[place]
     if block.kind != b"##DZ":

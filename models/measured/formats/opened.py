@@ -133,7 +133,7 @@ def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tupl
         for group in [texts for texts in groups if len({texts[i] for i in places}) == len(places)][:1]:
             for i in places:
                 by_group[i] = f"{group[i]}/{name}" if group[i] else name
-    unique = _numbered(by_group)
+    unique = _number_repeated(by_group)
     for name, places in repeated.items():
         weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in places) else "note"
         text = f"{len(places)} channels are called {name!r}: they are read as "
@@ -141,7 +141,7 @@ def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tupl
     return unique, said
 
 
-def _numbered(names: Sequence[str]) -> list[str]:
+def _number_repeated(names: Sequence[str]) -> list[str]:
     """Names with a number behind those that are repeated."""
     uses, taken, unique = Counter(names), set(names), []
     for name in names:

@@ -79,7 +79,7 @@ def open_rpc(path: Path) -> RpcFile:
             Channel(
                 name,
                 parameters.get(f"UNITS.CHAN_{i}", "").strip(),
-                _long(parameters, f"COMMENT.CHAN_{i}"),
+                _join_long_text(parameters, f"COMMENT.CHAN_{i}"),
                 0,
                 count,
                 layout.period,
@@ -88,7 +88,9 @@ def open_rpc(path: Path) -> RpcFile:
             for name, i, step in zip(names, numbers, steps, strict=True)
         )
         start, notes = zoned(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
-        return RpcFile(path, channels, start, _long(parameters, "COMMENT"), (*said, *repeated, *notes), layout)
+        return RpcFile(
+            path, channels, start, _join_long_text(parameters, "COMMENT"), (*said, *repeated, *notes), layout
+        )
 
 
 def read_parameters(path: Path) -> dict[str, str]:
@@ -197,7 +199,7 @@ def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> lis
     return [notice(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
 
 
-def _long(parameters: dict[str, str], name: str) -> str:
+def _join_long_text(parameters: dict[str, str], name: str) -> str:
     """Text that is spread over several parameters, NAME_1, NAME_2, ... with line ends written as ``\\n``."""
     parts: list[str] = []
     while (key := f"{name}_{len(parts) + 1}") in parameters:

@@ -128,9 +128,11 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
-    zero = min((start for _, channel in usable if (start := _started(channel)) is not None), default=None)
+    zero = min((start for _, channel in usable if (start := _start_in_utc(channel)) is not None), default=None)
     with_clock = [
-        (channel, place) for group, channel in usable if (place := _place(group, channel, zero, left)) is not None
+        (channel, place)
+        for group, channel in usable
+        if (place := _channel_location(group, channel, zero, left)) is not None
     ]
     said = [*cut, *left.findings(path)]
     if not with_clock:
@@ -168,9 +170,9 @@ def _numeric(channel: Any, left_out: LeftOut) -> bool:
     return False
 
 
-def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> ChannelLocation | None:
+def _channel_location(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> ChannelLocation | None:
     """Where a channel's samples and times are; None where it has no clock or is one."""
-    properties, start = channel.properties, _started(channel)
+    properties, start = channel.properties, _start_in_utc(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
     if str(properties.get("wf_xunit_string", "s")).casefold() not in SECONDS:
@@ -193,7 +195,7 @@ def _place(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -
     return ChannelLocation(group.name, channel.name, clocks[0].name, late, 0.0)
 
 
-def _started(channel: Any) -> datetime | None:
+def _start_in_utc(channel: Any) -> datetime | None:
     """When a channel began, in UTC; None where the file does not say."""
     stamp = channel.properties.get("wf_start_time")
     if not hasattr(stamp, "seconds"):

@@ -84,7 +84,7 @@ def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) ->
         raise InputError(path, "start", str(start), "a start with its time zone is needed")
 
 
-def _single(path: Path, groups: Sequence[ChannelGroup], form: str) -> ChannelGroup:
+def _only_group(path: Path, groups: Sequence[ChannelGroup], form: str) -> ChannelGroup:
     """The only group of a format with one clock."""
     if len(groups) != 1:
         raise InputError(path, "groups", len(groups), f"{form} has one sampling rate: write a file for each, or MDF 4")
@@ -126,7 +126,7 @@ def write_csv(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
     """Write the header to the file ``temporary``, then rows of shortest numbers, block by block."""
-    group = _single(path, groups, "CSV")
+    group = _only_group(path, groups, "CSV")
     for name, unit in zip(group.names, group.units, strict=True):
         if is_clock(name):
             raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
@@ -232,7 +232,7 @@ def write_rpc(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
     """Write the header, groups of samples, and the header again with the limits of every channel."""
-    group = _single(path, groups, "RPC III")
+    group = _only_group(path, groups, "RPC III")
     limits = np.tile([[np.inf], [-np.inf]], len(group.names))
     with temporary.open("wb") as file:
         file.write(_rpc_header(path, group, limits, start, comment))
@@ -278,13 +278,13 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
         "PARTITIONS": 1,
         "PART.CHAN_1": 1,
         "PART.NCHAN_1": len(group.names),
-        **_long("COMMENT", comment),
+        **_spread_long_text("COMMENT", comment),
     }
     texts = zip(group.names, group.units, limits.T, group.comments, strict=True)
     for i, (name, unit, (low, high), text) in enumerate(texts, start=1):
         told = {"DESC": name, "UNITS": unit, "SCALE": "1.0", "LOWER_LIMIT": f"{low:.9g}", "UPPER_LIMIT": f"{high:.9g}"}
         parameters |= {f"{key}.CHAN_{i}": value for key, value in (told | {"MAP": str(i)}).items()}
-        parameters |= _long(f"COMMENT.CHAN_{i}", text)
+        parameters |= _spread_long_text(f"COMMENT.CHAN_{i}", text)
     count = len(parameters) + 3
     if count > MOST:
         text = f"the header has {MOST} parameters, {count} are needed: write fewer channels or comments, or MDF 4"
@@ -306,7 +306,7 @@ def _record(path: Path, key: str, value: str) -> bytes:
     return key.encode("ascii").ljust(KEY, b"\0") + text.ljust(RECORD - KEY, b"\0")
 
 
-def _long(name: str, text: str) -> dict[str, object]:
+def _spread_long_text(name: str, text: str) -> dict[str, object]:
     """Spread a text over several parameters, with line ends written as ``\\n``."""
     plain = text.replace("\\", "\\\\").replace("\n", "\\n")
     return {f"{name}_{i // LONGEST + 1}": plain[i : i + LONGEST] for i in range(0, len(plain), LONGEST)}

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, Motion
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL, CutVehicle
 
@@ -40,7 +40,7 @@ class PlainHubs:
     def __init__(self, vehicle: CutVehicle, hub_inputs: "HubInputs", step: float, any_time: bool = False) -> None:
         self.vehicle, self.hub_inputs, self.step, self.any_time = vehicle, hub_inputs, step, any_time
         self.bodies = Bodies(vehicle.tree)
-        self.parts = Parts(self.bodies, vehicle.uncut, vehicle.chassis)
+        self.parts = PlainParts(self.bodies, vehicle.uncut, vehicle.chassis)
         self.held, self.loads = held_at_rest(vehicle.uncut, vehicle.chassis)
         self._weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         tyres = vehicle.uncut.tyres
@@ -63,7 +63,7 @@ class PlainHubs:
         inside = spring + other
         by_hubs, wrenches = self._act(motion, hubs, q)
         force += by_hubs - inside @ travels.gradient
-        acceleration, moments = self._hold(mass, force, guide, q, v)
+        acceleration, moments = self._guide_accelerations(mass, force, guide, q, v)
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
@@ -93,7 +93,7 @@ class PlainHubs:
         rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
-    def _act(self, motion: Motion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of all hubs by a row of the hub inputs, and their wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
@@ -108,7 +108,7 @@ class PlainHubs:
         return total, wrenches
 
     def _tyre(
-        self, i: int, hub: np.ndarray, motion: Motion, road: tuple[float, float], q: np.ndarray
+        self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment (N m) in space at a hub by its tyre on a road of a height (m) and rate (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
@@ -124,7 +124,7 @@ class PlainHubs:
         side = grip * cornering * (roll_steer * q[ROLL] + q[HEADING] - sideways / speed)
         return np.array([-load * rising / speed, side, load]), side * np.array([-down[2], 0.0, down[0]])
 
-    def _hold(
+    def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
 from models.vehicles.spatial import SpatialVehicle, Vector
 
 Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
@@ -54,10 +54,10 @@ class PlainTree:
         if len(self._loads):
             force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
         if self._lines:
-            force += self._drawn(motion)
+            force += self._line_spring_forces(motion)
         return mass + self._rows.T * self._inertia @ self._rows, force
 
-    def _drawn(self, motion: Motion) -> np.ndarray:
+    def _line_spring_forces(self, motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of springs along lines: -F dl/dq, l the distance of their ends."""
         total, ends = np.zeros(self.size), motion.at(self._ends)
         for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):

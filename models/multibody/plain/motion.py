@@ -43,7 +43,7 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PlainMotion:
     """All bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the space first."""
 
     matrices: np.ndarray
@@ -108,7 +108,7 @@ class Bodies:
         arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
-    def move(self, q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
         """All bodies at coordinates and rates (n,): m, rad, per s."""
         matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
@@ -119,7 +119,7 @@ class Bodies:
             for j in coordinates:
                 rows = self._joint(rows, j, steps[j], float(v[j]))
             matrices[i + 1] = rows
-        return Motion(matrices)
+        return PlainMotion(matrices)
 
     def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
         """Rows of matrices behind joint j, by the product rule, from those before it."""
@@ -130,7 +130,7 @@ class Bodies:
         rows[REST] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
         return rows
 
-    def inertia(self, motion: Motion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n), and forces (n,) of weights (gravity (3,), m/s^2) less what inertia asks without q''."""
         columns = motion.matrices[1:, FIRST:]
         count = self.size

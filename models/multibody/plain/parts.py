@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion, Points
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion, Points
 from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
 
 
@@ -27,7 +27,7 @@ class Travels:
     gradient: np.ndarray
 
 
-class Parts:
+class PlainParts:
     """The springs, then the bars, of a vehicle on its bodies; ``default`` is the frame of those that name none."""
 
     def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
@@ -56,7 +56,7 @@ class Parts:
         self._design = np.zeros(len(both))
         self._design = self.travels(bodies.move(still, still), still, still).travel
 
-    def travels(self, motion: Motion, q: np.ndarray, v: np.ndarray) -> Travels:
+    def travels(self, motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
         """Travels at coordinates and rates (n,) in whose motion all bodies are."""
         axes, apart = motion.at(self._axes), motion.at(self._two) - motion.at(self._one)
         axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]

@@ -10,8 +10,8 @@ import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.road import driven, surface
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
@@ -86,7 +86,7 @@ class PlainRolling:
     def __init__(self, handling: "Handling") -> None:
         self.handling, vehicle = handling, handling.vehicle
         self.bodies = Bodies(vehicle)
-        self.parts = Parts(self.bodies, vehicle, CARRIER)
+        self.parts = PlainParts(self.bodies, vehicle, CARRIER)
         held, self.loads = held_at_rest(vehicle, CARRIER)
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, vehicle)
@@ -113,9 +113,9 @@ class PlainRolling:
         of = handling.tyres
         self._bristles = cornering / (cornering_factor(of.cells) * self._radius * sunk * of.half_width)
         self._leans = np.where(self._towed, 0.0, of.inclination * np.sign([tyre.point[1] for tyre in tyres]))
-        self._shares(tyres)
+        self._shares_of_tyres(tyres)
 
-    def _shares(self, tyres: tuple[Tyre, ...]) -> None:
+    def _shares_of_tyres(self, tyres: tuple[Tyre, ...]) -> None:
         """Shares of steering, brake and drive of every tyre: wheels of an axle share evenly, and so do axles behind;
         what is towed is not driven."""
         axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
@@ -133,7 +133,7 @@ class PlainRolling:
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
         by_tyres, report, ledger = self._roll(t, motion, v)
-        outside, power = self._outside(t, motion)
+        outside, power = self._drag_and_pushes(t, motion)
         travel, rate = self._joints @ q, self._joints @ v
         along, damped = self._joint_held + self._joint_stiffness * travel, self._joint_damping * rate
         mass += self._joints.T * self._joint_inertia @ self._joints
@@ -155,14 +155,14 @@ class PlainRolling:
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _roll(self, t: float, motion: Motion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+    def _roll(self, t: float, motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
         steer, steering = driven(self.handling.controls.steer, t)
         points, angle = motion.at(self._points), self._steered * steer
-        contact = self._touch(motion, points, angle)
+        contact = self._loads_and_points(motion, points, angle)
         slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
         creep = self._creep(contact, slides)
-        force, moments = self._press(motion, points, contact, creep)
+        force, moments = self._tyre_forces(motion, points, contact, creep)
         torques = self._torques(t, beside)
         force += self._turn_wheels(motion, contact.axle, torques)
         power = (creep * slides[:, :3]).sum(1)
@@ -185,7 +185,7 @@ class PlainRolling:
         )
         return force, report, ledger
 
-    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
+    def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
         """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
@@ -205,7 +205,7 @@ class PlainRolling:
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
     def _slide(
-        self, motion: Motion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside what carries them, rad/s.
 
@@ -220,7 +220,7 @@ class PlainRolling:
         on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
         return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
-    def _axles(self, motion: Motion, steer: np.ndarray) -> np.ndarray:
+    def _axles(self, motion: PlainMotion, steer: np.ndarray) -> np.ndarray:
         """Axles (w, 3), to the left of their wheels: steered and leaning beside where the carrier heads, or a towed
         body by its x axis in the road's plane."""
         ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
@@ -237,8 +237,8 @@ class PlainRolling:
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
         return tyre_forces(patch, slides, of.cells)
 
-    def _press(
-        self, motion: Motion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
+    def _tyre_forces(
+        self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
@@ -253,7 +253,7 @@ class PlainRolling:
             total += self._hold(motion, i, about[i] * contact.axle[i])
         return total, moments
 
-    def _hold(self, motion: Motion, i: int, moment: np.ndarray) -> np.ndarray:
+    def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of a moment that what carries wheel i takes over from the wheel's body."""
         return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
@@ -267,7 +267,7 @@ class PlainRolling:
         torque = self._driven * driving - self._braked * braking * np.tanh(relative_spin / of.brake_rate)
         return np.where(self._rotors >= 0, torque, 0.0)
 
-    def _turn_wheels(self, motion: Motion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
+    def _turn_wheels(self, motion: PlainMotion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
         """Generalised forces (n,) of torques on the wheels, and against them on what carries these."""
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
@@ -275,7 +275,7 @@ class PlainRolling:
             total -= self._hold(motion, i, torques[i] * axles[i])
         return total
 
-    def _outside(self, t: float, motion: Motion) -> tuple[np.ndarray, float]:
+    def _drag_and_pushes(self, t: float, motion: PlainMotion) -> tuple[np.ndarray, float]:
         """Generalised forces (n,) of drag and pushes, and their power (W)."""
         heading = motion.axes(self._carrier)[PLACE]
         total, power = np.zeros(self.bodies.size), 0.0

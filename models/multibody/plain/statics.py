@@ -9,7 +9,7 @@ import numpy as np
 
 from models.multibody.plain.joint_elements import joint_rows
 from models.multibody.plain.motion import FIRST, Bodies
-from models.multibody.plain.parts import Parts
+from models.multibody.plain.parts import PlainParts
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 
 
@@ -18,7 +18,7 @@ def held_at_rest(vehicle: SpatialVehicle, frame: str | None) -> tuple[np.ndarray
     tyres (N)."""
     bodies = Bodies(vehicle)
     still = np.zeros(bodies.size)
-    motion, parts = bodies.move(still, still), Parts(bodies, vehicle, frame)
+    motion, parts = bodies.move(still, still), PlainParts(bodies, vehicle, frame)
     risen = motion.at(bodies.points([(tyre.body, tyre.point) for tyre in vehicle.tyres]))[:, FIRST:, 2]
     rows = np.vstack([parts.travels(motion, still, still).gradient, joint_rows(bodies, vehicle), risen])
     springs = [_stiffness_at_rest(spring) for spring in vehicle.springs]

@@ -10,7 +10,7 @@ from models.bicycle import rolling_tyres as rt
 from models.bicycle.ideal_rolling import FALLEN, IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.bicycle.whipple import Whipple
-from models.core.assumptions import Assumption, judged
+from models.core.assumptions import Assumption, with_assumptions
 from models.core.discretisation import Series, by_steps, not_estimated, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
@@ -80,7 +80,7 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
         axes["wheel"] = Channel("wheel", ["rear", "front"])
     counts = {"steps": ride.steps}
     labelled = result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=ride)
-    judged(labelled, assumptions(scene))
+    with_assumptions(labelled, assumptions(scene))
     if not error:
         return labelled
     return (

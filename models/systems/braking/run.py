@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.systems.braking.assumptions import assumptions
@@ -37,9 +37,9 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     except RunFailed as failure:
         if failure.partial is not None:
             seconds = time.perf_counter() - begun
-            failure.partial = judged(_labelled(scene, name, engine, failure.partial, seconds), assumed)
+            failure.partial = with_assumptions(_labelled(scene, name, engine, failure.partial, seconds), assumed)
         raise
-    stop = judged(_labelled(scene, name, engine, path, time.perf_counter() - begun), assumed)
+    stop = with_assumptions(_labelled(scene, name, engine, path, time.perf_counter() - begun), assumed)
 
     return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
 

@@ -23,11 +23,11 @@ def assumptions(scene: ContactScene, body: Contact) -> list[Assumption]:
     """Assumptions that the scene's theory makes of its contact."""
     listed = [*of_pressing(scene, body), *_creepages(body)]
     if isinstance(body, Linear):
-        listed.append(_no_slip(lambda run: {"contact": _used(run, body)}))
+        listed.append(_no_slip(lambda run: {"contact": _utilised_friction(run, body)}))
     if isinstance(body, Linear | Fastsim):
         listed.append(_slender(lambda run: {"contact": np.array([body.a / body.b])}))
     if body.pair.mismatch != 0.0 and body.friction > 0.0:
-        listed.append(_alike(body))
+        listed.append(_bodies_alike(body))
     return listed
 
 
@@ -49,7 +49,7 @@ def of_rows(file: Path) -> list[Assumption]:
         peak = 1.5e-6 * values["load"] / (np.pi * a * b)
         listed = [_slender(lambda run: {"rows": a / b}), _elastic(lambda run: {"rows": peak})]
     creepages = {name: values.get(name, np.zeros(0)) for name in ("xi_x", "xi_y")}
-    return [*listed, _small(lambda run: creepages), _dry(lambda run: creepages)]
+    return [*listed, _small_creepage(lambda run: creepages), _constant_friction(lambda run: creepages)]
 
 
 def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
@@ -64,7 +64,10 @@ def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
 
 
 def _by_radii(scene: ContactScene, body: Contact) -> Callable[[Result], Watched]:
-    """Semi-axes by the radii of curvature that are known: of both bodies, or of the undeformed distance."""
+    """Return the watch function of the semi-axes divided by the known radii of curvature.
+
+    The radii are those of both bodies, or else of the distance between the undeformed surfaces.
+    """
     shares: dict[str, np.ndarray] = {}
     if isinstance(body, OnEllipse):
         axes = {"x": body.a, "y": body.b}
@@ -101,11 +104,14 @@ def _creepages(body: Contact) -> list[Assumption]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
     if isinstance(body, Linear) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
-        return [_small(creepages)]
-    return [_small(creepages), _dry(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")})]
+        return [_small_creepage(creepages)]
+    return [
+        _small_creepage(creepages),
+        _constant_friction(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")}),
+    ]
 
 
-def _small(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _small_creepage(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "small creepage",
         "creepages, and spin times the semi-axis, are so small that their squares do not count",
@@ -116,7 +122,7 @@ def _small(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     )
 
 
-def _dry(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "constant friction",
         "friction is the same however fast the contact slips",
@@ -138,7 +144,7 @@ def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _used(run: Result, body: Contact) -> np.ndarray:
+def _utilised_friction(run: Result, body: Contact) -> np.ndarray:
     """Tangential forces by mu N; without friction any force is too large."""
     force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
@@ -155,7 +161,7 @@ def _slender(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _alike(body: Contact) -> Assumption:
+def _bodies_alike(body: Contact) -> Assumption:
     cost = np.array([body.pair.quasi_identity_error(body.friction)])
     return Assumption(
         "bodies alike",

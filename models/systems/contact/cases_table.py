@@ -15,7 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import band, cells_error, halved, moment_band, slenderness, spin_share, used_with_moment
+from models.contact.accuracy import (
+    band,
+    cells_error,
+    coarser_cells,
+    moment_band,
+    slenderness,
+    spin_share,
+    used_with_moment,
+)
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
@@ -146,7 +154,7 @@ def _forces(values: dict[str, Any], built: Build, method: Method, errors: bool =
     fine = fastsim(ellipses, pair, cells=method.cells, **choices)
     forces = [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation]
     if errors:
-        coarse = fastsim(ellipses, pair, cells=halved(method.cells), **choices)
+        coarse = fastsim(ellipses, pair, cells=coarser_cells(method.cells), **choices)
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
         share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)

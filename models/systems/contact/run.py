@@ -16,7 +16,7 @@ from models.contact.hertz import Hertz, by_approach, by_axes, by_load
 from models.contact.material import Falling, Pair
 from models.contact.profile_files import read_profile
 from models.contact.profiles import Profile
-from models.contact.simplified_theory import PLAIN, NormalContact, Options, press
+from models.contact.simplified_theory import PLAIN, NormalContact, SimplifiedOptions, press
 from models.contact.standard_profiles import RAILS, WHEELS, built_in
 from models.contact.theories import (
     Contact,
@@ -31,7 +31,7 @@ from models.contact.theories import (
 )
 from models.contact.undeformed_distance import quadratic
 from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended
@@ -139,7 +139,7 @@ def run(
         steps[-1] = shown
     forces, off = zip(*steps, strict=True)
     rolls = Rolls(body, motions, forces, off if error else (), marks[0] - start, np.diff(marks))
-    labelled = judged(_result(scene, rolls, seconds), assumptions(scene, body))
+    labelled = with_assumptions(_result(scene, rolls, seconds), assumptions(scene, body))
     return with_error(labelled, scene, body, off) if error else labelled
 
 
@@ -190,7 +190,7 @@ def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: boo
     seconds = time.perf_counter() - start
     rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
     table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
-    judged(table, of_rows(scene.cases_file()))
+    with_assumptions(table, of_rows(scene.cases_file()))
     return with_error_of_rows(table, scene) if error else table
 
 
@@ -264,7 +264,7 @@ def creepages(scene: ContactScene) -> list[Motion]:
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
-def interpenetrating(hertz: Hertz, pair: Pair, options: Options = PLAIN) -> NormalContact:
+def interpenetrating(hertz: Hertz, pair: Pair, options: SimplifiedOptions = PLAIN) -> NormalContact:
     """An ellipse as the theory of 1983 finds it, with room for more than its area."""
     A, B = float(hertz.A), float(hertz.B)
     x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))

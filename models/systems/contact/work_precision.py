@@ -19,7 +19,7 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.material import Pair
 from models.contact.theories import ExactOnEllipse, Linear, Motion, OnEllipse, Simplified
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_cells, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
@@ -49,7 +49,7 @@ Roll = Callable[[Motion], Any]
 
 
 @dataclass(frozen=True)
-class Case:
+class ContactCase:
     """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N.
 
     parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
@@ -91,7 +91,7 @@ class Case:
         return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
-def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
+def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = FINEST) -> ContactCase:
     """The case with its forces: the error of the grid is taken out, and what is left of it stated.
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
@@ -130,25 +130,25 @@ class TheorySettings:
 
     name: str
     cells: tuple[int, ...]
-    rolled: Callable[[Case, int], Roll]
+    rolled: Callable[[ContactCase, int], Roll]
 
 
-def _fastsim(**choices: Any) -> Callable[[Case, int], Roll]:
-    def rolled(case: Case, cells: int) -> Roll:
+def _fastsim(**choices: Any) -> Callable[[ContactCase, int], Roll]:
+    def rolled(case: ContactCase, cells: int) -> Roll:
         ellipse = Ellipse(case.a / case.b, case.pair, cells=cells, **choices)
         return lambda motion: ellipse(case.a, case.load, case.friction, *motion)
 
     return rolled
 
 
-def _simplified(case: Case, cells: int) -> Roll:
+def _simplified(case: ContactCase, cells: int) -> Roll:
     pressed = interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair)
     contact = Simplified(pressed, case.friction)
     return lambda motion: contact.roll(motion, cells)
 
 
-def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
-    def rolled(case: Case, cells: int) -> Roll:
+def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], Roll]:
+    def rolled(case: ContactCase, cells: int) -> Roll:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
 
@@ -158,14 +158,14 @@ def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
 FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
 """Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
 WAYS = (
-    TheorySettings("linear theory", (1,), _of(Linear)),
+    TheorySettings("linear theory", (1,), _rolled_by_theory(Linear)),
     TheorySettings("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
     TheorySettings("FASTSIM, plain march", FINE, _fastsim(march="plain")),
     TheorySettings("FASTSIM", FAST, _fastsim()),
     TheorySettings("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
     TheorySettings("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
     TheorySettings("theory of 1983", NET, _simplified),
-    TheorySettings("exact theory", GRID, _of(ExactOnEllipse)),
+    TheorySettings("exact theory", GRID, _rolled_by_theory(ExactOnEllipse)),
 )
 
 
@@ -191,7 +191,7 @@ class TheoryPoint:
         return float(np.quantile(self.errors, 0.95))
 
 
-def measure(theory: TheorySettings, cells: int, cases: list[Case], repeats: int = 3) -> TheoryPoint:
+def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
     """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
     errors, seconds = [], []
     for case in cases:
@@ -237,10 +237,11 @@ def ellipse_cases(
     pair: Pair,
     levels: tuple[float, ...],
     kinds: dict[str, Parts] = KINDS,
-) -> list[Case]:
+) -> list[ContactCase]:
     """All kinds and levels on one ellipse, without their forces."""
     return [
-        Case(a, b, load, friction, pair, kind, parts, level) for (kind, parts), level in product(kinds.items(), levels)
+        ContactCase(a, b, load, friction, pair, kind, parts, level)
+        for (kind, parts), level in product(kinds.items(), levels)
     ]
 
 
@@ -251,10 +252,10 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
     """
     hertz, built = hertz_of(scene), built_of(scene)
     cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
-    known, points = list[Case](), list[TheoryPoint]()
+    known, points = list[ContactCase](), list[TheoryPoint]()
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))
-        known.append(exact(case))
+        known.append(with_exact_forces(case))
     for i, way in enumerate(WAYS):
         progress(way.name, 0.5 + 0.5 * i / len(WAYS))
         points += [measure(way, cells, known) for cells in way.cells]
@@ -266,7 +267,7 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
         "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
-    judged(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
+    with_assumptions(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
     left = by_cells(rms(price["uncertainty"]), 1.0, "mu N", max(FINEST), 1.0, MOST_CELLS)
     return stated(price, {"exact force": left}, "three grids of the exact theory")
 
@@ -280,12 +281,12 @@ def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
     cases."""
     errors = attrgetter("mean"), attrgetter("most")
     return [
-        (f"{100 * target:g} %", *(_told(cheapest(points, target, error), error) for error in errors))
+        (f"{100 * target:g} %", *(_point_text(cheapest(points, target, error), error) for error in errors))
         for target in TARGETS
     ]
 
 
-def _told(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
+def _point_text(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
     if point is None:
         return "none"
     seconds = cost((point.seconds, *point.range))

@@ -5,7 +5,7 @@ import numpy as np
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, along
+from models.systems.handling.run import Drive, joint_travel
 
 
 def energy(drive: Drive) -> np.ndarray:
@@ -34,5 +34,5 @@ def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
         total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
         total -= body.mass * handling.gravity @ motion.centre
     for element in handling.vehicle.joint_elements:
-        total += 0.5 * element.inertia * float(along(handling, element, v)) ** 2
+        total += 0.5 * element.inertia * float(joint_travel(handling, element, v)) ** 2
     return float(total)

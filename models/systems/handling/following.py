@@ -11,7 +11,7 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.core.smoothing import smoothed
-from models.measured.drive import Measured
+from models.measured.drive import MeasuredDrive
 from models.multibody.numbers import Control, Controls, Handling
 from models.systems.handling.run import driven
 
@@ -23,7 +23,7 @@ LOW_PASS = 2.0
 """Hz: torques follow no faster change of the speed, which would be the sensor's noise."""
 
 
-def controls_along(handling: Handling, drive: Measured, step: float, file: str) -> Controls:
+def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: str) -> Controls:
     """Steering, brakes and drive that move the car along a measured steer angle and speed.
 
     handling : the car, with the shares of its axles in braking and driving; step : s, of the march; file : of the
@@ -49,7 +49,7 @@ def controls_along(handling: Handling, drive: Measured, step: float, file: str) 
     raise RunFailed(ENGINE, f"no torque of the wheels gives the measured speed: it is off by up to {off:.3g} m/s")
 
 
-def _with_torque(controls: Controls, drive: Measured, torque: np.ndarray) -> Controls:
+def _with_torque(controls: Controls, drive: MeasuredDrive, torque: np.ndarray) -> Controls:
     """Controls with the measured steer angle and a torque (n,) in N m of all wheels together."""
     times = drive.times - drive.times[0]
 

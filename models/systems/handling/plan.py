@@ -49,7 +49,7 @@ def describe(scene: HandlingScene) -> str:
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
         *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
-        *(_line(*line) for line in _shares(first)),
+        *(_line(*line) for line in _native_shares(first)),
         _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
         _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
     ]
@@ -58,7 +58,7 @@ def describe(scene: HandlingScene) -> str:
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
 
 
-def _shares(handling: Handling) -> list[tuple[str, str]]:
+def _native_shares(handling: Handling) -> list[tuple[str, str]]:
     """What of the springs is native in each engine, and why no more: heads and texts."""
     divisions = {engine: divided(handling, engine) for engine in ENGINES}
     native = {engine: division.native for engine, division in divisions.items()}

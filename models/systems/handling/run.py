@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Estimate, Series, by_cells, by_steps, not_estimated, size_of, stated, summed
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
@@ -164,7 +164,7 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
     labelled = result(
         scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=manoeuvre
     )
-    return judged(labelled, assumptions(drive.handling))
+    return with_assumptions(labelled, assumptions(drive.handling))
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
@@ -184,7 +184,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreRerun:
-    """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
+    """Reruns of a drive in an engine, from a speed (m/s), with other steps or another mesh of the tyre's patch."""
 
     engine: str
     drive: Drive
@@ -196,7 +196,7 @@ class ManoeuvreRerun:
         return float(self.drive.run.times[1])
 
     @cached_property
-    def twice(self) -> Series:
+    def in_double_step(self) -> Series:
         """The manoeuvre in twice the step; raises RunFailed."""
         return self._with_net(self.drive.handling.tyres.cells, 2.0)
 
@@ -212,7 +212,7 @@ class ManoeuvreRerun:
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:
-            return self.twice
+            return self.in_double_step
         run, handling, step = self.drive.run, self.drive.handling, factor * self.step
         first, count = round(MIDDLE * (len(run.times) - 1)), max(2, round(share * (len(run.times) - 1) / factor))
         later = _later(handling, run.times[first])
@@ -229,7 +229,7 @@ class ManoeuvreRerun:
         cells = self.drive.handling.tyres.cells
         other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
         try:
-            base, coarse = self.twice, self._with_net(other, 2.0)
+            base, coarse = self.in_double_step, self._with_net(other, 2.0)
         except RunFailed:
             base, coarse = principal(self.drive), self._with_net(other, 1.0)
         creepages, fewer, more = (self._creep(count) for count in (cells, other, finer))
@@ -357,13 +357,13 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
     at.reports(handling.numbers, run.times, *states, report, ledger)
     for element in handling.vehicle.joint_elements:
-        travel, rate = (along(handling, element, values) for values in states)
+        travel, rate = (joint_travel(handling, element, values) for values in states)
         ledger[:, at.POTENTIAL] += (element.held + 0.5 * element.stiffness * travel) * travel
         ledger[:, at.DISSIPATED] -= element.damping * rate**2
     return report, ledger
 
 
-def along(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
+def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
     """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
     places = handling.vehicle.coordinates()
     columns = [places.index(place) for place in element.coordinates]

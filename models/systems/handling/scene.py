@@ -22,7 +22,7 @@ from models.road.plane_waves import plane_waves
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
-    from models.measured.drive import Measured
+    from models.measured.drive import MeasuredDrive
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
@@ -147,7 +147,7 @@ class HandlingScene(SceneFile):
         tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
         return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
 
-    def drive(self, name: str) -> "Measured":
+    def drive(self, name: str) -> "MeasuredDrive":
         """The measured drive of a manoeuvre, as long as the manoeuvre; InputError for a file that holds none."""
         from models.measured.drive import read_drive
 

@@ -35,13 +35,13 @@ def numbers_beside(handling: Handling, division: Division) -> np.ndarray:
     whole: tuple[SpringDamper | AntiRollBar, ...] = (*handling.vehicle.springs, *handling.vehicle.bars)
     for row, part in zip(rows, whole, strict=True):
         if part.name in native:
-            _leave(row, left.get(part.name))
+            _remainder(row, left.get(part.name))
     kept = rows[rows[:, ACTS].any(axis=1)]
     rows[: len(kept)], numbers[at.PARTS] = kept, len(kept)
     return numbers
 
 
-def _leave(row: np.ndarray, left: Element | None) -> None:
+def _remainder(row: np.ndarray, left: Element | None) -> None:
     """Leave of a part what is not native, nothing where all of it is."""
     gone = left is None or left.travel_force is None, left is None or left.rate_force is None
     row[ACTS[:4]] = (left.stiffness, left.damping, left.held, left.friction) if left else 0.0

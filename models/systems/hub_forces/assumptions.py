@@ -117,7 +117,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
                 "same attitude",
                 "forces that keep their directions meet a vehicle that lies as the measured one",
                 "name the effect kalman_filter or prescribed_angles",
-                lambda run: _beside(run, angles),
+                lambda run: _angle_differences(run, angles),
                 "rad",
                 -TURNED,
                 TURNED,
@@ -175,7 +175,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
     )
 
 
-def _beside(run: Result, angles: Angles | None) -> Watched:
+def _angle_differences(run: Result, angles: Angles | None) -> Watched:
     """Differences of roll and pitch from the measured angles."""
     assert angles is not None
     times = angles.period * np.arange(len(angles.samples))

@@ -105,10 +105,10 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
             if name == FILTER:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    return Comparison(measurement, runs, failed, _true(measurement, last))
+    return Comparison(measurement, runs, failed, _true_run(measurement, last))
 
 
-def _true(measurement: Measurement, engine: str) -> Result | None:
+def _true_run(measurement: Measurement, engine: str) -> Result | None:
     """The labelled run that gave a virtual measurement, with the error that was told of it."""
     if measurement.truth is None:
         return None

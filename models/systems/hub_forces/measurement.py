@@ -61,7 +61,7 @@ def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float,
     return HubInputs(np.column_stack([*heights, *rates]), speed=speed)
 
 
-def truth(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
+def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
     """The vehicle on its tyres, its hub forces in a frame."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
@@ -77,7 +77,7 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
 
 
 def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
-    """Hub forces and angles of a run at every so many of its steps, without noise."""
+    """Hub forces and angles of a run, sampled without noise at every ``every``-th step."""
     n, period = run.states.shape[1] // 2, float(run.times[1]) * every
     angles = run.states[::every, [ROLL, PITCH, n + ROLL, n + PITCH]]
     wrenches = run.wrenches[::every]

@@ -47,13 +47,13 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
                 f"must be above {growth:.3g} Hz: forces that keep their directions topple the vehicle so fast",
             )
     if scene.forces.file is not None:
-        judged(scene, vehicle)
+        doubts_about_files(scene, vehicle)
 
 
 def findings(scene: HubScene) -> tuple[Finding, ...]:
     """Queries about the vehicle, and doubts about measured forces."""
     vehicle = scene.cut_vehicle()
-    doubts = judged(scene, vehicle) if scene.forces.file is not None else ()
+    doubts = doubts_about_files(scene, vehicle) if scene.forces.file is not None else ()
     return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
 
 
@@ -138,7 +138,7 @@ def _line(head: str, text: str) -> str:
     return f"  {head:<10} {text}"
 
 
-def judged(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
+def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
     """Doubts about the files of a scene; InputError for what cannot be, unless the scene accepts it."""
     from models.measured.checks import check
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -70,7 +70,10 @@ class Measurement:
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
-        """Inputs of so many steps (s), roll and pitch held by a method; raises InputError."""
+        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` guides roll and pitch.
+
+        Raises InputError.
+        """
         scene, free = self.scene, self.forces.hub_inputs(step, steps, self.scene.forces.interpolation)
         if method == "kalman":
             from models.systems.hub_forces.tilt_filter import pulled
@@ -252,4 +255,4 @@ def labelled(
         detail=path,
         method=method,
     )
-    return judged(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))
+    return with_assumptions(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))

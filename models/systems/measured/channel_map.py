@@ -79,10 +79,10 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
         remedy = f"name one of {', '.join(numbered)}" if not alike else "rename all but one"
         text = f"is there {len(alike or numbered)} times in {source.path.name}: {remedy}"
         raise InputError(file, place, name, text)
-    raise InputError(file, place, name, f"no such channel in {source.path.name}{_near(name, source)}")
+    raise InputError(file, place, name, f"no such channel in {source.path.name}{_similar_channels(name, source)}")
 
 
-def _near(name: str, source: Source) -> str:
+def _similar_channels(name: str, source: Source) -> str:
     """Phrase with the channels of a file that are most like a name, or else the first ones."""
     plain = {channel.name.casefold(): channel.name for channel in source.channels}
     close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]

@@ -22,7 +22,7 @@ from models.core.whole_files import write_whole
 from models.measured.channel import BLOCK, Source
 from models.measured.columns import Columns
 from models.measured.gaps import without_absurd
-from models.measured.recording import Progress, Recording, silent
+from models.measured.recording import Progress, Recording, no_progress
 from models.measured.resampling import SAME, onto
 from models.measured.signal import Signal
 from models.measured.timing import EVEN, Timing, timing
@@ -83,14 +83,14 @@ def record(
     signals: Sequence[Signal],
     hubs: Sequence[str],
     folder: Path,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Recording:
     """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
     Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
     """
-    shifts, start, noticed = placed(scene, sources)
+    shifts, start, noticed = file_shifts(scene, sources)
     progress("reading times", 0.0)
     placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
     groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
@@ -99,13 +99,13 @@ def record(
         needed = "no channel is mapped to a hub: wheel forces are what drives the vehicle"
         raise InputError(scene.file, "files", None, needed)
     grid = _grid(scene, leading)
-    noticed += [finding for group in groups for finding in (*_of_group(group), *_outside(scene, group, grid))]
+    noticed += [finding for group in groups for finding in (*_of_group(group), *_check_cover(scene, group, grid))]
     columns = _columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
         absurd = list[Finding]()
         for i, group in enumerate(groups):
             progress(f"reading {group.source.path.name}", i / len(groups))
-            absurd += (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+            absurd += (_direct if _is_on_clock(group, grid) else _resampled)(group, grid, columns, folder)
         _referred(scene, signals, columns)
         (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
         columns.close(grid.count)
@@ -134,7 +134,9 @@ def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Fi
     ways: dict[str, list[str]] = {}
     for group in groups:
         faster = group.timing.period < grid.period * (1 - SAME)
-        way = "as it is" if _even(group, grid) else "filtered without phase" if faster else "interpolated linearly"
+        way = (
+            "as it is" if _is_on_clock(group, grid) else "filtered without phase" if faster else "interpolated linearly"
+        )
         ways.setdefault(way, []).append(f"{group.source.path.name} ({group.timing.rate:.6g} Hz)")
     by, rate = "the scene" if scene.clock.rate else "the wheel forces", 1 / grid.period
     told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
@@ -142,7 +144,7 @@ def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Fi
     return Finding("clock", "note", "recording", text, rate, "Hz")
 
 
-def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
+def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
     """Shift of each file's times (s), the date at which the common time is 0, and findings on both."""
     offsets = [file.offset for file in scene.files]
     known = [source.start for source in sources if source.start is not None]
@@ -213,7 +215,7 @@ def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
     return ClockGrid(start, period, count)
 
 
-def _outside(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> Iterator[Finding]:
+def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> Iterator[Finding]:
     """Say, or refuse, that a group does not cover the recording."""
     begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
     late, early = begin - grid.start, end - group.timing.end
@@ -244,7 +246,7 @@ def _columns(
     return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
 
 
-def _even(group: ClockGroup, grid: ClockGrid) -> bool:
+def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     """Whether the samples of a group are those of the clock."""
     clock = group.timing
     at = grid.places(clock.times)

@@ -89,26 +89,26 @@ def consequences(
         )
         try:
             if first not in known:
-                known[first] = run(stretch(recording, samples, begun), begun)
-            put_right = run(stretch(recording, samples | corrected, folder / place), folder / place)
+                known[first] = run(samples_as_recording(recording, samples, begun), begun)
+            put_right = run(samples_as_recording(recording, samples | corrected, folder / place), folder / place)
         except (InputError, RunFailed):
             return Consequence(finding)
-        return _worst(finding, known[first], put_right, answers)
+        return _most_changed_force(finding, known[first], put_right, answers)
 
-    return tuple(consequence(number, finding) for number, finding in enumerate(_different(findings)))
+    return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
 
-def judged(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
+def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
     """The verdict on a run that is accepted but for what its findings do."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
-    reason = "; ".join(told(consequence for consequence in consequences if consequence.grade == worst))
+    reason = "; ".join(consequence_texts(consequence for consequence in consequences if consequence.grade == worst))
     bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
     return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
-def told(consequences: Iterable[Consequence]) -> list[str]:
+def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
     """A text each; where more than FEW are of one check only the worst, which says of how many."""
     kinds: dict[str, list[Consequence]] = {}
     for consequence in consequences:
@@ -120,7 +120,7 @@ def told(consequences: Iterable[Consequence]) -> list[str]:
     return out
 
 
-def _different(findings: Iterable[Finding]) -> list[Finding]:
+def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
     """Doubts, those of the same check about the same channels once; what a filter says follows from all others."""
     doubts = [finding for finding in findings if finding.weight == "doubt"]
     first = {(finding.check, finding.signals or finding.place): finding for finding in reversed(doubts)}
@@ -135,7 +135,7 @@ def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
     return first, count
 
 
-def stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
+def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -> Recording:
     """A recording of these samples."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))
@@ -144,7 +144,7 @@ def stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
     return Recording(recording.signals, columns, recording.period)
 
 
-def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
+def _most_changed_force(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
     """The section force that differs most, of those that carry anything."""
     first = min(round(SETTLING / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
@@ -158,7 +158,7 @@ def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequenc
     return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
 
-def _late(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     """Read later by the delay, or by what a clock has drifted since the start."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
@@ -178,7 +178,7 @@ def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
     return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))
 
 
-def _gained(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _divided_by_factor(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples[s] / factor for s in signals}
@@ -226,11 +226,11 @@ def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, peri
 
 
 CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
-    "shift": _late,
-    "drift": _late,
-    "gain": _gained,
-    "sign": _gained,
-    "unit": _gained,
+    "shift": _read_later,
+    "drift": _read_later,
+    "gain": _divided_by_factor,
+    "sign": _divided_by_factor,
+    "unit": _divided_by_factor,
     "offset": _offset,
     "lever": _referred,
     "exchanged": _exchanged,

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed
 from models.systems.hub_forces.run import LEAST, ORDER
-from models.systems.measured.consequences import stretch
+from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import Outcome, SectionRun
 from models.systems.measured.section_run import run as march
 
@@ -33,7 +33,7 @@ def errors_of_steps(
     first = (recording.count - count) // 2
     samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
     shutil.rmtree(folder, ignore_errors=True)
-    part = replace(job, recording=stretch(recording, samples, folder))
+    part = replace(job, recording=samples_as_recording(recording, samples, folder))
     coarse = march(part, folder / "own")
     fine = march(replace(part, step=0.5 * grid.step), folder / "half")
     every, told = round(coarse.period / fine.period), dict[str, Estimate]()

@@ -63,12 +63,12 @@ class StepGrid:
 
     def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), on straight lines."""
-        return interpolate(samples, *self._places(count))
+        return interpolate(samples, *self._samples_before(count))
 
     def cubic(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
         samples before and the two after each."""
-        at, u = self._places(count)
+        at, u = self._samples_before(count)
         weights = (
             -u * (u - 1) * (u - 2) / 6,
             (u + 1) * (u - 1) * (u - 2) / 2,
@@ -77,7 +77,7 @@ class StepGrid:
         )
         return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
 
-    def _places(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def _samples_before(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Sample before each half step, and the part of the period since then."""
         numerator, denominator = self.part.numerator, self.part.denominator
         place = np.arange(count) * numerator

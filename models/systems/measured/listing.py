@@ -87,24 +87,24 @@ class Guess:
 
 def guess(channel: Channel) -> Guess | None:
     """A guess at the meaning of a channel; None where there is no clue; what is missing in a guess is empty."""
-    words, family = _words(channel.name), _words(channel.family)
+    words, family = _words_of_name(channel.name), _words_of_name(channel.family)
     kinds = quantities(channel.unit) or tuple(WORDS)
-    what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
+    what = next((kind for kind in kinds if _has_words(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
     if what is None:
         return None
-    corner = next((hub for text in (words, family) for hub, names in CORNERS.items() if _has(names, text)), "")
+    corner = next((hub for text in (words, family) for hub, names in CORNERS.items() if _has_words(names, text)), "")
     axes = TURNS if what in ("angular rate", "angle") else AXES if what in ("force", "moment", "acceleration") else {}
-    component = next((axis for axis, names in axes.items() if _has(names, words)), "")
+    component = next((axis for axis, names in axes.items() if _has_words(names, words)), "")
     unit = "" if channel.unit.strip() or what == "strain" else UNITS[what]
     doubts, left_out = [f"the file names no unit: is it {unit}?"] if unit else [], ""
-    part = _part(words, family) if what in ("force", "moment") else ""
+    part = _suspension_words(words, family) if what in ("force", "moment") else ""
     if part:
         left_out = (
             f"left out: of a part of the suspension ({part}), not of a hub; at a connector it can be compared with"
         )
         return Guess(channel.name, what, "", "", unit, " ".join(doubts), left_out)
     if what == "force" and corner and not component:
-        component, strange = "z", _strange(words)
+        component, strange = "z", _unexpected_word(words)
         doubts.append("vertical?")
         left_out = f"left out: is {strange!r} at the hub?" if strange else ""
     if what == "acceleration":
@@ -114,25 +114,25 @@ def guess(channel: Channel) -> Guess | None:
     return Guess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
 
 
-def _words(name: str) -> str:
+def _words_of_name(name: str) -> str:
     """Words of a name in small letters, parted by spaces."""
     return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
 
 
-def _part(*texts: str) -> str:
+def _suspension_words(*texts: str) -> str:
     """Words of a name, or of its group's, that name a part of a suspension; empty where none does."""
     matches = (re.search(rf"[^ ]*({PARTS})[^ ]*", text) for text in texts)
     return next((match.group() for match in matches if match), "")
 
 
-def _strange(words: str) -> str:
+def _unexpected_word(words: str) -> str:
     """First word of a force's name that is neither a corner, a force, a wheel nor one that says nothing."""
     for known in (*CORNERS.values(), WORDS["force"], WHEEL, PLAIN):
         words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
     return next((word for word in words.split() if len(word) > 1), "")
 
 
-def _has(names: str, words: str) -> bool:
+def _has_words(names: str, words: str) -> bool:
     return re.search(rf"(?:^| )(?:{names})(?: |$)", words) is not None
 
 

@@ -78,7 +78,7 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     folder.mkdir(parents=True)
     scene, said = scene_of(job, folder)
     result = simulate(scene, job.engine, error=error)
-    limited = trusted(scene, job.hold.force)
+    limited = trusted_time(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS, "pitch"):
         limited = replace(limited, unchecked="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
@@ -129,7 +129,7 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     driving = {"file": "wheel_forces.csv", "interpolation": "smooth", "accept": list(axle_forces.CHECKS)}
     effects: dict[str, Any] = {"wheel_forces": driving | {"frame": "inertial" if fixed else "body"}}
     if job.effect:
-        effects[job.effect] = _held(job, folder, said)
+        effects[job.effect] = _prescribed_pitch(job, folder, said)
     step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
     table = {
         "title": "recording",
@@ -145,11 +145,11 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     return scene, tuple(said)
 
 
-def trusted(scene: Scene, deviation: float) -> Trust | None:
+def trusted_time(scene: Scene, deviation: float) -> Trust | None:
     """How long a scene's run can be trusted when its forces have noise of this standard deviation (N); None where the
     pitch is held to a measured pitch."""
     assembly = assemble(scene)
-    bounds = drift_trust.trust(assembly)
+    bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
     noise = drift_trust.noise(assembly, deviation).passes(bounds.angle)
@@ -163,16 +163,16 @@ def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
         whole, left, right = map(repr, AXLES[axle])
         text = f"the vertical force is needed at {whole}, or at both {left} and {right}"
         raise InputError(job.file, "files.channels", None, text)
-    return np.asarray(sum(_whole(job, signal, findings) for signal in signals))
+    return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
 
 
-def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
+def _samples_without_gaps(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
     values, _, findings = bridged(job.recording, signal)
     said += findings
     return values
 
 
-def _held(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
+def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
     """The effect's table, and its file of pitch and rate, nose up."""
     hold, filtered = job.hold, job.hold.method == "kalman"
     columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
@@ -182,7 +182,7 @@ def _held(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
         for signal in [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check][:1]:
-            values = job.recording.samples(signal) if filtered else _whole(job, signal, findings)
+            values = job.recording.samples(signal) if filtered else _samples_without_gaps(job, signal, findings)
             columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:
         raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS!r}")

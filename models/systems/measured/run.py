@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
@@ -27,13 +27,13 @@ from models.measured.checks import findings
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
 from models.measured.checks.weight import moments
-from models.measured.recording import Progress, Recording, silent
+from models.measured.recording import Progress, Recording, no_progress
 from models.measured.signal import Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record
 from models.systems.measured.consequences import Consequence, consequences
-from models.systems.measured.consequences import judged as judged_by_consequences
+from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
 from models.systems.measured.pitch_plane import PlaneJob
@@ -45,7 +45,7 @@ from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Answer, Sections, points
 from models.systems.measured.trust import Drift, Level, drift
-from models.systems.measured.verdict import Compared, checks, compare, judge, surprised
+from models.systems.measured.verdict import Compared, checks, compare, filter_doubts, judge
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
 from models.systems.pitch_plane.trust import ANGLE, Trust
 from models.vehicles.cut_vehicle import CutVehicle
@@ -129,7 +129,7 @@ class Examination:
         return SectionRun(vehicle, recording, sections, *settings)
 
     def march(
-        self, name: str, folder: Path, progress: Callable[[float, float], None] = silent, error: bool = False
+        self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
     ) -> Outcome:
         """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
         job = self.job(name)
@@ -152,7 +152,7 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
@@ -181,7 +181,7 @@ def run(
             raise
         exam.failed[exam.chosen] = str(failure)
         exam.verdicts[exam.chosen] = Verdict("rejected", failure.reason)
-        labelled.data.attrs |= _ends(exam)
+        labelled.data.attrs |= _endings(exam)
         return labelled
 
 
@@ -189,7 +189,7 @@ def _judged_by_assumptions(run: Result, exam: Examination) -> Result:
     """The result with what it assumes and what of that it broke; of the pitch plane beside what its own run says."""
     if exam.outcome is None:
         return run
-    judged(run, assumptions(exam.scene, exam.rig.vehicle, exam))
+    with_assumptions(run, assumptions(exam.scene, exam.rig.vehicle, exam))
     if exam.plane is not None:
         run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
         run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *run_said[key]] for key in run_said})
@@ -229,7 +229,7 @@ def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, 
     return exam
 
 
-def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Recording:
+def read(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
     """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
     sources, rig = opened(scene), scene.rig()
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
@@ -274,18 +274,18 @@ def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) 
         _predicted(exam, exam.rig.vehicle)
     _run(exam, folder / WORK, progress, error)
     if exam.rig.vehicle is not None:
-        _judged(exam)
+        _with_verdicts(exam)
     lap("runs")
     if exam.outcome is not None:
         named = {(finding.check, finding.signals, finding.place) for finding in exam.findings}
         exam.findings += tuple(f for f in exam.outcome.findings if (f.check, f.signals, f.place) not in named)
-        exam.findings += surprised(exam.outcome)
+        exam.findings += filter_doubts(exam.outcome)
     progress("what the findings do", 0.9)
-    _weighed(exam, folder / WORK)
+    _with_consequences(exam, folder / WORK)
     lap("what the findings do")
     if exam.outcome is not None:
         progress("files", 0.95)
-        _handed(exam, exam.outcome, folder)
+        _save_section_forces(exam, exam.outcome, folder)
         lap("files")
 
 
@@ -293,7 +293,7 @@ def _predicted(exam: Examination, vehicle: CutVehicle) -> None:
     """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
     recording, free = exam.recording, exam.holds[FREE]
     tilt, rate = (
-        [_began(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
+        [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
         for what in ("angle", "angular rate")
     )
     couple = moments(exam.evidence)  # that the motion does not bear out, at the first hub
@@ -309,7 +309,7 @@ def _predicted(exam: Examination, vehicle: CutVehicle) -> None:
     )
 
 
-def _began(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
+def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
     """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
     for signal in recording.find(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
@@ -324,7 +324,7 @@ def _run(exam: Examination, work: Path, progress: Progress, error: bool) -> None
             check_run(job)
     for i, name in enumerate(exam.holds):
         progress(f"{name} run", 0.2 + 0.7 * i / len(exam.holds))
-        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(exam.holds), 0.7 / len(exam.holds))
+        told = _with_time_left(f"{name} run", progress, 0.2 + 0.7 * i / len(exam.holds), 0.7 / len(exam.holds))
         try:
             exam.runs[name] = exam.march(name, work / name, told, error)
         except RunFailed as error:
@@ -337,7 +337,7 @@ def _run(exam: Examination, work: Path, progress: Progress, error: bool) -> None
             exam.failed[name] = str(error)
 
 
-def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
+def _with_time_left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
     """Progress of a run with the time that it will still take."""
     started, first = time.monotonic(), [-1.0]
 
@@ -350,7 +350,7 @@ def _left(name: str, progress: Progress, begin: float, share: float) -> Callable
     return told
 
 
-def _judged(exam: Examination) -> None:
+def _with_verdicts(exam: Examination) -> None:
     """Check channels beside the run that is handed on, and the verdict on every run."""
     assert exam.drift is not None
     recording, slopes = exam.recording, tuple(exam.scene.hand_on.slopes)
@@ -370,7 +370,7 @@ def _judged(exam: Examination) -> None:
             exam.compared = beside
 
 
-def _weighed(exam: Examination, work: Path) -> None:
+def _with_consequences(exam: Examination, work: Path) -> None:
     """Compute the changes of the section forces by each finding, and the verdicts that follow: by the run
     with the stabiliser, or by the free one where that failed."""
     name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
@@ -382,7 +382,7 @@ def _weighed(exam: Examination, work: Path) -> None:
         }
 
 
-def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:
+def _save_section_forces(exam: Examination, outcome: Outcome, folder: Path) -> None:
     """Section forces counted, and into files in every format that the scene names; those of a killed run are left."""
     answers, wanted = exam.forces(outcome), exam.scene.hand_on
     exam.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
@@ -404,11 +404,11 @@ def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
         doubts=[finding.text for finding in exam.findings if finding.weight != "note"],
         detail=exam,
         run=exam.chosen,
-        **_ends(exam),
+        **_endings(exam),
     )
 
 
-def _ends(exam: Examination) -> dict[str, str]:
+def _endings(exam: Examination) -> dict[str, str]:
     """How the runs ended, as attributes."""
     verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
     return {"verdicts": json.dumps(verdicts), "failed": json.dumps(exam.failed)}

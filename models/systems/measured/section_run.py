@@ -23,7 +23,7 @@ from models.engines.cut_vehicle import UPRIGHT, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
-from models.measured.recording import Recording, silent
+from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
 from models.systems.measured.sections import Answer, Sections
@@ -159,7 +159,7 @@ def check(job: SectionRun) -> None:
         raise InputError(job.file, "stabilise.method", hold.method, needed)
 
 
-def run(job: SectionRun, folder: Path, progress: Progress = silent, block: float = BLOCK) -> Outcome:
+def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = BLOCK) -> Outcome:
     """Run all of a recording, or what is missing of it in ``folder``; ``progress`` is told seconds done and in all.
 
     ``block`` : s between checkpoints, which changes no bit of the answers. Raises InputError where the folder holds a
@@ -232,7 +232,7 @@ class _March:
         try:
             states = model.marched(*np.split(self.state, 2)).states
         except RunFailed:
-            states = self._until(model)
+            states = self._march_until_failure(model)
         inside = states[:, 4:]  # where it is and where it heads may be anything
         toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > UPRIGHT
         bad = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(inside) > SIZE_BOUND).any(axis=1)
@@ -247,7 +247,7 @@ class _March:
         states = states[: max(good, 1)]
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
-    def _until(self, model: HubModel) -> np.ndarray:
+    def _march_until_failure(self, model: HubModel) -> np.ndarray:
         """States of a block that the engine gave up: the longest part, by halves, that it can march."""
         good, bad, states = 0, model.steps, self.state[None]
         while bad - good > 1:

@@ -15,7 +15,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.measured.signal import HUB, Quantity, Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, felt
+from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, section_answers
 from models.multibody.cut_table import Joints, joints
 from models.vehicles.cut_vehicle import CutVehicle
 
@@ -105,7 +105,7 @@ class Sections:
         wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
-        felt(numbers, float(every), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
+        section_answers(numbers, float(every), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
         return out[:, self.columns]
 
 

@@ -149,7 +149,7 @@ class _AngleResponse:
         """Growth rates (3,), 1/s, 0 where an error does not grow by itself."""
         return np.asarray(self._modes[0].real)
 
-    def _of(self, factors: np.ndarray) -> np.ndarray:
+    def _matrices_of_modes(self, factors: np.ndarray) -> np.ndarray:
         """Matrices (n, 3, 3) of modal factors (n, 3)."""
         shapes = self._modes[1]
         return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
@@ -158,12 +158,12 @@ class _AngleResponse:
     def impulse(self) -> np.ndarray:
         """G (n, 3, 3): angles after a sudden rate."""
         turns = np.outer(self.times, self._modes[0])
-        return self._of(self.times[:, None] * np.sinc(1j * turns / np.pi))
+        return self._matrices_of_modes(self.times[:, None] * np.sinc(1j * turns / np.pi))
 
     @cached_property
     def step(self) -> np.ndarray:
         """(n, 3, 3): angles after a tilt."""
-        return self._of(np.cosh(np.outer(self.times, self._modes[0])))
+        return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
     def summed(self, values: np.ndarray) -> np.ndarray:
         """Integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""

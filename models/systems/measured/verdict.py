@@ -125,7 +125,7 @@ def compare(
             slope: pseudo_damage(computed[known], slope) / damage if damage > 0 else math.nan
             for slope, damage in true.items()
         },
-        _trusted(error - offset, size, run.period),
+        _trusted_time(error - offset, size, run.period),
     )
 
 
@@ -150,7 +150,7 @@ def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band
     return tuple(bands)
 
 
-def _trusted(error: np.ndarray, size: float, period: float) -> float:
+def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
     """When the error of a stretch first exceeds ``HALF`` of a size (s)."""
     length = max(round(STRETCH / period), 1)
     whole = error[: len(error) // length * length].reshape(-1, length)
@@ -190,7 +190,7 @@ def judge(
     return _in_space(verdict)
 
 
-def surprised(run: Outcome) -> tuple[Finding, ...]:
+def filter_doubts(run: Outcome) -> tuple[Finding, ...]:
     """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
     if not run.surprise > SURPRISED:
         return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
@@ -226,12 +226,12 @@ def figures_of_run(run: Outcome, vehicle: CutVehicle) -> RunFigures:
     for i, name in enumerate(("roll", "pitch")):
         moment, rate = run.samples(f"stabiliser {name}"), run.samples(f"{chassis} {name} rate")
         moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
-        shares = _share(moment, turning), _share(low_pass(moment, run.period), low_pass(turning, run.period))
+        shares = _rms_ratio(moment, turning), _rms_ratio(low_pass(moment, run.period), low_pass(turning, run.period))
         figures.append(RunFigures(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
     return max(figures, key=lambda each: each.moment_share_band)
 
 
-def _share(values: np.ndarray, total: np.ndarray) -> float:
+def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
     return rms(values) / rms(total) if rms(total) > 0 else float(rms(values) > 0)
 
 

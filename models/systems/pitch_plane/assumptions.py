@@ -132,13 +132,13 @@ def _artificial(assembly: Assembly) -> Assumption:
         "little artificial",
         "what holds the chassis does little beside its own inertia",
         moved if assembly.guided else soft,
-        partial(_shares, assembly.parameters, assembly.mode == "heave-pitch"),
+        partial(_artificial_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",
         most=ARTIFICIAL,
     )
 
 
-def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
+def _artificial_shares(p: Parameters, heave: bool, run: Result) -> Watched:
     """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
     are too few or too far apart."""
     from models.drift.score import figures_of_run

@@ -29,7 +29,7 @@ def exported(scene: Scene, engine: str) -> Exported:
 
 
 def _left_out(assembly: Assembly) -> list[str]:
-    """Inputs, and what goes slack within a step."""
+    """Names of the parts that the export leaves out: inputs, and parts that can lose contact within a step."""
     vehicle = assembly.vehicle
     return [
         *INPUTS[assembly.mode],

@@ -28,7 +28,7 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, guard
 from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
-from models.systems.pitch_plane.scene import Scene, assemble, ordered, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, effects_in_order, settings_of
 
 DRIFT = 0.05
 """A path has drifted off when its pitch is this far (rad) from the true one, unless the job says otherwise."""
@@ -84,10 +84,10 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        columns = zip(*map(self._kept, self.runs(paths)), strict=True)
+        columns = zip(*map(self._saved_part, self.runs(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
-    def _kept(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
+    def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
         if isinstance(run, RunFailed):
             last = 0.0 if run.time is None else run.time
             return np.full((len(self.rows), 8), np.nan), last, last
@@ -145,7 +145,7 @@ def noise_paths(
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
-    names, unshared = ordered(scene), list[str]()
+    names, unshared = effects_in_order(scene), list[str]()
     for name in names:
         module = module_of(DEFAULT, name)
         if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
@@ -193,13 +193,13 @@ class MujocoThreads(NoisePaths):
         from mujoco import rollout
 
         from models.engines.mujoco_march import warnings
-        from models.engines.mujoco_quiet import installed, quiet
+        from models.engines.mujoco_quiet import installed, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
         held = models[0].drive.controls is not None
         controls = np.stack([model.controls() for model in models]) if held else None
         working = models[: self.threads]
-        with installed(models[0].drive.law), quiet():
+        with installed(models[0].drive.law), without_warnings():
             sensed, _ = rollout.rollout(
                 [model.model for model in models],
                 [model.data for model in working],

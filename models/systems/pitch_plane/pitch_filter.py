@@ -180,7 +180,7 @@ class PitchFilter(ExtendedKalmanFilter):
         self.x, self.P = start.copy(), covariance.copy()
         self.late = np.zeros((STATES, 2))
         self._there = np.isfinite(measured.values) @ (1 << np.arange(len(measured.columns)))
-        self._seen = [self._of(there) for there in range(1 << len(measured.columns))]
+        self._seen = [self._model_of_columns(there) for there in range(1 << len(measured.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
         """State and Jacobians over step number ``u``.
@@ -205,7 +205,7 @@ class PitchFilter(ExtendedKalmanFilter):
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
 
-    def _of(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _model_of_columns(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
         chosen = np.array([i for i in range(len(self.measured.columns)) if there >> i & 1], dtype=int)
         return (

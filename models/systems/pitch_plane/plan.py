@@ -91,9 +91,9 @@ def trust_line(assembly: Assembly) -> list[str]:
     """How long the pitch of a force-excited run can be trusted, one line; none for a road or a guided run."""
     if assembly.mode not in ("force", "force-body"):
         return []
-    from models.systems.pitch_plane.trust import trust
+    from models.systems.pitch_plane.trust import predict_trust
 
-    limit = trust(assembly)
+    limit = predict_trust(assembly)
     if limit is None:
         return []
     if limit.until is None and assembly.doubts:

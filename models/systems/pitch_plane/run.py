@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
@@ -65,7 +65,7 @@ def run(
         integrated=json.dumps(STATES),
         **beside,
     )
-    judged(labelled, assumptions(assembly))
+    with_assumptions(labelled, assumptions(assembly))
     return _with_error(labelled, assembly, settings, channels) if error else labelled
 
 
@@ -90,16 +90,16 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
         return _series(trajectory.times, outputs(replace(assembly, sensors=()), trajectory), names)
 
     if method.adaptive:
-        looser = _looser(rerun, replace(settings, tolerance=LOOSER * settings.tolerance))
+        looser = _with_longer_engine_step(rerun, replace(settings, tolerance=LOOSER * settings.tolerance))
         return of_tolerance(run, fine, looser, LOOSER, settings.tolerance, sizes)
 
     def longer(times: float, share: float) -> Series:
-        return rerun(_other(settings, times, share))
+        return rerun(_settings_of_longer_step(settings, times, share))
 
     return estimated(run, fine, longer, method.order, settings.step, growth=_growth(assembly), sizes=sizes)
 
 
-def _looser(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
+def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
     """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
     the error."""
     try:
@@ -137,7 +137,7 @@ def _growth(assembly: Assembly) -> dict[str, float]:
     return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:part])))}
 
 
-def _other(settings: Settings, times: float, share: float) -> Settings:
+def _settings_of_longer_step(settings: Settings, times: float, share: float) -> Settings:
     """Steps so many times as long, over a share of the run, in whole steps."""
     step = times * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))

@@ -48,7 +48,7 @@ def check_end(scene: Scene, place: str, file: str, end: float) -> None:
         raise InputError(scene.file, place, file, allowed)
 
 
-def numbers(times: np.ndarray, rate: float) -> np.ndarray:
+def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
     """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
     return np.floor(times * rate + SLACK).astype(np.int64)
 
@@ -58,7 +58,7 @@ def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
     """
-    number = numbers(times, rate)
+    number = instant_numbers(times, rate)
     row = np.searchsorted(times, (number - SLACK) / rate)
     if np.abs(times[row] * rate - number).max() > SLACK:
         raise InputError(scene.file, place, rate, NO_ROW)
@@ -67,7 +67,7 @@ def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place
 
 def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
     """The reading with white noise on each sample: ``sampling_rate``, ``deviation``, ``seed`` and ``path`` of p."""
-    number = numbers(times, p.sampling_rate)
+    number = instant_numbers(times, p.sampling_rate)
     noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
     return read(times, values, p.sampling_rate, scene, place) + noise[number]
 

@@ -205,7 +205,7 @@ def assemble(scene: Scene) -> Assembly:
     p = scene.vehicle_parameters()
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
-    for name in ordered(scene):
+    for name in effects_in_order(scene):
         assembly = module_of(DEFAULT, name).extend(assembly, scene.effects[name])
     return assembly
 
@@ -220,7 +220,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
     return state
 
 
-def ordered(scene: Scene) -> list[str]:
+def effects_in_order(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
     modules = {name: module_of(DEFAULT, name) for name in scene.effects}
     legal(modules, scene)

@@ -35,7 +35,7 @@ from models.drift.score import (
 from models.fatigue.damage import SLOPE
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assemble, changed
-from models.systems.pitch_plane.trust import trust
+from models.systems.pitch_plane.trust import predict_trust
 from models.systems.pitch_plane.virtual_measurement import (
     PAPER,
     check_road,
@@ -148,7 +148,7 @@ class Bench:
         self.follow = follower(scene, self.folder)
         self.parameters = self.follow(self.override, {}).vehicle_parameters()
         self.methods = self._methods()
-        predicted = trust(assemble(self._scene({})), options.limits.pitch_error)
+        predicted = predict_trust(assemble(self._scene({})), options.limits.pitch_error)
         assert predicted is not None  # nothing holds a free run
         self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
         self.holding = holding_stiffness(self.parameters, predicted.rate)

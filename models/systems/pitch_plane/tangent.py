@@ -265,10 +265,10 @@ def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> C
     path = path_of(assembly, longest)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
-    return Covariance(path.forces.period * np.arange(path.samples + 1), carried(path, deviation))
+    return Covariance(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))
 
 
-def carried(path: TangentPath, deviation: float) -> np.ndarray:
+def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
     """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
     matrices = np.zeros((path.samples + 1, 8, 8))
     stages = np.arange(2 * path.per_sample + 1) / (2 * path.per_sample)

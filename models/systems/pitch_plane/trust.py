@@ -113,7 +113,7 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
 def interpolation(assembly: Assembly, longest: float = STEP) -> GrowthCurve:
     """Error of the rule between the samples alone; 0 for a run of too few samples to tell."""
     path = path_of(assembly, longest)
-    return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
+    return _growth_by_parameters(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
 def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> GrowthCurve:
@@ -126,10 +126,10 @@ def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STE
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _carried(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
+    return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
 
 
-def _carried(
+def _growth_by_parameters(
     path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
 ) -> GrowthCurve:
     pushes = None if errors is None else errors[:, None, :]
@@ -174,7 +174,7 @@ class Trust:
         return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
 
 
-def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
+def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     """How long a scene's run can be trusted, and why; None for a run that is guided, held, or on a road, where no error
     grows."""
     forces = assembly.input

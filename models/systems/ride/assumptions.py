@@ -49,7 +49,7 @@ def assumptions(
     whole = [*_tyres(vehicle, of), *_angles(vehicle, of), *_slips(vehicle, of)]
     for spring in vehicle.springs:
         whole += _curves(scene, spring, of) if spring.bent else _travels(scene, vehicle, spring, of)
-    whole += [*_waves(scene, vehicle), *_seats(scene)]
+    whole += [*_waves(scene, vehicle), *_seat_assumptions(scene)]
     return [*whole, *([NEARLY_GAUSSIAN] if replaced else [])]
 
 
@@ -200,7 +200,7 @@ def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
     return float(hop.max(initial=0.0)), float(frequencies[swinging].min(initial=np.inf))
 
 
-def _seats(scene: RideScene) -> Iterator[Assumption]:
+def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
     """Assumptions on outputs that are weighted for people along the vertical."""
     people = [name for name, by in scene.weighting.items() if by == "Wk"]
     if not people:

@@ -29,7 +29,7 @@ SAFETY = 2.0
 """One draw of last digits may change little by chance."""
 
 
-def nudged(vehicle: LinearVehicle, accuracy: float, draw: int = 0) -> LinearVehicle:
+def with_changed_last_digits(vehicle: LinearVehicle, accuracy: float, draw: int = 0) -> LinearVehicle:
     """The vehicle with other last digits: every entry of its matrices changed by up to ``accuracy`` of itself."""
 
     def changed(matrix: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ def with_error_of_sweep(
 
 def _direct(linear: Linear, road: Excitation, filters: Mapping[str, str], speed: float, digit: float) -> np.ndarray:
     """Deviations (outputs,) of the nudged vehicle; nan where its last digits leave none."""
-    system = weighted(excited(nudged(linear(speed), digit), road, speed), filters)
+    system = weighted(excited(with_changed_last_digits(linear(speed), digit), road, speed), filters)
     try:
         return stationary(system).deviation
     except InputError:

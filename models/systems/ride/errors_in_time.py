@@ -44,7 +44,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
         every = round(times)
         end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
         wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
-        cut = _until(profile, float(wanted[-1]))
+        cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
             linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * REACH
         )
@@ -57,7 +57,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
     return estimated(run, fine, rerun, ORDER, step)
 
 
-def _until(profile: SpeedProfile, end: float) -> SpeedProfile:
+def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
     """The drive up to a time (s)."""
     before = profile.times < end - 1e-9
     times = [*profile.times[before], end]

@@ -8,11 +8,11 @@ from models.engines.export import (
     Exported,
     Subject,
     coordinate_names,
+    masses_of_shown_bodies,
     names_of,
     of_exudyn,
     of_mujoco,
     parts_left_out,
-    shown,
 )
 from models.engines.spatial_protocol import check_whole
 from models.systems.ride.of_scene import vehicle_of
@@ -38,9 +38,9 @@ def exported(scene: RideScene, engine: str) -> Exported:
 
 def _in_exudyn(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
     from models.engines.exudyn_export import functions
-    from models.engines.spatial_exudyn_build import RoadTable, assemble
+    from models.engines.spatial_exudyn_build import RoadRows, assemble
 
-    built = assemble(vehicle, None, RoadTable(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
+    built = assemble(vehicle, None, RoadRows(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
     mbs = built.mbs
     mbs.Assemble()
     places = [built.places[place] for place in vehicle.coordinates()]
@@ -52,12 +52,12 @@ def _in_exudyn(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -
 def _in_mujoco(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
-    from models.engines.mujoco_tree import Numbers, spec_of, weigh
+    from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 
     left_out = [*parts_left_out(vehicle), *by_speed]
     vehicle, lowered = realisable(vehicle)
     spec = spec_of(vehicle, 1e-3)
-    add_shapes(spec, shown(vehicle, {body.name for body in spec.bodies}))
+    add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     model = spec.compile()
-    weigh(model, Numbers(vehicle, model), vehicle.bodies)
+    set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
     return of_mujoco(spec, model, names_of(vehicle), subject, [*left_out, *lowered])

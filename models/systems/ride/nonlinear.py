@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Series, estimated
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
@@ -33,7 +33,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import InTime, Spectral, few, watching
+from models.systems.ride.watched import InTime, Spectral, few_speeds, watching
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
@@ -128,8 +128,8 @@ def linearised(
         detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
-    motion = _moved(vehicle, road, speeds, replaced)
-    judged(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
+    motion = _motions_of_parts(vehicle, road, speeds, replaced)
+    with_assumptions(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
     if not error:
         return labelled
     known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
@@ -147,10 +147,10 @@ class CopiesBySpeed:
 
     def __call__(self, paths: range) -> Arrays:
         """Arrays of ``Copies``, their first axis the speeds."""
-        made = [self._at(self.speeds[i]) for i in paths]
+        made = [self._copies_at_speed(self.speeds[i]) for i in paths]
         return {name: np.array([getattr(each, name) for each in made]) for name in Copies.__dataclass_fields__}
 
-    def _at(self, speed: float) -> Copies:
+    def _copies_at_speed(self, speed: float) -> Copies:
         s = self.sampling
         return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
 
@@ -183,12 +183,12 @@ def _replaced_at(
     return replaced[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
 
 
-def _moved(
+def _motions_of_parts(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, replaced: list[StatisticallyLinear]
 ) -> Spectral:
     """Motions of the parts of statistically linearised vehicles, springs about their own means."""
     known = dict(zip(speeds.tolist(), replaced, strict=True))
-    chosen = few(speeds)
+    chosen = few_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
         for name in replaced[0].springs
@@ -233,7 +233,7 @@ def in_engine(
     )
     at, seen = ride.rows, watching(linearise(vehicle, speed), vehicle, speed)
     motion = InTime(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
-    judged(labelled, assumptions(scene, vehicle, motion))
+    with_assumptions(labelled, assumptions(scene, vehicle, motion))
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
 
@@ -258,7 +258,7 @@ def _with_error_of_steps(
     def rerun(times: float, share: float) -> Series:
         longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
         count = int(REPEATED * share * steps / times)
-        read = table[:: round(times)] if times >= 1.0 else _halved(table)
+        read = table[:: round(times)] if times >= 1.0 else _road_at_half_spacing(table)
         begin = first * path.step
         ride = driven(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
         return series(ride, begin)
@@ -268,7 +268,7 @@ def _with_error_of_steps(
     return estimated(run, fine, rerun, ORDER, path.step)
 
 
-def _halved(table: np.ndarray) -> np.ndarray:
+def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
     """A road at twice as many places, straight between those that are known."""
     halved = np.repeat(table, 2, axis=0)[:-1]
     halved[1::2] = (table[:-1] + table[1:]) / 2.0

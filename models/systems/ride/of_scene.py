@@ -127,13 +127,13 @@ def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
 
 def fitted_road(scene: RideScene) -> "FittedRoad":
     """The measured road of a scene with what was fitted to it; InputError where nothing can be."""
-    from models.road.fitted import fit
+    from models.road.fitted import fit_road
     from models.road.measured_tracks import read_tracks
 
     road = scene.road
     assert road.file is not None
     path = scene.path(road.file, "road.file")
-    return fit(read_tracks(path, road.track_width, first=road.first, last=road.last))
+    return fit_road(read_tracks(path, road.track_width, first=road.first, last=road.last))
 
 
 def half_track_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:

@@ -47,7 +47,7 @@ def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
     return replace(effect, needs=(*effect.needs, *needy), why=effect.why or "for it needs it") if needy else effect
 
 
-def has(scene: RideScene, sort: str) -> bool:
+def has_omissions(scene: RideScene, sort: str) -> bool:
     """Whether a scene's vehicle and road hold any effects of a sort."""
     return bool(SORTS[sort](ReducedScene.complete(scene)))
 

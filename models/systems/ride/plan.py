@@ -48,7 +48,7 @@ def describe(scene: RideScene) -> str:
         *(("read", note) for note in vehicle.notes),
         *_bodies(vehicle),
         ("road", road_of(scene, there).label(half_track_of(scene, there))),
-        *(("", text) for text in met(scene, there)),
+        *(("", text) for text in noise_sharing_text(scene, there)),
         ("speed", _speed(scene)),
         ("outputs", ", ".join(output.name for output in vehicle.outputs)),
         ("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none"),
@@ -70,7 +70,7 @@ FRONT_REAR = {
 }
 
 
-def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
+def noise_sharing_text(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
     """How the wheels of an axle, and the axles, share the road's noise, in words."""
     road, placed = scene.road, placed_wheels(scene, wheels)
     place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"

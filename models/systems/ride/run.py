@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, told_by, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import FEW, Along, Spectral, few, own_deviations
+from models.systems.ride.watched import FEW, Along, Spectral, few_speeds, own_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -67,7 +67,7 @@ def run(
         if scene.drive is not None:
             return _driven(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or goes_in_time(scene)):
-            return _swept(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
+            return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
@@ -76,7 +76,9 @@ def run(
         return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
 
 
-def _swept(scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool) -> Result:
+def _deviations_by_speed(
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
+) -> Result:
     """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
     from models.ride.sweep import sweep
 
@@ -99,7 +101,9 @@ def _swept(scene: RideScene, engine: str, vehicle: SpatialVehicle, points: Sweep
         detail=swept,
     )
     road = roads.get(AS_WRITTEN, [*roads.values()][-1])
-    judged(labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, few(swept.speeds), {})))
+    with_assumptions(
+        labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, few_speeds(swept.speeds), {}))
+    )
     if not error:
         return labelled
     digit = DIGIT if engine == "reference" or not any(spring.bent for spring in vehicle.springs) else CORNERED
@@ -140,6 +144,6 @@ def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool)
         seconds=time.process_time() - begun,
         detail=drive,
     )
-    apart = Spectral(vehicle, lambda _: linear, road, few(np.linspace(0.0, drive.speed.max(), FEW + 1)[1:]), {})
-    judged(labelled, assumptions(scene, vehicle, Along(own_deviations(vehicle, drive.deviation), apart)))
+    apart = Spectral(vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), FEW + 1)[1:]), {})
+    with_assumptions(labelled, assumptions(scene, vehicle, Along(own_deviations(vehicle, drive.deviation), apart)))
     return with_error_of_drive(labelled, scene, linear, road, alone) if error else labelled

@@ -31,7 +31,7 @@ class WatchedMotion(Protocol):
         ...
 
 
-def watched(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
+def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     """Outputs that tell how every part moves: the force of a tyre less its load, travels and rates, angles of bodies
     that may turn, and, where tyres have side forces, what makes up their slip."""
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
@@ -48,7 +48,7 @@ def watched(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
 
 def watching(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     """A linear vehicle, whoever made it, whose outputs are those of ``watched`` and the slip angles (rad)."""
-    seen = replace(vehicle, outputs=watched(vehicle))
+    seen = replace(vehicle, outputs=watched_outputs(vehicle))
     rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
     return replace(linear, outputs=(*rows, *_slips(vehicle, rows, speed)))
 
@@ -70,7 +70,7 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     return {}
 
 
-def few(speeds: Sequence[float] | np.ndarray) -> list[float]:
+def few_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
     """Some of the speeds (m/s), the slowest and the fastest among them."""
     rising = np.unique(np.asarray(speeds, float))
     return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, FEW).round().astype(int))]
@@ -94,15 +94,15 @@ class Spectral:
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
         """Standard deviations (speeds,) by name, not finite where there is none."""
-        rows, names = [], [output.name for output in self._seen(self.speeds[0]).outputs]
+        rows, names = [], [output.name for output in self._watched_at_speed(self.speeds[0]).outputs]
         for speed in self.speeds:
             try:
-                rows.append(sweep(self._seen, {"own": self.road}, [speed]).deviation[0, 0])
+                rows.append(sweep(self._watched_at_speed, {"own": self.road}, [speed]).deviation[0, 0])
             except InputError:
                 rows.append(np.full(len(names), np.nan))
         return dict(zip(names, np.array(rows).T, strict=True))
 
-    def _seen(self, speed: float) -> LinearVehicle:
+    def _watched_at_speed(self, speed: float) -> LinearVehicle:
         return watching(self.linear(speed), self.vehicle, speed)
 
 
@@ -115,7 +115,7 @@ class Along:
     apart: Spectral
 
     def of(self, name: str) -> Gaussian:
-        """Gaussian statistics of a part's motion at every instant, or at some speeds."""
+        """Gaussian statistics of the motion of a part, by name: at every instant of a drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
@@ -124,7 +124,7 @@ class Along:
 
 def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
     """Deviations (rows, outputs) of a vehicle's own outputs by the names of ``watched``."""
-    alike = {replace(output, name=""): output.name for output in watched(vehicle)}
+    alike = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
     pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
     return {alike[same]: values for output, values in pairs if (same := replace(output, name="")) in alike}
 

@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.core.smoothing import smoothed
-from models.measured.drive import Measured, read_drive
+from models.measured.drive import MeasuredDrive, read_drive
 from models.systems.single_track.assumptions import assumptions
 from models.systems.single_track.equations import march, reports
 from models.systems.single_track.scene import SensorTable, SingleTrackScene
@@ -32,7 +32,7 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
     begun = time.process_time()
     given = inputs(drive, scene)
     motion, table = motion_of(scene, given, float(drive.times[1] - drive.times[0]))
-    channels = shown(scene.sensors, given, motion, table[:, 0])
+    channels = sensor_channels(scene.sensors, given, motion, table[:, 0])
     channels |= {
         name: Channel("time", table[:, column], unit)
         for name, column, unit in zip(REPORTS, REPORT_COLUMNS, UNITS, strict=True)
@@ -47,11 +47,11 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
         seconds=time.process_time() - begun,
         detail=drive,
     )
-    run = judged(run, assumptions(scene))
+    run = with_assumptions(run, assumptions(scene))
     return not_estimated(run, "steps are the samples of the measurement, whose own error is larger") if error else run
 
 
-def inputs(drive: Measured, scene: SingleTrackScene) -> np.ndarray:
+def inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
     """(n, 3): steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and put right."""
     period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
     steer, speed = drive.steer, drive.speed
@@ -78,7 +78,9 @@ def motion_of(scene: SingleTrackScene, given: np.ndarray, period: float) -> tupl
     return motion, reports(*parts, given, motion)
 
 
-def shown(sensors: SensorTable, given: np.ndarray, motion: np.ndarray, lateral: np.ndarray) -> dict[str, Channel]:
+def sensor_channels(
+    sensors: SensorTable, given: np.ndarray, motion: np.ndarray, lateral: np.ndarray
+) -> dict[str, Channel]:
     """What sensors show of the motion, by the names of channels that a measurement has."""
     slip = np.arctan2(motion[:, 0], given[:, 1]) + sensors.side_slip_offset
     acceleration = sensors.acceleration_ratio * lateral + sensors.acceleration_offset

@@ -23,7 +23,7 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     return listed
 
 
-def _places(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
+def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
     """The largest or least value among the patches of each wheel, over the positions."""
     worst = max if largest else min
 
@@ -45,7 +45,7 @@ def _half_space() -> Assumption:
         "half-space",
         "contacts are small beside the radii of wheel and rail",
         "lower wheelset.load, or compute with finite elements",
-        _places(share),
+        _extreme_of_patches(share),
         "of the radius",
         most=HALF_SPACE,
     )
@@ -63,7 +63,7 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
         "within the profiles",
         "contacts lie within the profiles",
         "use longer profiles or smaller positions",
-        _places(free, largest=False),
+        _extreme_of_patches(free, largest=False),
         "mm from the end",
         least=0.0,
     )
@@ -74,7 +74,7 @@ def _elastic() -> Assumption:
         "elastic",
         "the steel does not flow",
         "lower wheelset.load: a real contact would be larger and its pressure lower",
-        _places(lambda place: 1e-6 * place.peak),
+        _extreme_of_patches(lambda place: 1e-6 * place.peak),
         "MPa",
         most=1e-6 * YIELDS,
     )
@@ -88,7 +88,7 @@ def _small_creepage() -> Assumption:
         "small creepage",
         "creepages, and spin times the semi-axis, are so small that their squares do not count",
         "lower the yaw: a wheel that slides is no rolling contact",
-        _places(largest),
+        _extreme_of_patches(largest),
         "",
         most=SMALL_CREEPAGE,
     )
@@ -99,7 +99,7 @@ def _slow_slip(speed: float) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give the case's friction as it is for such slip, or lower wheelset.speed",
-        _places(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
+        _extreme_of_patches(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
         "m/s",
         most=FAST_SLIP,
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.wheel_on_rail import DEEP
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_cells, not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
@@ -93,7 +93,7 @@ def run(
                 else str(failure)
             )
         contacts.seconds.append(time.process_time() - begun)
-    labelled = judged(_labelled(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
+    labelled = with_assumptions(_labelled(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
     return _with_error(labelled, scene, held) if error and contacts.placed else labelled
 
 
@@ -130,7 +130,7 @@ def sums(placed: Placed) -> np.ndarray:
 
 
 def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
-    positions = [numbers(placed) for placed in contacts.placed]
+    positions = [position_quantities(placed) for placed in contacts.placed]
     most = max((len(position[wheel]) for position in positions for wheel in WHEELS), default=0)
     missing = dict.fromkeys(PATCH, np.nan)
     rows = [(*position[wheel], *[missing] * most)[:most] for position in positions for wheel in WHEELS]
@@ -156,7 +156,7 @@ def patches(placed: Placed, wheel: str) -> tuple[PatchReport, ...]:
     return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
 
 
-def numbers(placed: Placed) -> dict[str, Any]:
+def position_quantities(placed: Placed) -> dict[str, Any]:
     """Every quantity of a position, and of every patch of both wheels."""
     return {
         "shift": 1e3 * placed.shift,

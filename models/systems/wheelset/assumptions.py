@@ -30,7 +30,7 @@ FRICTION = 0.02
 def assumptions(equations: Equations) -> list[Assumption]:
     """Assumptions of a path of the wheelset at its speed; judged by the path, a result's detail."""
     wheelset = equations.wheelset
-    listed = [_presses(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
+    listed = [_wheels_press(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
     listed += [_elastic()] if yields(wheelset.material) else []
     listed += [_no_slip(wheelset)] if equations.law == "linear" else []
     listed += [_travel(wheelset)] if equations.body.held else []
@@ -84,7 +84,7 @@ def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     return _of_path(of_path)
 
 
-def _presses(wheelset: Wheelset) -> Assumption:
+def _wheels_press(wheelset: Wheelset) -> Assumption:
     return Assumption(
         "wheels press",
         "both wheels stay on their rails",

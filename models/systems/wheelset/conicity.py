@@ -82,10 +82,10 @@ def check(scene: WheelsetScene) -> None:
     if asked.table is not None:
         read_rolling_radii(scene.path(asked.table, "conicity.table"))
     elif (profiles := wheelset_of(scene).profiles) is not None:
-        _left(scene, asked, profiles)
+        _left_profiles(scene, asked, profiles)
 
 
-def _left(scene: WheelsetScene, asked: ConicityTable, profiles: Profiles) -> Profiles:
+def _left_profiles(scene: WheelsetScene, asked: ConicityTable, profiles: Profiles) -> Profiles:
     """Cross-sections of the left side."""
     named = {key: value for key, value in (("wheel", asked.left_wheel), ("rail", asked.left_rail)) if value is not None}
     return profiles.model_copy(update=named).located(scene) if named else profiles
@@ -104,7 +104,7 @@ def _table(
         cones = f"cones of conicity {wheelset.conicity:g}, {radii}"
         return RollingRadiusTable(y, 2.0 * wheelset.equivalent_conicity * y + right - left), cones
     profiles = wheelset.profiles
-    of_left = _left(scene, asked, profiles)
+    of_left = _left_profiles(scene, asked, profiles)
     count = round(asked.reach / asked.spacing)
     displacements = asked.reach * np.arange(-count, count + 1) / count
     sides = f"{profiles.wheel} on {profiles.rail}"

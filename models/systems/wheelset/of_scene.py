@@ -36,7 +36,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(SETS))
     if base is None:
         path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
-        base = _judged(parse(path), path.name, "")
+        base = _checked_wheelset(parse(path), path.name, "")
     profiles = base.profiles if scene.profiles is None else scene.profiles.located(scene)
     if profiles is not None and FLANGE in override:
         raise InputError(
@@ -46,10 +46,10 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
             "has no meaning beside profiles, which have flanges of their own: drop one of them",
         )
     values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
-    return extended(_judged(values | override, scene.file, "wheelset.override"), scene)
+    return extended(_checked_wheelset(values | override, scene.file, "wheelset.override"), scene)
 
 
-def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:
+def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset:
     """The wheelset of these values; errors name the file and the table."""
     try:
         return Wheelset(**values)
@@ -70,7 +70,7 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
 
 
 @lru_cache(32)
-def _started(
+def _initial_state(
     engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
     equations = implementation(engine)(wheelset, speed, law, cells)
@@ -79,10 +79,10 @@ def _started(
     return equations, state
 
 
-def started(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
+def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
     """Equations at a speed (m/s), and the state (10,) that the scene's paths begin with; kept for further paths."""
     contact, run = scene.contact, scene.run
-    return _started(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
+    return _initial_state(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
 
 
 def path_speeds(scene: WheelsetScene) -> list[float]:

@@ -9,18 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import halved
-from models.core.assumptions import judged
+from models.contact.accuracy import coarser_cells
+from models.core.assumptions import with_assumptions
 from models.core.discretisation import Estimate, stated
 from models.core.errors import RunFailed
-from models.core.result import Channel, Result, joined, result
+from models.core.result import Channel, Result, join_results, result
 from models.core.told import gathered
 from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
-from models.rail.limit_cycle import Orbit, Unknown, attained, beside, bifurcation, refined, solved
+from models.rail.limit_cycle import Orbit, Unknown, attained, bifurcation, guess_from_orbit, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_or_why
 from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
-from models.systems.wheelset.of_scene import BESIDE, equations_of, implementation, path_speeds, started, wheelset_of
+from models.systems.wheelset.of_scene import (
+    BESIDE,
+    equations_and_start,
+    equations_of,
+    implementation,
+    path_speeds,
+    wheelset_of,
+)
 from models.systems.wheelset.scene import WheelsetScene
 from models.systems.wheelset.stated_error import FEWEST, with_error, with_error_of_cycles
 
@@ -48,7 +55,7 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
     """
     speed = path_speeds(scene)[0] if speed is None else speed
-    started(scene, engine, speed)  # kept: its seconds are none of the path
+    equations_and_start(scene, engine, speed)  # kept: its seconds are none of the path
     begun = time.process_time()
     motion = path(scene, engine, speed)
     labelled = judged_path(scene, engine, speed, motion, seconds=time.process_time() - begun)
@@ -57,13 +64,13 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
 
 def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **more: Any) -> Result:
     """A motion as the result of a scene at a speed (m/s), which says what assumptions it breaks."""
-    equations, _ = started(scene, engine, speed)
-    return judged(_labelled(scene, engine, motion, **more), assumptions(equations))
+    equations, _ = equations_and_start(scene, engine, speed)
+    return with_assumptions(_labelled(scene, engine, motion, **more), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     """The motion at a speed (m/s) from the scene's displacement and yaw, every step of it, and nothing else."""
-    equations, start = started(scene, engine, speed)
+    equations, start = equations_and_start(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
@@ -79,8 +86,8 @@ def _labelled(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: A
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Paths by engine and speed (m/s) as one result over engine, speed and time."""
-    each = {engine: gathered(joined(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
-    whole = gathered(joined(each, "engine"), each)
+    each = {engine: gathered(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
+    whole = gathered(join_results(each, "engine"), each)
     whole.data["speed"].attrs["units"] = "m/s"
     return whole
 
@@ -124,7 +131,7 @@ def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Res
         for name, part in (("real", linear.values.real), ("imag", linear.values.imag))
     }
     labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
-    judged(labelled, of_linear(wheelset))
+    with_assumptions(labelled, of_linear(wheelset))
     left = uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
     if math.isfinite(left):
         told = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
@@ -158,7 +165,7 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
         for name, unit in ORBIT.items()
     }
     labelled = result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
-    judged(labelled, of_branch(equations.wheelset))
+    with_assumptions(labelled, of_branch(equations.wheelset))
     if error and orbits:
         middle = len(orbits) // 2
         coarse = _on_half_the_cells(scene, orbits[middle], unknown)
@@ -173,7 +180,9 @@ def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> 
     coarse = replace(orbit, steps=orbit.steps // 2)
     try:
         return solved(
-            beside(coarse, replace(orbit.equations, cells=halved(scene.contact.cells))), unknown, precise=False
+            guess_from_orbit(coarse, replace(orbit.equations, cells=coarser_cells(scene.contact.cells))),
+            unknown,
+            precise=False,
         )
     except RunFailed:
         return None
@@ -203,7 +212,7 @@ def cycles(
         return results, failed
     for engine in engines:
         try:
-            guess = beside(first, equations_of(scene, engine, speed))
+            guess = guess_from_orbit(first, equations_of(scene, engine, speed))
             orbit = refined(solved(guess, AMPLITUDE, precise=False), AMPLITUDE)
             results[engine] = _one_period(scene, engine, orbit, error)
         except RunFailed as failure:
@@ -213,7 +222,7 @@ def cycles(
 
 def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
     """A cycle as a result over its period, whose detail is the orbit."""
-    labelled = judged(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
+    labelled = with_assumptions(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
     period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
     if not error:
         return period

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from models.contact.accuracy import LIKELY, halved
+from models.contact.accuracy import LIKELY, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
@@ -50,9 +50,9 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     if scene.contact.law == "linear":
         return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
     cells = scene.contact.cells
-    other = halved(cells) if cells >= FEWEST else 2 * cells
+    other = coarser_cells(cells) if cells >= FEWEST else 2 * cells
     try:
-        coarse = _coarse(scene, march, other)
+        coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other} cells the path fails: {failure}")
     told = _of_steps(scene, march, fine, coarse)
@@ -79,7 +79,7 @@ def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int |
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse(scene: WheelsetScene, march: March, cells: int) -> Series:
+def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
     """The path on other cells, in twice the step where that can be."""
     with suppress(InputError, RunFailed):
         return series(march(changed(scene, 2.0, cells=cells)))

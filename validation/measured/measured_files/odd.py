@@ -134,10 +134,10 @@ def difference(source: Source, truth: Truth, says: str) -> float:
     channels, said = read(source), [finding.text for finding in source.noticed if finding.weight != "note" or says]
     if set(channels) != set(truth) or not (any(says in text for text in said) if says else not said):
         return np.inf
-    return max(_apart(channels[name], truth[name], bool(says)) for name in truth)
+    return max(_largest_difference(channels[name], truth[name], bool(says)) for name in truth)
 
 
-def _apart(
+def _largest_difference(
     read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], partial_allowed: bool
 ) -> float:
     """Largest difference of times and values; a part of the samples will do where that was said."""
@@ -213,7 +213,7 @@ def called(extension: str, name: str) -> Make:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class CutSweep:
     """A file of one format cut off at many places: refused, or the rest read right and named.
 
     cuts : number of places, spread evenly over the file; 0 for every byte.

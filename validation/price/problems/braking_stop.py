@@ -75,7 +75,7 @@ class Played:
 
 
 @dataclass(frozen=True)
-class Result:
+class StopResult:
     """Stopping distance (m), and counts of steps and calls."""
 
     distance: float
@@ -83,10 +83,10 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Solver:
+class StopSolver:
     """A run that is ready."""
 
-    run: Callable[[], Result]
+    run: Callable[[], StopResult]
 
 
 class BrakingStop:
@@ -116,7 +116,7 @@ class BrakingStop:
         self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self.true, other = (self._by(*each) for each in solvers)
+        self.true, other = (self._distance_by_scipy(*each) for each in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -131,13 +131,13 @@ class BrakingStop:
             engine, method, SAMPLE / substeps, ORDERS.get(method, 0), default=DEFAULTS.get((method, substeps), "")
         )
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> StopSolver:
         """The stop by one method in steps."""
         substeps = round(SAMPLE / setting.value)
-        run = self._ours if setting.method == OURS else partial(self._others, setting.method)
-        return Solver(partial(run, substeps))
+        run = self._stop_by_twinrig if setting.method == OURS else partial(self._stop_by_method, setting.method)
+        return StopSolver(partial(run, substeps))
 
-    def errors(self, solution: Result) -> dict[str, float]:
+    def errors(self, solution: StopResult) -> dict[str, float]:
         """Errors of a solution's stopping distance."""
         return {"stopping distance": abs(solution.distance - self.true)}
 
@@ -148,7 +148,7 @@ class BrakingStop:
         vehicle.run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * MORE)
 
-    def _by(self, method: str, tolerance: float) -> float:
+    def _distance_by_scipy(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return tight_distance(FRONT, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
@@ -165,20 +165,20 @@ class BrakingStop:
             torques.append(part[1:, 0].copy())
         return np.concatenate(torques)
 
-    def _ours(self, substeps: int) -> Result:
+    def _stop_by_twinrig(self, substeps: int) -> StopResult:
         stop = braked(FRONT, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed)
         if stop.rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
+        return StopResult(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
 
-    def _others(self, method: str, substeps: int) -> Result:
+    def _stop_by_method(self, method: str, substeps: int) -> StopResult:
         number = (EULER, RK4, LITERAL).index(method)
         torques, step = self._torques(substeps), SAMPLE / substeps
         friction = Change(Curve(self.slips, self.mu[0]), Curve(self.slips, self.mu[1]), self.change)
         way, steps, _ = marched(number, FRONT, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})
+        return StopResult(way, {"steps": steps, "force calls": WALKS[method] * steps})
 
 
 @cache

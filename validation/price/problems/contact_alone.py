@@ -37,7 +37,7 @@ USUAL = ("FASTSIM", 21)
 
 
 @dataclass(frozen=True)
-class Result:
+class ContactResult:
     """Forces (n, 2) by mu N, what they took, and what the program says against them, if anything."""
 
     forces: np.ndarray
@@ -46,10 +46,10 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Solver:
+class ContactSolver:
     """A run that is ready."""
 
-    run: Callable[[], Result]
+    run: Callable[[], ContactResult]
 
 
 class ContactAlone:
@@ -87,20 +87,20 @@ class ContactAlone:
         usual = (self._ways[engine, method].name, cells) == USUAL
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> ContactSolver:
         """All contacts, each by one theory."""
-        return Solver(partial(self._run, self._ways[setting.engine, setting.method], round(1.0 / setting.value)))
+        return ContactSolver(partial(self._run, self._ways[setting.engine, setting.method], round(1.0 / setting.value)))
 
-    def errors(self, solution: Result) -> dict[str, float]:
+    def errors(self, solution: ContactResult) -> dict[str, float]:
         """Mean over the contacts, and what 95 of 100 keep to, both in % of mu N."""
         off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
         return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
 
-    def _run(self, theory: TheorySettings, cells: int) -> Result:
+    def _run(self, theory: TheorySettings, cells: int) -> ContactResult:
         forces = np.array([force_of(theory.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
         linear, number = theory.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
-        return Result(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
+        return ContactResult(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
 
 
 @cache

@@ -69,7 +69,7 @@ def heights(place: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True)
-class Solver:
+class FreeVehicleSolver:
     """A run that is ready."""
 
     run: Callable[[], Trajectory]
@@ -151,13 +151,13 @@ class FreeVehicle:
         step = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
         return setting(engine, method, float(step))
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> FreeVehicleSolver:
         """The vehicle in one engine."""
         settings = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
         times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
         model = build(setting.engine, self.vehicle, settings, SPEED, self.road(times))
         rest = np.zeros(len(self.vehicle.coordinates()))
-        return Solver(partial(model.run, rest, rest))
+        return FreeVehicleSolver(partial(model.run, rest, rest))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of any wheel load and of any acceleration, at the instants."""

@@ -15,7 +15,7 @@ from scipy.integrate import OdeSolution, solve_ivp
 
 from models.advice.price.problem import Setting
 from models.advice.price.systems.pitch_plane import engine_settings
-from models.core.assumptions import judged
+from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
@@ -104,7 +104,7 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
     channels = outputs(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     times = {"time": Channel("time", run.times, "s")}
-    return judged(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
+    return with_assumptions(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
@@ -173,7 +173,7 @@ class RoadExcited:
         times = GRID * np.arange(round(DURATION / GRID) + 1)
         self._states = self._solution(times).T
         others = [dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
-        differences = [self._largest(other - self._states) for other in others]
+        differences = [self._largest_errors(other - self._states) for other in others]
         self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
@@ -187,16 +187,16 @@ class RoadExcited:
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of a wheel force (N) and of a state, at the integrator's own instants; the run is judged."""
         judge(self.assembly, solution)
-        return self._largest(solution.states - self._at(solution.times))
+        return self._largest_errors(solution.states - self._reference_states(solution.times))
 
-    def _at(self, times: np.ndarray) -> np.ndarray:
+    def _reference_states(self, times: np.ndarray) -> np.ndarray:
         """Reference states (n, 8): stored where the times lie on the grid, else the solver's own interpolant."""
         index = np.rint(times / GRID).astype(int)
         if np.abs(times - GRID * index).max() < 1e-12:
             return self._states[index]
         return self._solution(times).T
 
-    def _largest(self, off: np.ndarray) -> dict[str, float]:
+    def _largest_errors(self, off: np.ndarray) -> dict[str, float]:
         """Largest force and state error from the states' differences (n, 8); the road cancels."""
         p = self.assembly.parameters
         forces = off[:, :2] * [p.k1, p.k2] + off[:, 4:6] * [p.d1, p.d2]

@@ -17,9 +17,9 @@ from mujoco import rollout
 from models.core.errors import Refused, RunFailed
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.exudyn_system import counted, items, solve
+from models.engines.exudyn_system import items, solve, solver_counts
 from models.engines.mujoco import INTEGRATORS
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_quiet import without_warnings
 from models.sensors.rotations import from_matrix, logarithm, product
 
 KINDS = exu.OutputVariableType
@@ -47,7 +47,7 @@ def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndar
     model = spec.compile()
     rates = gyro(period * np.arange(count + 1))
     torques = np.diff(rates, axis=0)[None] / period
-    with quiet():
+    with without_warnings():
         path, _ = rollout.rollout(
             model,
             mujoco.MjData(model),
@@ -80,7 +80,7 @@ def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndar
     if note or len(kept) != count // every + 1:
         raise RunFailed("exudyn", "the solver reported failure", period * every * len(kept))
     attitudes = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
-    return _sound("exudyn", attitudes, counted(mbs))
+    return _sound("exudyn", attitudes, solver_counts(mbs))
 
 
 def _sphere(

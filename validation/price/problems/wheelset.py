@@ -22,7 +22,7 @@ from models.engines.catalogue import MISSING
 from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model
-from models.engines.exudyn_system import counted
+from models.engines.exudyn_system import solver_counts
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed
@@ -81,7 +81,7 @@ QUICK: dict[tuple[str, str], tuple[float, ...]] = {
 
 
 @dataclass(frozen=True)
-class Result:
+class WheelsetResult:
     """Positions and rates at the end (8,), and what they took."""
 
     state: Array
@@ -92,7 +92,7 @@ class Result:
 class Solver:
     """A run that is ready."""
 
-    run: Callable[[], Result]
+    run: Callable[[], WheelsetResult]
 
 
 @njit(cache=True, error_model="numpy")
@@ -140,8 +140,8 @@ class RollingWheels:
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other = (self.read(self._by(*solver).state) for solver in SOLVERS)
-        self.uncertainty = self._off(other)
+        self._true, other = (self.read(self._run_by_method(*solver).state) for solver in SOLVERS)
+        self.uncertainty = self._channel_errors(other)
         self.bound = self.wheels.mu * self.wheels.load
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -176,11 +176,11 @@ class RollingWheels:
             return self._mujoco(method, steps)
         if not setting.adaptive:
             check_step("reference", self.wheels, method, setting.value, steps)
-        return Solver(partial(self._by, method, setting.value))
+        return Solver(partial(self._run_by_method, method, setting.value))
 
-    def errors(self, solution: Result) -> dict[str, float]:
+    def errors(self, solution: WheelsetResult) -> dict[str, float]:
         """Largest error of the creep forces along and across (N), and of the displacements along and across (m)."""
-        return self._off(self.read(solution.state))
+        return self._channel_errors(self.read(solution.state))
 
     def read(self, state: Array) -> dict[str, Array]:
         """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
@@ -188,16 +188,16 @@ class RollingWheels:
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
 
-    def _off(self, channels: dict[str, Array]) -> dict[str, float]:
+    def _channel_errors(self, channels: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
-    def _by(self, method: str, value: float) -> Result:
+    def _run_by_method(self, method: str, value: float) -> WheelsetResult:
         """The written equations by RK4 in steps, or by scipy at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":
             steps = round(DURATION / value)
             march(state, numbers, self._table, DURATION / steps, steps)
-            return Result(state, {"steps": steps, "force calls": 4 * steps})
+            return WheelsetResult(state, {"steps": steps, "force calls": 4 * steps})
 
         def derivative(t: float, y: Array) -> Array:
             rates(y, numbers, self._table, out := np.empty(y.size))
@@ -206,15 +206,15 @@ class RollingWheels:
         done = solve_ivp(derivative, (0.0, DURATION), state, method, rtol=value, atol=1e-6 * value)
         if not done.success:
             raise RunFailed("reference", done.message)
-        return Result(done.y[:, -1], {"steps": done.t.size - 1, "force calls": int(done.nfev)})
+        return WheelsetResult(done.y[:, -1], {"steps": done.t.size - 1, "force calls": int(done.nfev)})
 
     def _mujoco(self, method: str, steps: int) -> Solver:
         marcher = Marcher(model(self.wheels, DURATION / steps, method))
 
-        def run() -> Result:
+        def run() -> WheelsetResult:
             with installed(kernel_law(forces)):
                 state = marcher.run(self._start[None], steps)[0, -1]
-            return Result(state, {"steps": steps, "force calls": STAGES[method] * steps})
+            return WheelsetResult(state, {"steps": steps, "force calls": STAGES[method] * steps})
 
         return Solver(run)
 
@@ -225,11 +225,13 @@ class RollingWheels:
         steps = round(DURATION / (LARGEST if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 
-        def run() -> Result:
+        def run() -> WheelsetResult:
             calls[0] = 0
             q, v = np.split(self._start, 2)
             state = rolling.run(q, v, steps, DURATION / steps, method, tolerance)
-            return Result(state, {**counted(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)})
+            return WheelsetResult(
+                state, {**solver_counts(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)}
+            )
 
         return Solver(run)
 

@@ -55,7 +55,7 @@ def on_road(folder: Path) -> list[Value]:
         folder,
         "road",
         problem.title,
-        f"{EQUATIONS}{ON_ROAD}\n{_numbers(problem)}",
+        f"{EQUATIONS}{ON_ROAD}\n{_parameters_and_start(problem)}",
         f"End values at {problem.duration:g} s ({problem.reference}); the "
         "uncertainty is the largest difference of the three.",
         _values("road", problem.duration, true, sure),
@@ -97,7 +97,7 @@ def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list
     ]
 
 
-def _numbers(problem: ForceExcited | road_excited.RoadExcited) -> str:
+def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> str:
     """Parameters and the start."""
     numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
     start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
@@ -114,7 +114,7 @@ def _body(problem: ForceExcited, guided: bool) -> str:
     asked = ", ".join(f"largest error of the {name} [{unit}]" for name, unit in problem.units.items())
     return f"""{problem.note}
 {EQUATIONS}
-{_numbers(problem)}
+{_parameters_and_start(problem)}
 
 Input: `{problem.key}.csv`; between samples, forces are linear.{pitch}
 

@@ -43,7 +43,7 @@ def write(folder: Path) -> list[Value]:
     return values
 
 
-def _body(problem: ride.Ride) -> str:
+def _body(problem: ride.PricedRide) -> str:
     road = road_of_level(half_track(problem.vehicle.wheels))
     wheels = "\n".join(
         f"| {i} | {w.name} | {w.x:.17g} | {w.y:.17g} |" for i, w in enumerate(problem.vehicle.wheels, start=1)

@@ -37,10 +37,10 @@ TRAILER = {
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many stops that end, those among them that say why there is no number."""
-    return drawn(count, seed, _drawn)
+    return drawn(count, seed, _draw_stop)
 
 
-def _drawn(random: np.random.Generator) -> Sample:
+def _draw_stop(random: np.random.Generator) -> Sample:
     """One stop; raises where tyres do not hold a circle, or a vehicle rolls over."""
     engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
     return _sample(scene, engine)

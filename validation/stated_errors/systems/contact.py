@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import halved
+from models.contact.accuracy import coarser_cells
 from models.contact.theories import Contact
 from models.core.discretisation import errors_of
 from models.systems.contact.run import POWERS, run
@@ -25,10 +25,10 @@ LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that are refused are drawn anew."""
-    return drawn(count, seed, lambda random: _sample(_drawn(random)))
+    return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
 
 
-def _drawn(rng: np.random.Generator) -> ContactScene:
+def _draw_scene(rng: np.random.Generator) -> ContactScene:
     theory = str(rng.choice(THEORIES))
     method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST, LARGEST[theory]))}
     if theory == "fastsim":
@@ -62,7 +62,7 @@ def _sample(scene: ContactScene) -> Sample:
     power = POWERS[scene.method.name] or 0
     name = f"{scene.method.name} on {cells} cells, {len(motions)} motions"
     calls = len(motions) * float(cells) ** power
-    return Sample(name, "", errors_of(run_), true, calls, calls * (halved(cells) / cells) ** power)
+    return Sample(name, "", errors_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)
 
 
 def _rolled(body: Contact, motion: tuple[float, float, float], cells: int) -> tuple[float, float, float]:

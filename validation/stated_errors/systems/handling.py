@@ -24,10 +24,10 @@ CELL, STEP = 10, 8
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many manoeuvres whose runs end."""
-    return drawn(count, seed, _drawn)
+    return drawn(count, seed, _draw_manoeuvre)
 
 
-def _drawn(random: np.random.Generator) -> Sample:
+def _draw_manoeuvre(random: np.random.Generator) -> Sample:
     """One manoeuvre; raises where the tyres cannot follow a step, before any error is told."""
     engine = str(random.choice(ENGINES))
     return _sample(build(_table(random), "drawn.toml"), engine)
@@ -65,10 +65,10 @@ def _sample(scene: HandlingScene, engine: str) -> Sample:
                 raise
             told = error.partial
     errors, drive = errors_of(told), told.detail
-    return Sample(scene.title, engine, errors, _true(scene, drive, engine, told), calls[0], sum(calls[1:]))
+    return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, told), calls[0], sum(calls[1:]))
 
 
-def _true(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
+def _true_errors(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})

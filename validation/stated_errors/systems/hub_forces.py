@@ -26,10 +26,10 @@ FINER = 12
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many scenes whose runs end."""
-    return drawn(count, seed, _drawn)
+    return drawn(count, seed, _draw_scene)
 
 
-def _drawn(random: np.random.Generator) -> Sample:
+def _draw_scene(random: np.random.Generator) -> Sample:
     """One scene; raises for steps in which a mode would grow, before any run."""
     engine = str(random.choice(ENGINES))
     return _sample(build(_table(random), "drawn.toml"), engine)
@@ -64,14 +64,16 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 def _sample(scene: HubScene, engine: str) -> Sample:
     """Run with its error, and truth."""
     with counted() as calls:
-        told = _told(scene, engine)
+        told = _run_with_error(scene, engine)
     errors, plain = errors_of(told), 2 * scene.steps
     names = list(errors)
     title = f"{scene.title}, {scene.stabilise.method}, {scene.vehicle.file}"
-    return Sample(title, engine, errors, _true(scene, engine, told, names), 4.0 * plain, sum(calls) - 4.0 * plain)
+    return Sample(
+        title, engine, errors, _true_errors(scene, engine, told, names), 4.0 * plain, sum(calls) - 4.0 * plain
+    )
 
 
-def _told(scene: HubScene, engine: str) -> Result:
+def _run_with_error(scene: HubScene, engine: str) -> Result:
     """The run with its error, refused or not."""
     try:
         return run(scene, engine, error=True)
@@ -81,7 +83,7 @@ def _told(scene: HubScene, engine: str) -> Result:
         return error.partial
 
 
-def _true(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[str, float]:
+def _true_errors(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
     vehicle = scene.cut_vehicle()

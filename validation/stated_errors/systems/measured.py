@@ -23,10 +23,10 @@ FINER = 12
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many recordings whose runs end."""
-    return drawn(count, seed, _drawn)
+    return drawn(count, seed, _draw_recording)
 
 
-def _drawn(random: np.random.Generator) -> Sample:
+def _draw_recording(random: np.random.Generator) -> Sample:
     """One recording; raises for steps in which a mode would grow, before any run."""
     engine = str(random.choice(ENGINES))
     return _sample(_table(random), engine)
@@ -71,10 +71,10 @@ def _sample(table: dict[str, Any], engine: str) -> Sample:
     truth = run(build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER * virtual["sampling_rate"])}}), engine)
     steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + told.counts()["steps"])
     title = f"{table['title']}, {table['stabilise']['method']}"
-    return Sample(title, engine, errors_of(told), _true(told, truth), steps, sum(calls) - steps)
+    return Sample(title, engine, errors_of(told), _true_errors(told, truth), steps, sum(calls) - steps)
 
 
-def _true(told: Result, truth: Result) -> dict[str, float]:
+def _true_errors(told: Result, truth: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     mine, fine = (each.detail.outcome for each in (told, truth))
     return {

@@ -42,11 +42,11 @@ def _sample(random: np.random.Generator, folder: Path) -> Sample:
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
     integrator = str(random.choice(known))
     scene = _scene(random, folder, engine, integrator)
-    with _counted() as calls:
+    with _count_force_calls() as calls:
         run = _run(scene, engine)
-    truth = _truth(scene, engine)
+    truth = _reference_run(scene, engine)
     told = errors_of(run)
-    true = {name: float(np.sqrt(np.mean((run[name] - _at(truth, name, run.times)) ** 2))) for name in told}
+    true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in told}
     settings = settings_of(scene, engine)
     fine = f"tolerance {settings.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{settings.step:.3g} s"
     what = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
@@ -62,7 +62,7 @@ def _run(scene: Scene, engine: str) -> Result:
         return failure.partial
 
 
-def _truth(scene: Scene, engine: str) -> Result:
+def _reference_run(scene: Scene, engine: str) -> Result:
     """The reference run, in steps that are an integer part of the scene's."""
     settings = settings_of(scene, engine)
     step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
@@ -70,7 +70,7 @@ def _truth(scene: Scene, engine: str) -> Result:
     return single.run(scene, "reference", Settings("RK4", step / finer, scene.run.duration))
 
 
-def _at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
+def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
     """A channel of the truth at times (n,), by a cubic through the four rows about each that is none of its own."""
     rows = np.clip(np.searchsorted(truth.times, times - 1e-9), 0, len(truth.times) - 1)
     if np.abs(truth.times[rows] - times).max() < 1e-9:
@@ -79,7 +79,7 @@ def _at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
 
 
 @contextmanager
-def _counted() -> Iterator[list[float]]:
+def _count_force_calls() -> Iterator[list[float]]:
     """Force calls of every run that is made within."""
     calls: list[float] = []
     build_model = single.build

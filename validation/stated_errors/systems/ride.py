@@ -37,7 +37,7 @@ ENGINES = ("exudyn", "mujoco")
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """Random rides of all kinds, in turn."""
     rng = np.random.default_rng(seed)
-    kinds = (_in_time, _swept, _in_time, _driven, _in_time, _copies)
+    kinds = (_in_time, _sample_of_sweep, _in_time, _driven, _in_time, _copies)
     for i in range(count):
         yield kinds[i % len(kinds)](rng, i)
 
@@ -64,12 +64,12 @@ def _varied(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle
     return replace(vehicle, springs=springs, tyres=tyres)
 
 
-def _of(result: Result, name: str, engine: str, true: Mapping[str, float], calls: float, extra: float) -> Sample:
+def _sample_of(result: Result, name: str, engine: str, true: Mapping[str, float], calls: float, extra: float) -> Sample:
     told = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true}
     return Sample(name, engine, told, true, calls, extra)
 
 
-def _swept(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
     """Deviations of a linear vehicle at nine speeds, beside the same in extended precision."""
     file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
     engine = str(rng.choice(["reference", *ENGINES]))
@@ -80,7 +80,9 @@ def _swept(rng: np.random.Generator, number: int) -> Sample:
     true = np.array([exact(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
     gaps = np.sqrt(np.mean((deviation - true) ** 2, axis=0))
     names = result["output"].tolist()
-    return _of(result, f"{number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0)
+    return _sample_of(
+        result, f"{number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0
+    )
 
 
 def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
@@ -137,7 +139,7 @@ def _driven(rng: np.random.Generator, number: int) -> Sample:
     gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     steps = float(len(result.times))
-    return _of(result, f"{number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps)
+    return _sample_of(result, f"{number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps)
 
 
 def _copies(rng: np.random.Generator, number: int) -> Sample:
@@ -187,7 +189,7 @@ def _in_time(rng: np.random.Generator, number: int) -> Sample:
     calls = ORDER * steps + len(rows)
     read = (1.0 + 0.9 + 0.18) * steps / 16
     name = f"{number}: {file} at {speed:.3g} m/s in steps of {1e3 * path.step:.2g} ms"
-    return _of(result, name, engine, true, calls, 0.54 * ORDER * steps + read)
+    return _sample_of(result, name, engine, true, calls, 0.54 * ORDER * steps + read)
 
 
 def _path(

@@ -20,10 +20,10 @@ FINER, POSITIONS = 4.0, 4
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that fail or are refused are drawn anew."""
-    return drawn(count, seed, lambda random: _sample(_drawn(random)))
+    return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
 
 
-def _drawn(rng: np.random.Generator) -> WheelRailScene:
+def _draw_scene(rng: np.random.Generator) -> WheelRailScene:
     start = float(rng.uniform(-0.004, 0.004))
     rolls = rng.random() < 0.6
     case = {"yaw": float(rng.uniform(0.0, 3.0)), "friction": float(rng.uniform(0.1, 0.5))} if rolls else {}

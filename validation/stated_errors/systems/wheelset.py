@@ -29,10 +29,10 @@ LONGEST = 2.4
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that fail or are refused are drawn anew."""
-    return drawn(count, seed, lambda random: _sample(*_drawn(random)))
+    return drawn(count, seed, lambda random: _sample(*_draw_scene(random)))
 
 
-def _drawn(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
+def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
     speed, profiled = float(rng.uniform(8.0, 90.0)), rng.random() < 0.25
     override = {
         "stiffness_x": 10.0 ** rng.uniform(4.7, 6.3),
@@ -69,7 +69,7 @@ def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample:
 
     with mock.patch.object(system, "path", counted):
         run = system.run(scene, engine, speed, error=True)
-    true = _true(scene, run, lambda other: march(other, "reference", speed))
+    true = _true_errors(scene, run, lambda other: march(other, "reference", speed))
     told = errors_of(run)
     name = f"{speed:.3g} m/s, step {scene.run.step:.2g} s, {scene.contact.law}, {scene.contact.cells} cells"
     name += ", profiles" if scene.profiles else ""
@@ -81,18 +81,20 @@ def _cells(scene: WheelsetScene) -> float:
     return scene.contact.cells**2 if scene.contact.law == "fastsim" else 1.0
 
 
-def _true(scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]) -> Mapping[str, float]:
+def _true_errors(
+    scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]
+) -> Mapping[str, float]:
     """Errors by the channels of the estimates, of steps and of cells."""
     fine = series(run.detail)
-    true = _apart(fine, series(march(changed(scene, 1.0 / FINER))))
+    true = _rms_differences(fine, series(march(changed(scene, 1.0 / FINER))))
     if scene.contact.law == "linear":
         return true
     cells = min(MORE * scene.contact.cells, MOST)
-    of_cells = _apart(fine, series(march(changed(scene, 1.0, cells=cells))))
+    of_cells = _rms_differences(fine, series(march(changed(scene, 1.0, cells=cells))))
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 
-def _apart(fine: Series, truth: Series) -> dict[str, float]:
+def _rms_differences(fine: Series, truth: Series) -> dict[str, float]:
     rows = rows_at(truth.times, fine.times)
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][rows]) ** 2)))

@@ -9,7 +9,7 @@ from models.advice.price.meshed import TIGHT, MeshedScene, chosen, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import STIFF, Equations, WheelsetPath
-from models.systems.wheelset.of_scene import path_speeds, started, wheelset_of
+from models.systems.wheelset.of_scene import equations_and_start, path_speeds, wheelset_of
 from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -40,7 +40,7 @@ class PricedWheelset(MeshedScene):
     def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
         """The paths of the wheelset by DOP853, an accurate reference."""
         scene = self._scene(cells, step, duration)
-        return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
+        return [_exact(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity of all paths side by side; each is judged."""

@@ -61,13 +61,13 @@ def _without_profiles(table: Table, scene: Any) -> None:
     raise InputError(scene.file, "profiles", None, allowed)
 
 
-def _swept(scene: Any) -> bool:
+def _spin_is_swept(scene: Any) -> bool:
     """Whether spin is what a scene sweeps."""
     return scene.sweep is not None and scene.sweep.of == "spin"
 
 
 def _without_spin(table: Table, scene: Any) -> None:
-    if _swept(scene):
+    if _spin_is_swept(scene):
         allowed = "is what this scene asks for: sweep another creepage to leave it out"
         raise InputError(scene.file, "sweep.of", "spin", allowed)
     table["creepage"].pop("spin")
@@ -126,7 +126,7 @@ TABLE = {
         "nothing: the third column of the same creepages",
         {"motions with spin": 1},
         usual=0.3,  # 1/m, as of a wheel of usual conicity
-        there=lambda scene: bool(scene.creepage.spin) or _swept(scene),
+        there=lambda scene: bool(scene.creepage.spin) or _spin_is_swept(scene),
         leave_out=_without_spin,
     ),
 }

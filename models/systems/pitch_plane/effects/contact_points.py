@@ -66,7 +66,7 @@ def compression(pieces: np.ndarray, period: float, stiffness: float, damping: fl
     P = (f - tau f' + tau^2 f'' - ...) / k, which ends because f is a polynomial.
     """
     tau = damping / stiffness
-    particular = _particular(pieces, tau) / stiffness
+    particular = _particular_solution(pieces, tau) / stiffness
     piece = np.clip(np.floor(times / period + 1e-9).astype(int), 0, pieces.shape[1] - 1)
     since = np.maximum(times - piece * period, 0.0)
     steady_part = sum(particular[power, piece] * since**power for power in range(len(particular)))
@@ -76,7 +76,7 @@ def compression(pieces: np.ndarray, period: float, stiffness: float, damping: fl
     return steady_part + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
-def _particular(pieces: np.ndarray, tau: float) -> np.ndarray:
+def _particular_solution(pieces: np.ndarray, tau: float) -> np.ndarray:
     """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``pieces``."""
     total, derivative = np.zeros_like(pieces), pieces.copy()
     for order in range(len(pieces)):

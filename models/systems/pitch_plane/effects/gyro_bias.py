@@ -13,7 +13,7 @@ from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, bias
 from models.systems.pitch_plane.effects.gyro import Gyro
-from models.systems.pitch_plane.sampling import PATH, numbers
+from models.systems.pitch_plane.sampling import PATH, instant_numbers
 
 NEEDS = ("gyro",)
 COST = "one filter over the gyro's samples after the run; no state in any engine"
@@ -44,7 +44,7 @@ class Biased:
         """Channel ``gyro`` with the bias on it, and ``gyro_bias`` alone (both rad/s)."""
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
         unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
-        number = numbers(times, rate)
+        number = instant_numbers(times, rate)
         drift = bias(
             int(number[-1]) + 1,
             1 / rate,

@@ -246,14 +246,14 @@ def _assumption(guide: Guide) -> Assumption:
         "innovations",
         "the filter's innovations are as its model and deviations make them",
         "correct the measured pitch (bias, delay, unit) or the inertia, or state deviations that are true",
-        partial(_places, guide.consistency),
+        partial(_places_in_intervals, guide.consistency),
         "half widths of a right filter's band",
         -1.0,
         1.0,
     )
 
 
-def _places(known: Consistency, run: Result) -> Watched:
+def _places_in_intervals(known: Consistency, run: Result) -> Watched:
     """Where each figure lies in its interval, from -1 to 1."""
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in known.figures}
 

@@ -51,11 +51,11 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     check_end(scene, "effects.wheel_forces.file", p.file, signal.end)
     turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
     driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
-    doubts, assumed = _judged(driven, p, values, period)
+    doubts, assumed = _doubts_about_forces(driven, p, values, period)
     return replace(driven, doubts=(*driven.doubts, *doubts), assumptions=(*driven.assumptions, *assumed))
 
 
-def _judged(
+def _doubts_about_forces(
     assembly: Assembly, p: Parameters, values: np.ndarray, period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
     """Doubts about forces (n, 2) in N that cannot be this vehicle's, and that they balance its weight; InputError for

@@ -18,13 +18,13 @@ def _keep_vehicle(table: Table, scene: Any) -> None:
     raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
 
 
-def _holds(sort: str) -> Callable[[Any], bool]:
+def _omissions_of_sort(sort: str) -> Callable[[Any], bool]:
     """Whether a scene's vehicle and road hold omissions of a sort."""
 
     def there(scene: Any) -> bool:
-        from models.systems.ride.omissions import has
+        from models.systems.ride.omissions import has_omissions
 
-        return has(scene, sort)
+        return has_omissions(scene, sort)
 
     return there
 
@@ -61,7 +61,7 @@ def _hold_mean_speed(table: Table, scene: Any) -> None:
     table["speeds"] = {"values": [way / (times[-1] - times[0])]}
 
 
-def _weigh(table: Table, scene: Any) -> None:
+def _weight_first_output(table: Table, scene: Any) -> None:
     """The first acceleration by Wk."""
     name = next(output.name for output in _vehicle(scene).outputs if output.kind == "acceleration")
     table["weighting"] = {name: "Wk"}
@@ -69,16 +69,18 @@ def _weigh(table: Table, scene: Any) -> None:
 
 BY_SPEED = "a linear vehicle of its own at every speed"
 TABLE = {
-    "anti_roll_bars": _of_vehicle("Anti-roll bars, one by one", "a product per bar", _holds("anti_roll_bars")),
+    "anti_roll_bars": _of_vehicle(
+        "Anti-roll bars, one by one", "a product per bar", _omissions_of_sort("anti_roll_bars")
+    ),
     "body_mass": _of_vehicle(
         "Mass of the wheels, of one axle or of all, and of every other light body: what moves then follows its springs",
         "two states per freedom of a light body",
-        _holds("body_mass"),
+        _omissions_of_sort("body_mass"),
     ),
     "bushings": _of_vehicle(
         "Bushings of the wheels: the stiffer springs between wheels and what they carry, rigid along their direction",
         "a product per bushing, and the fastest modes of the vehicle",
-        _holds("bushings"),
+        _omissions_of_sort("bushings"),
     ),
     "curves": Entry(
         "Curves and friction of springs and dampers, beyond their slopes at rest",
@@ -86,7 +88,7 @@ TABLE = {
         "runs in time by an engine in place of one covariance",
         {"bent springs": 1},
         modules=("models.ride.statistical_linearisation",),
-        there=_holds("curves"),
+        there=_omissions_of_sort("curves"),
         leave_out=_straighten,
     ),
     "delay": Entry(
@@ -95,7 +97,7 @@ TABLE = {
         "a filter of the road per axle",
         {"delays": 1},
         usual="delayed",
-        there=_holds("delay"),
+        there=_omissions_of_sort("delay"),
         leave_out=_equal("front_rear"),
     ),
     "drag": _of_vehicle(
@@ -104,7 +106,7 @@ TABLE = {
     "freedoms": _of_vehicle(
         "Single freedoms of bodies: locked. Wheels keep their up and down; their other freedoms are locked together",
         "two states per freedom",
-        _holds("freedoms"),
+        _omissions_of_sort("freedoms"),
     ),
     "gravity_and_preload": Entry(
         "Gravity, and the preload of the springs that carry the bodies",
@@ -125,7 +127,7 @@ TABLE = {
     "mounts": _of_vehicle(
         "Mounts and seats: a body that carries no tyre sits rigidly on the one that its springs join it to",
         "a product per mount, and the freedoms of what it carries",
-        _holds("mounts"),
+        _omissions_of_sort("mounts"),
     ),
     "second_corner": Entry(
         "The road's second corner: its filters of second order become those of first order",
@@ -140,7 +142,7 @@ TABLE = {
         "a second filter of the road per axle",
         {"heights": 2},
         usual="modelled",
-        there=_holds("second_track"),
+        there=_omissions_of_sort("second_track"),
         leave_out=_equal("left_right"),
     ),
     "side_forces": _of_vehicle(
@@ -149,7 +151,7 @@ TABLE = {
     "tyre_damping": _of_vehicle(
         "Damping of the tyres: nothing but their springs is left",
         "a product per tyre; without a second corner white noise at the outputs",
-        _holds("tyre_damping"),
+        _omissions_of_sort("tyre_damping"),
     ),
     "varying_speed": Entry(
         "A speed that varies along the road",
@@ -165,7 +167,7 @@ TABLE = {
         "eight states per weighted output by Wk, six by Wd",
         {"states": 8},
         there=lambda scene: bool(scene.weighting),
-        put_in=_weigh,
+        put_in=_weight_first_output,
     ),
 }
 """Usual values: the road's second corner is at 20 rad/m, a wavelength of a third of a metre."""
