@@ -11,23 +11,27 @@ import pytest
 from models.brake.sprung import sprung
 from models.core.errors import InputError, Refused
 from models.core.systems import load
+from models.engines.braking_sprung_plain import PlainOnSprings
 from models.engines.export import Subject
 from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
 from models.multibody.plain.rolling import PlainRolling
 from models.multibody.plain.statics import held_at_rest
 from models.own_model.car import car
+from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.energy import unaccounted
 from models.systems.handling.export import of_handling
 from models.systems.handling.run import REFERENCE, build, driven
 from models.systems.ride.run import run as run_ride
+from models.tyre.magic_formula import surface
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial import JointElement, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import build_vehicle, load_vehicle
+from validation.braking.sprung_box import braked, steady
 from validation.own_model.car_energy import energies_apart
 from validation.own_model.cars import SALOON
 
@@ -311,8 +315,24 @@ def test_springs_on_hinges_are_refused_where_springs_lie_between_points(saloon):
         cut(saloon, "body")
     with pytest.raises(Refused, match="joint 'fl travel' acts along coordinates"):
         build_spatial("mujoco", saloon)
-    with pytest.raises(InputError, match="acts along coordinates"):
-        sprung(saloon, 1.0)
+
+
+def test_it_brakes_in_both_engines_as_the_plain_equations_do(saloon):
+    """To rounding where the wheels' forces are held over the same steps; its wheels spin with the file's inertia."""
+    own = sprung(saloon, 0.0)
+    assert (own.plane.front.spin_inertia, own.plane.rear.spin_inertia) == (1.1, 1.2)
+    torques = steady(500.0, 500.0, 200.0, 200.0)
+    in_engines = [braked(own, surface("wet"), engine, 0.05, 1e-3) for engine in ("exudyn", "mujoco")]
+    cars = (*in_engines, replace(in_engines[0], engine=PlainOnSprings(own)))
+    exudyn, other, plain = (each.run(torques, 6.0, 0.1).states[-1] for each in cars)
+    assert other == pytest.approx(exudyn, abs=1e-9)
+    assert plain == pytest.approx(exudyn, abs=1e-9)
+    assert exudyn[1, 0] < 5.9  # m/s
+    lost = replace(saloon, joint_elements=saloon.joint_elements[:-1])
+    without = braked(sprung(lost, 0.0), surface("wet"), "mujoco", 0.05, 1e-3).run(torques, 6.0, 0.1).states[-1]
+    assert np.abs(without - exudyn).max() > 1e-4  # the fault: no rear bar
+    with pytest.raises(InputError, match="of its spin must be above 0"):
+        sprung(replace(saloon, tyres=(replace(saloon.tyres[0], spin_inertia=1.3), *saloon.tyres[1:])), 0.0)
 
 
 def blocks(page: Path) -> dict[str, str]:
@@ -333,6 +353,13 @@ forces = { sampling_rate = 100.0 }
 road = { iso8608 = "B" }
 run = { duration = 1.0 }
 """
+STOP = """title = "b"
+system = "braking"
+vehicle = { file = "my_car.xml" }
+road = { stretches = [{ left = "wet" }] }
+brakes = { front = { gradient = 300.0 }, rear = { gradient = 100.0 }, supply = 2.0 }
+procedures = { straight = { speed = 3.0 } }
+"""
 
 
 def test_scenes_take_the_car_of_the_documentation(tmp_path):
@@ -341,6 +368,7 @@ def test_scenes_take_the_car_of_the_documentation(tmp_path):
         (tmp_path / name).write_text(text, encoding="utf-8")
     (tmp_path / "ride.toml").write_text(RIDE)
     (tmp_path / "hubs.toml").write_text(HUBS)
+    (tmp_path / "stop.toml").write_text(STOP)
     handling = load(tmp_path / "my_lane_change.toml")
     plan = handling_plan.describe(handling)
     assert "read               tyres, steering, brakes and drive are twinrig's; not built: joint 'fl spin'" in plan
@@ -349,6 +377,7 @@ def test_scenes_take_the_car_of_the_documentation(tmp_path):
     ride = run_ride(load(tmp_path / "ride.toml"))
     assert {"driver", "travel joint 'fl travel'", "tyre force rr"} <= set(ride.data["output"].values)
     assert (ride.data["deviation"] > 0.0).all()
+    assert re.search(r"\n  read +tyres, steering", braking_plan.describe(load(tmp_path / "stop.toml")))
     assert "tendon 'front bar'" in [each.name for each in load(tmp_path / "hubs.toml").cut_vehicle().elements]
 
 

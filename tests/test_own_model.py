@@ -7,17 +7,20 @@ import mujoco
 import numpy as np
 import pytest
 
+from models.advice.own_model_price import priced
 from models.core.errors import InputError
 from models.own_model import certificate as certifying
-from models.own_model.builds import equations
-from models.own_model.certificate import certificate
+from models.own_model.builds import as_parsed, equations, sliding
+from models.own_model.certificate import agreement, certificate, moved_at, softness, states_of
 from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
 from models.own_model.path import paths
+from models.own_model.states import random_states
 from models.own_model.urdf import misread
-from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, GEARED, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.soft_couplings import softly_coupled
 
 
 def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
@@ -36,6 +39,73 @@ def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...]
 def test_every_build_moves_as_the_file_does(tmp_path, text):
     for row in certificate(_read(tmp_path, text).twin, 20):
         assert max(row.mass, row.force, row.acceleration) < 1e-11, row  # rounding by a condition of about 100
+
+
+@pytest.fixture(scope="module")
+def geared(tmp_path_factory):
+    return _read(tmp_path_factory.mktemp("geared"), GEARED).twin
+
+
+def as_drawn(twin):
+    """20 random states, of which dry friction sticks at some."""
+    return list(zip(*random_states(twin.model, 20), strict=True))
+
+
+def test_dry_friction_and_couplings_are_those_of_the_file(geared):
+    """To rounding; a coupling or a friction that is 1 % off is seen in every build."""
+    states = states_of(geared, 20)
+    assert len(sliding(geared, states)) == len(states) > len(sliding(geared, as_drawn(geared)))  # faster rates slide
+    for row in certificate(geared, 20):
+        assert max(row.mass, row.force, row.acceleration) < 1e-11, row
+    (gear, shut), (swing, slide) = geared.driven.couplings, geared.driven.frictions
+    wrong = replace(geared.driven, couplings=(replace(gear, ratio=1.01 * gear.ratio), shut))
+    dry = replace(geared.driven, frictions=(swing, replace(slide, force=1.01 * slide.force)))
+    for driven in (wrong, dry):
+        assert all(row.acceleration > 1e-5 for row in certificate(replace(geared, driven=driven), 20))
+
+
+def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geared):
+    """Far from rigid, and the law all the same: to 1e-8, MuJoCo's tolerance; the fault: another impedance."""
+    states = states_of(geared, 10)
+    assert softness(geared, 10) > 1e-3
+    soft = moved_at(as_parsed(geared), states)
+    assert agreement("", moved_at(softly_coupled(geared), states), soft, geared).acceleration < 1e-8
+    ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
+    other = replace(geared, driven=replace(geared.driven, couplings=ties))
+    assert agreement("", moved_at(softly_coupled(other), states), soft, geared).acceleration > 1e-4
+
+
+def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
+    report = paths(geared)
+    assert report.alike and report.soft and 0.0 < report.horizon < 1.0
+    assert report.distances["mujoco"] > 1e-6  # its couplings give way
+    assert any("dry friction sticks" in line for line in report.lines())
+
+
+@pytest.mark.parametrize(
+    "name,old,new,kind,owner",
+    [
+        ("gear", 'polycoef=".1 .25', 'polycoef=".1 .26', "coupling", "equality 'gear'"),
+        ("gear", '<joint name="shut"', '<joint active="false" name="shut"', "coupling", "equality 'shut'"),
+        ("swing", 'frictionloss=".4"', 'frictionloss=".5"', "friction loss", "joint 'swing'"),
+        ("slide", 'frictionloss="1.5"', "", "friction loss", "joint 'slide'"),
+    ],
+)
+def test_differences_of_couplings_and_friction_are_named(tmp_path, geared, name, old, new, kind, owner):
+    comparison = compare(geared, _read(tmp_path, changed(GEARED, name, old, new), "b.xml").twin, 5)
+    assert not comparison.alike and comparison.unexplained < 1e-10
+    assert [(each.kind, each.owner) for each in comparison.influential] == [(kind, owner)]
+
+
+def test_softness_of_couplings_is_listed_and_not_compared(tmp_path, geared):
+    second = _read(tmp_path, changed(GEARED, "shut", ".95 .99", ".9 .99"), "b.xml").twin
+    comparison = compare(geared, second, 5)
+    assert comparison.alike and [each.owner for each in comparison.not_compared] == ["equality 'shut'"]
+
+
+def test_couplings_and_dry_friction_have_no_price(geared):
+    with pytest.raises(InputError, match="no price here"):
+        priced(geared, 1e-4, None)
 
 
 def test_ends_of_a_tendon_between_sites_are_told(tmp_path):
@@ -161,7 +231,7 @@ def test_thirty_joints_are_certified(tmp_path):
 
 REFUSED = [
     ("contact", '<geom name="box" type="box" size=".1 .1 .1"/>', "geom 'box' (a.xml:2)"),
-    ("friction_loss", '<joint name="rub" axis="0 1 0" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
+    ("friction_loss", '<joint name="rub" type="ball" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
     ("turning_law", '<joint name="soft" type="ball" damping="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
 ]
 

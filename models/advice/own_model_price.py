@@ -148,6 +148,9 @@ def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommend
     """The cheapest settings of a model; InputError for what cannot be asked."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
+    if twin.driven.couplings or twin.driven.frictions:
+        said = "has no price here: dry friction and couplings of joints are soft in MuJoCo and rigid elsewhere"
+        raise InputError("--tolerance", "", tolerance, said)
     places = named_coordinates(twin)
     if not places:
         raise InputError(twin.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")

@@ -5,6 +5,7 @@ design position; heave, roll and pitch of the chassis follow (see ``models.vehic
 that springs and tyres have at the time. Wheels turn as in the plane and are no bodies of their own.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from models.brake.plane_vehicle import Axle, Truck
 from models.core.errors import InputError
 from models.multibody.numbers import Handling, Tyres
-from models.vehicles.free_vehicle import CARRIER, SWAY
+from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
 from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
 
 ROLL, PITCH = 4, 5
@@ -47,7 +48,8 @@ class Sprung:
 
 
 def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> Sprung:
-    """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel.
+    """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel
+    whose tyre names none.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
     here. Raises InputError for a vehicle of other axles, that tows, or that cannot be steered.
@@ -60,14 +62,16 @@ def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> 
         left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])
     ):
         raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
-    if vehicle.joint_elements:
-        said = "acts along coordinates: a braked vehicle on its suspension has springs between points alone"
-        raise InputError(vehicle.name, vehicle.joint_elements[0].name, None, said)
+    inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
+    for tyre, inertia, beside in zip(tyres, inertias, (1, 0, 3, 2), strict=True):
+        if not inertia > 0.0 or inertia != inertias[beside]:
+            allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"
+            raise InputError(vehicle.name, f"tyres[{tyre.name}]", inertia, allowed)
     centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0))
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
         raise ValueError("the carrier and the sway are not the first bodies")
-    return Sprung(handling, _plane(centred, spin_inertia, front))
+    return Sprung(handling, _plane(centred, inertias[::2], front))
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:
@@ -97,7 +101,7 @@ def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
 
 
-def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:
+def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
     """The plane vehicle of a centred one."""
     turn = sum(
         body.inertia[2][2] + body.mass * (body.position[0] ** 2 + body.position[1] ** 2) for body in vehicle.bodies
@@ -107,10 +111,12 @@ def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:
             x=left.point[0],
             track=left.point[1] - right.point[1],
             radius=left.point[2],
-            spin_inertia=spin_inertia,
+            spin_inertia=inertia,
             roll_share=share,
         )
-        for left, right, share in zip(vehicle.tyres[::2], vehicle.tyres[1::2], (front, 1.0 - front), strict=True)
+        for left, right, inertia, share in zip(
+            vehicle.tyres[::2], vehicle.tyres[1::2], spin_inertias, (front, 1.0 - front), strict=True
+        )
     )
     return Truck(
         mass=sum(body.mass for body in vehicle.bodies),

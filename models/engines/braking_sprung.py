@@ -33,6 +33,7 @@ from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise, mass
@@ -73,7 +74,8 @@ class OnSprings:
     def _model(self) -> FreeModel:
         """Built with the first step."""
         handling = self.vehicle.handling
-        return free_model(self.engine, Driven(handling.vehicle, handling.gravity, self._table, held, set_held))
+        parts = joint_parts(handling.vehicle)
+        return free_model(self.engine, Driven(handling.vehicle, handling.gravity, self._table, held, set_held, parts))
 
     def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called

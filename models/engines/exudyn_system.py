@@ -90,6 +90,19 @@ def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]
     return mass, force
 
 
+def ties(mbs: Any) -> np.ndarray:
+    """(c, n): derivatives by the coordinates of Exudyn's own constraints, at its initial state."""
+    solver: Any = exu.MainSolverImplicitSecondOrder()
+    options = quiet_settings()
+    solver.InitializeSolver(mbs, options)
+    n, count = solver.GetODE2size(), solver.GetAEsize()
+    solver.SetSystemJacobian(np.zeros((n + count, n + count)))
+    solver.ComputeJacobianAE(mbs)
+    rows = np.array(solver.GetSystemJacobian(), float)[n:, :n]
+    solver.FinalizeSolver(mbs, options)
+    return rows
+
+
 def march_settings(settings: Settings) -> Any:
     """Exudyn's settings of a march all of whose steps the sensors store."""
     options = quiet_settings()

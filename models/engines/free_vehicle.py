@@ -18,7 +18,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.native_parts import GroundSpring, LineSpring, NativePart, joint_parts
+from models.engines.native_parts import Coupling, DryFriction, GroundSpring, LineSpring, NativePart, joint_parts
 from models.engines.protocol import guard, timed
 from models.vehicles.spatial import SpatialVehicle
 
@@ -36,7 +36,8 @@ class Driven:
     engine has all of them as its own, and calls nothing back; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
     parts, ground_springs, line_springs : springs, dampers, mounts and bars that the engine has as its own beside the
-    kernel's forces.
+    kernel's forces; frictions, couplings : along its coordinates and between them, as the engine has them: explicit
+    integrators of Exudyn ignore couplings.
     """
 
     vehicle: SpatialVehicle
@@ -47,6 +48,8 @@ class Driven:
     parts: tuple[NativePart, ...] = ()
     ground_springs: tuple[GroundSpring, ...] = ()
     line_springs: tuple[LineSpring, ...] = ()
+    frictions: tuple[DryFriction, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
 
     @property
     def size(self) -> int:

@@ -7,10 +7,17 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start
+from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start, ties
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.native_exudyn import add_ground_spring, add_line_spring, add_parts, add_rotors, built_elements
+from models.engines.native_exudyn import (
+    Coordinates,
+    add_ground_spring,
+    add_line_spring,
+    add_parts,
+    add_rotors,
+    built_elements,
+)
 from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
@@ -46,6 +53,11 @@ class FreeExudyn(FreeModel):
             add_ground_spring(built, spring)
         for line in driven.line_springs:
             add_line_spring(built, line)
+        coordinates = Coordinates(built, node)
+        for friction in driven.frictions:
+            coordinates.rub(friction)
+        for coupling in driven.couplings:
+            coordinates.couple(coupling)
         self._sensors = recorders(mbs, [node])
         mbs.Assemble()
 
@@ -68,6 +80,11 @@ class FreeExudyn(FreeModel):
         """Exudyn's own mass matrix (n, n) and residual (n,)."""
         start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
+
+    def ties(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """(c, n): derivatives of Exudyn's own constraints by the coordinates."""
+        start(self.mbs, q, v)
+        return ties(self.mbs)
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""

@@ -16,6 +16,7 @@ from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.native_mujoco import (
+    add_constraints,
     add_ground_spring,
     add_line_spring,
     add_parts,
@@ -57,6 +58,7 @@ def specified(driven: Driven) -> mujoco.MjSpec:
         add_ground_spring(spec, driven.vehicle, spring)
     for line in driven.line_springs:
         add_line_spring(spec, driven.vehicle, line)
+    add_constraints(spec, driven.vehicle, driven.frictions, driven.couplings)
     spec.option.gravity = driven.gravity
     spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
     return spec
@@ -136,11 +138,11 @@ class FreeMujoco(FreeModel):
         return self.data.qacc.copy()
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """MuJoCo's own mass matrix (n, n), and the forces (n,) that it holds to move it."""
+        """MuJoCo's own mass matrix (n, n), and the forces (n,) that it holds to move it, constraints included."""
         self.acceleration(time, q, v)
         mass = np.empty((self.size, self.size))
         mujoco.mj_fullM(self.model, self.data, mass)
-        return mass, self.data.qfrc_smooth.copy()
+        return mass, self.data.qfrc_smooth + self.data.qfrc_constraint
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""

@@ -16,7 +16,16 @@ import numpy as np
 
 from models.engines.exudyn_system import items, lists
 from models.engines.exudyn_tree import JOINTS, Build
-from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, LineSpring, NativePart
+from models.engines.native_parts import (
+    SLIDES,
+    AxialTravel,
+    CoordinateTravel,
+    Coupling,
+    DryFriction,
+    GroundSpring,
+    LineSpring,
+    NativePart,
+)
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
 
@@ -29,7 +38,7 @@ LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
 
 def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
     """All parts into a system whose one tree has its coordinates in ``node``."""
-    coordinates, trees, axial = _Coordinates(built, node), _Trees(built, node), list[Axial]()
+    coordinates, trees, axial = Coordinates(built, node), _Trees(built, node), list[Axial]()
     for part in parts:
         if isinstance(part.travel, CoordinateTravel):
             coordinates.add(part.element, part.travel)
@@ -128,8 +137,8 @@ def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
     return {"name": names, "stiffness": stiffness, "damping": damping, "offset": offset}
 
 
-class _Coordinates:
-    """Connectors between coordinates of one node."""
+class Coordinates:
+    """Connectors and constraints between coordinates of one node."""
 
     def __init__(self, built: Build, node: Any) -> None:
         self.built, self.node, self.markers = built, node, dict[int, Any]()
@@ -154,6 +163,21 @@ class _Coordinates:
                 offset=-_sunk(element),
                 **_gains(element),
             )
+        )
+
+    def rub(self, friction: DryFriction) -> None:
+        """Dry friction of a coordinate against the ground."""
+        markers, law = [self._still(), self._marker(friction.coordinate)], {"frictionProportionalZone": SLIDES}
+        self.built.mbs.AddObject(
+            items.CoordinateSpringDamperExt(markerNumbers=markers, dynamicFrictionForce=friction.force, **law)
+        )
+
+    def couple(self, coupling: Coupling) -> None:
+        """A rigid constraint; Exudyn's is factor1 q1 - q0 - offset = 0."""
+        driver = self._still() if coupling.driver is None else self._marker(coupling.driver)
+        markers = [self._marker(coupling.driven), driver]
+        self.built.mbs.AddObject(
+            items.CoordinateConstraint(markerNumbers=markers, factor1=coupling.ratio, offset=-coupling.offset)
         )
 
     def _add_loads(self, element: Element, travel: CoordinateTravel) -> None:

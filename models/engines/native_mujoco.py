@@ -15,7 +15,15 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, LineSpring, NativePart
+from models.engines.native_parts import (
+    AxialTravel,
+    CoordinateTravel,
+    Coupling,
+    DryFriction,
+    GroundSpring,
+    LineSpring,
+    NativePart,
+)
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import Curve, SpatialVehicle
 
@@ -107,6 +115,24 @@ def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSp
         site = f"end {number + i}"
         carrier.add_site(name=site, pos=np.subtract(point, origin))
         tendon.wrap_site(site)
+
+
+def add_constraints(
+    spec: mujoco.MjSpec, vehicle: SpatialVehicle, frictions: Sequence[DryFriction], couplings: Sequence[Coupling]
+) -> None:
+    """Dry friction of joints and equality constraints between them; both are soft in MuJoCo."""
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
+    for friction in frictions:
+        spec.joint(joints[friction.coordinate]).frictionloss = friction.force
+    for coupling in couplings:
+        equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=joints[coupling.driven])
+        if coupling.driver is not None:
+            equality.name2 = joints[coupling.driver]
+        equality.data[:2] = coupling.offset, coupling.ratio
+        equality.solref[:], equality.solimp[:] = coupling.solref, coupling.solimp
+    if frictions or couplings:
+        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 
 
 def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:

@@ -15,6 +15,8 @@ from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Vect
 
 CURVES = ("mujoco",)
 """Engines whose own elements can have a force that is piecewise linear in travel or rate."""
+SLIDES = 1e-3
+"""m/s, rad/s: dry friction has its whole force above this speed, and in proportion to the speed below."""
 NO_FRAME = "its axis is fixed in no end of it that carries the other end"
 NO_TRAVEL = "no coordinate moves its ends apart along its axis"
 NO_CURVE = "curve: piecewise linear forces are functions in Exudyn, no elements"
@@ -96,6 +98,32 @@ class LineSpring:
     def ends(self) -> tuple[tuple[str | None, Vector], ...]:
         """Both bodies with their points."""
         return (self.first_body, self.first_point), (self.second_body, self.second_point)
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    """Coulomb friction against the motion of a coordinate (its number in the tree's order), force in N or N m."""
+
+    name: str
+    coordinate: int
+    force: float
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A constraint between two coordinates (numbers in the tree's order): q_driven = offset + ratio q_driver.
+
+    driver : None where the driven coordinate keeps to the offset; offset in m or rad; solref, solimp : how soft MuJoCo
+    makes it, whose equality constraints are never rigid. Exudyn's is rigid.
+    """
+
+    name: str
+    driven: int
+    driver: int | None
+    ratio: float
+    offset: float
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import BUILDS, Equations, Moved, as_parsed, equations
+from models.own_model.builds import BUILDS, Equations, Moved, State, as_parsed, equations, expected, rigid, sliding
 from models.own_model.reading import TwinModel
 from models.own_model.states import COUNT, random_states
 
@@ -23,9 +23,12 @@ LOOSEST = 1e-6
 """Bound beyond which nothing is certified, whatever the condition of the mass matrix."""
 SMALL = 1e-6
 """m/s^2, rad/s^2: what accelerations are compared with where none is larger."""
+SINGULAR = "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
 QUIET = 1e-3
 """Share of the largest acceleration of all states, or of gravity, that counts where a state has less: what is there is
 rounding alone, of weights that joints bear."""
+FASTER = (1.0, 3.0, 10.0)
+"""Factors of random rates, of which the first is taken at which all dry friction slides."""
 Told = Callable[[float], object]
 """Told the share that is done."""
 
@@ -54,14 +57,35 @@ class Agreement:
 
 
 def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
-    """Every build of the description beside the file's own model."""
-    states = list(zip(*random_states(twin.model, count), strict=True))
-    expected = moved_at(as_parsed(twin), states)
-    rows = list[Agreement]()
+    """Every build of the description beside the file's own model; RunFailed where dry friction sticks at all states."""
+    states, rows = states_of(twin, count), list[Agreement]()
     for i, build in enumerate(BUILDS):
-        rows.append(agreement(build, expected, moved_at(equations(twin, build), states), twin))
+        true, seen = (moved_at(each, states) for each in (expected(twin, build), equations(twin, build)))
+        rows.append(agreement(build, true, seen, twin))
         told((i + 1) / len(BUILDS))
     return tuple(rows)
+
+
+def states_of(twin: TwinModel, count: int) -> list[State]:
+    """Random states; where dry friction sticks with rates that are faster, and left out where it sticks all the same.
+
+    RunFailed where none is left.
+    """
+    states = list[State]()
+    for q, v in zip(*random_states(twin.model, count), strict=True):
+        tried = (sliding(twin, [(q, factor * v)]) for factor in FASTER)
+        states += next((each for each in tried if each), [])
+    if not states:
+        said = "dry friction sticks at all states, and MuJoCo's gives way: try `--without friction_loss`"
+        raise RunFailed("twin", said)
+    return states
+
+
+def softness(twin: TwinModel, count: int) -> float:
+    """Largest relative difference of accelerations of the file's own model with MuJoCo's soft couplings from those with
+    rigid ones, at states that satisfy them."""
+    states = states_of(twin, count)
+    return agreement("", moved_at(rigid(twin), states), moved_at(as_parsed(twin), states), twin).acceleration
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
@@ -69,7 +93,7 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
     try:
         return [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
-        raise RunFailed("twin", "the mass matrix is singular: something without inertia can move") from None
+        raise RunFailed("twin", SINGULAR) from None
 
 
 def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], twin: TwinModel) -> Agreement:

@@ -1,4 +1,4 @@
-"""What a file holds that has no equal in the equations of a tree: refused by name and line, or left out when asked to.
+"""What a file holds beside a tree with linear laws: refused by name and line where it has no equal, left out if asked.
 
 Limits of joints are the exception: as long as no coordinate leaves its range they do nothing, so states are drawn
 inside the ranges, limits are switched off in the file's own model, and that is said.
@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import is_fixed, is_line, label
+from models.own_model.reading import is_fixed, is_line, is_tie, label, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -49,12 +49,28 @@ class Content:
 
 
 def contents(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """All that has no equal, a row for each kind that the model has."""
+    """All that is no part of a tree with linear laws, a row for each kind that the model has."""
+    return _rows(model, document, lambda kind, what, number: True)
+
+
+def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
+    """Of ``contents``, what has no equal in the other builds."""
+    return _rows(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
+
+
+def _rows(model: mujoco.MjModel, document: Document, wanted: Callable[[str, str, int], bool]) -> list[Content]:
     rows = list[Content]()
     for kind, (listed, why, _) in KINDS.items():
-        if names := [_with_line(model, document, *each) for each in listed(model)]:
+        if names := [_with_line(model, document, *each) for each in listed(model) if wanted(kind, *each)]:
             rows.append(Content(kind, tuple(names), why))
     return rows
+
+
+def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
+    """Whether dry friction is that of a hinge or slide, and an equality constraint a coupling of two of them."""
+    if kind == "friction_loss":
+        return what == "joint" and rubs(model, number)
+    return kind == "equality" and is_tie(model, number)
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
@@ -62,17 +78,18 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     for kind in without:
         if kind not in KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(KINDS))
-    there = contents(model, document)
+    there = without_equal(model, document)
     for row in there:
         if row.kind not in without:
             allowed = f"has no equal in the other builds; leave it out with `--without {row.kind}`"
             all_kinds = ",".join(dict.fromkeys((*without, *(each.kind for each in there))))
             more = f"; all that this file needs: `--without {all_kinds}`" if len(there) > 1 else ""
             raise InputError(document.path.name, "", None, f"{row.line()}. It {allowed}{more}")
-    for row in there:
+    left_out = [row for row in contents(model, document) if row.kind in without]
+    for row in left_out:
         KINDS[row.kind][2](model)
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
-    return there
+    return left_out
 
 
 def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
@@ -237,8 +254,16 @@ def _keep_flexes(model: mujoco.MjModel) -> None:
 
 KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
     "contact": (_touching, "bodies that may touch", _forget_contacts),
-    "friction_loss": (_rubbing, "dry friction is a soft constraint in MuJoCo, with no law of its own", _forget_rubbing),
-    "equality": (_equalities, "a soft constraint in MuJoCo", _forget_equalities),
+    "friction_loss": (
+        _rubbing,
+        "dry friction, a soft constraint in MuJoCo, is built for hinges and slides alone",
+        _forget_rubbing,
+    ),
+    "equality": (
+        _equalities,
+        "a soft constraint in MuJoCo, which is built for joints that follow another in proportion alone",
+        _forget_equalities,
+    ),
     "actuator": (
         _odd_actuators,
         "a state, a delay, a muscle, a rotor of its own, or a target other than a joint or a fixed tendon",

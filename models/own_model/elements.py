@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import is_line, label, sites_of
+from models.own_model.reading import is_line, is_tie, label, sites_of
 
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
@@ -89,7 +89,8 @@ def _place(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
 
 
 def _count(model: mujoco.MjModel, sort: str) -> int:
-    return {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon, "actuator": model.nu, "model": 1}[sort]
+    counts = {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon, "actuator": model.nu}
+    return {**counts, "equality": model.neq, "model": 1}[sort]
 
 
 def _owner(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
@@ -211,6 +212,24 @@ def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
     model.site_sameframe[sites_of(model, t)] = 0
 
 
+def _read_tie(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """Whether a coupling acts (1), its offset and ratio; zeros where it does not."""
+    return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if is_tie(model, e) else np.zeros(0)
+
+
+def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+    model.eq_active0[e], model.eq_data[e, :2] = value[0] != 0.0, value[1:]
+
+
+def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """solref and solimp of a coupling."""
+    return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if is_tie(model, e) else np.zeros(0)
+
+
+def _write_softness(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+    model.eq_solref[e], model.eq_solimp[e] = value[:2], value[2:]
+
+
 KINDS = (
     _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
     _Kind("body", "mass", "kg", *_body("body_mass")),
@@ -234,10 +253,22 @@ KINDS = (
     _Kind("tendon", "damping", "N s/m", *_field("tendon_damping", lambda model, t: t)),
     _Kind("tendon", "spring length", "m", *_field("tendon_lengthspring", lambda model, t: t)),
     _Kind("tendon", "armature", "kg", *_field("tendon_armature", lambda model, t: t)),
+    _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
+    _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
     _Kind("actuator", "gear", "", *_of_actuator("actuator_gear", 1)),
     _Kind("actuator", "gain", "", *_of_actuator("actuator_gainprm", 3)),
     _Kind("actuator", "bias", "", *_of_actuator("actuator_biasprm", 3)),
     _Kind("actuator", "control range", "", *_field("actuator_ctrlrange", lambda model, i: i)),
 )
-DROPPED = ("gravity", "gravity compensation", "stiffness", "damping", "armature", "friction loss", "gain", "bias")
+DROPPED = (
+    "gravity",
+    "gravity compensation",
+    "stiffness",
+    "damping",
+    "armature",
+    "friction loss",
+    "coupling",
+    "gain",
+    "bias",
+)
 """Kinds that a model can be without, as zero."""

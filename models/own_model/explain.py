@@ -13,16 +13,15 @@ import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import PLAIN, Moved, as_parsed, equations
-from models.own_model.certificate import Agreement, agreement, moved_at
+from models.own_model.builds import PLAIN, Moved, equations, expected
+from models.own_model.certificate import Agreement, agreement, moved_at, states_of
 from models.own_model.elements import Element, drop, elements, put, tensor_of
 from models.own_model.reading import TwinModel, described
-from models.own_model.states import random_states
 
 STATES = 20
 """States at which elements are tried."""
-OFF = ("friction loss", "range")
-"""Kinds of elements that are off in both files (see ``content``): a difference in them is listed, and not compared."""
+OFF = ("range", "softness")
+"""Kinds of elements that are off, or that MuJoCo alone has: a difference in them is listed, and not compared."""
 STILL = 1e-13
 """Relative change of accelerations and of the mass matrix below which an element has no influence."""
 Key = tuple[str, str]
@@ -33,7 +32,8 @@ States = list[tuple[np.ndarray, np.ndarray]]
 class Difference:
     """An element that differs: what it is, its values in both files (None: it has none), its unit, and its influence,
     the largest relative change of accelerations when it alone is as in the other file, or of the mass matrix where
-    no acceleration changes (None where it has no try); said : its kind in words, where that says more."""
+    no acceleration changes (None where it has no try); off : it is listed, and not compared; said : its kind in words,
+    where that says more."""
 
     kind: str
     owner: str
@@ -41,6 +41,7 @@ class Difference:
     first: np.ndarray | None
     second: np.ndarray | None
     influence: float | None
+    off: bool
     said: str = ""
 
     def sentence(self, files: Sequence[str]) -> str:
@@ -67,13 +68,13 @@ class Comparison:
     @property
     def influential(self) -> tuple[Difference, ...]:
         """Differences that change accelerations or the mass matrix, or could not be tried."""
-        tried = (each for each in self.differences if each.kind not in OFF)
+        tried = (each for each in self.differences if not each.off)
         return tuple(each for each in tried if each.influence is None or each.influence > STILL)
 
     @property
     def not_compared(self) -> tuple[Difference, ...]:
         """Differences in what is off in both files."""
-        return tuple(each for each in self.differences if each.kind in OFF)
+        return tuple(each for each in self.differences if each.off)
 
     @property
     def silent(self) -> tuple[Difference, ...]:
@@ -87,9 +88,9 @@ def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Compari
     if unmatched:
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
     order = [second.names.index(name) for name in first.names]
-    states = list(zip(*random_states(first.model, count), strict=True))
-    twin = moved_at(as_parsed(first), states)
-    other = [_permuted(each, order) for each in moved_at(as_parsed(second), _in_order(states, order))]
+    states = states_of(first, count)
+    twin = moved_at(expected(first, PLAIN), states)
+    other = [_permuted(each, order) for each in moved_at(expected(second, PLAIN), _in_order(states, order))]
     apart = agreement("the second file", twin, other, first)
     base = moved_at(equations(first, PLAIN), states)
     trial = _Trial(first, states, base)
@@ -174,6 +175,7 @@ def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
 def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
     """Elements that differ; trials : of the first and of the second file, None where there are no common states."""
     rows, listed, others = list[Difference](), elements(first.model), elements(second.model)
+    rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
         element, other = listed.get(key), others.get(key)
         if element is not None and other is not None and element.same(other):
@@ -184,7 +186,8 @@ def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Tri
         influence = _influence(trials, key, element, other) if trials is not None else None
         first_value, second_value = (None if each is None else each.value for each in (element, other))
         kind = "orientation of the inertia" if _only_turned(key[0], element, other) else key[0]
-        rows.append(Difference(*key, there.unit, first_value, second_value, influence, kind))
+        off = key[0] in OFF or (key[0] == "friction loss" and not rubbing)
+        rows.append(Difference(*key, there.unit, first_value, second_value, influence, off, kind))
     return rows
 
 
@@ -224,14 +227,14 @@ def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Ele
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """
-    states = list(zip(*random_states(twin.model, count), strict=True))
+    states = states_of(twin, count)
     rows = list[tuple[Element, float]]()
     for key, element in elements(twin.model).items():
         model = copy(twin.model)
         if not element.value.any() or not drop(model, key):
             continue
         less = described(model, twin.name)
-        seen = agreement(build, moved_at(as_parsed(less), states), moved_at(equations(less, build), states), twin)
+        seen = agreement(build, moved_at(expected(less, build), states), moved_at(equations(less, build), states), twin)
         if seen.alike:
             rows.append((element, seen.acceleration))
     return sorted(rows, key=lambda row: row[1])

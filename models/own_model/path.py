@@ -16,7 +16,7 @@ from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
-from models.own_model.builds import PLAIN, plain_tree
+from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
 from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
 
@@ -33,7 +33,9 @@ FILE = "the file's own model"
 class PathReport:
     """step (s); horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other build from
     the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
-    energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy."""
+    energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
+    whether MuJoCo has soft couplings, so that its path is another one: from it the file's is counted then; rubbing :
+    whether there is dry friction: paths are compared as long as it slides."""
 
     step: float
     horizon: float
@@ -41,11 +43,14 @@ class PathReport:
     failed: dict[str, str]
     quaternions: bool
     energy: float | None
+    soft: bool = False
+    rubbing: bool = False
 
     @property
     def alike(self) -> bool:
         """Whether the builds have the same path; the file's own model counts where it has the same coordinates."""
-        held = [size for name, size in self.distances.items() if name != FILE or not self.quaternions]
+        others = {FILE: self.quaternions, SOFT: self.soft}
+        held = [size for name, size in self.distances.items() if not others.get(name)]
         return bool(held) and max(held) <= ALIKE
 
     def lines(self) -> list[str]:
@@ -55,10 +60,13 @@ class PathReport:
         if self.horizon < DURATION:
             rows.append(
                 f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBED:g} reaches {ALIKE:g}"
+                f"{', or dry friction sticks' if self.rubbing else ''}"
             )
         for name, size in self.distances.items():
             turned = " (quaternions: distance of the step's error)" if name == FILE and self.quaternions else ""
-            rows.append(f"  {name} from {ENGINES[0]}: {size:.1e}{turned}")
+            given = " (soft couplings give way)" if name == SOFT and self.soft else ""
+            first = SOFT if name == FILE and self.soft else ENGINES[0]
+            rows.append(f"  {name} from {first}: {size:.1e}{turned}{given}")
         if self.energy is not None:
             rows.append(f"  kinetic energy less work of all forces: {self.energy:.1e} of the largest kinetic energy")
         return rows
@@ -75,11 +83,14 @@ def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     first = built.pop(ENGINES[0], None)
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None)
-    disturbed = _model(twin, ENGINES[1]).march(q + DISTURBED, v, steps, step)
-    rows = _rows(first, disturbed, steps)
-    distances = {name: _distance(twin, name, first[:rows], path[:rows]) for name, path in built.items()}
+    soft = bool(twin.driven.couplings)
+    disturbed = _model(twin, PLAIN if soft else ENGINES[1]).march(q + DISTURBED, v, steps, step)
+    rows = _sliding_rows(twin, first[: _rows(first, disturbed, steps)])
+    base = {FILE: built.get(SOFT, first)} if soft else {}
+    distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
     energy = _ledger(twin, first[:rows], step)
-    return PathReport(step, (rows - 1) * step, distances, failed, bool(twin.coordinates.turnings), energy)
+    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions)
+    return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
 
 
 def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
@@ -101,6 +112,9 @@ def _by_build(twin: TwinModel, build: str, start: tuple[np.ndarray, np.ndarray],
 
 
 def _model(twin: TwinModel, build: str) -> FreeModel:
+    if twin.driven.couplings and build != SOFT:
+        move = equations(twin, build)
+        return Plain(build, lambda time, q, v: move(q, v).acceleration, twin.size)
     if build != PLAIN:
         return free_model(build, twin.driven)
     return Plain(PLAIN, plain_tree(twin).acceleration, twin.size)
@@ -127,6 +141,15 @@ def _rows(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
     grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= ALIKE * np.maximum(size, 1.0)))
     return max(2, int(grown[0])) if len(grown) else steps + 1
+
+
+def _sliding_rows(twin: TwinModel, path: np.ndarray) -> int:
+    """How many states of a path lie before dry friction sticks in MuJoCo, less one whose step may have met that."""
+    n = twin.size
+    for i, row in enumerate(path if twin.driven.frictions else ()):
+        if not sliding(twin, [(row[:n], row[n:])]):
+            return max(2, i - 1)
+    return len(path)
 
 
 def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:

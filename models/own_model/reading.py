@@ -4,14 +4,14 @@ Every joint is a body without mass that moves along its axis, at its anchor; beh
 is a body with its mass, at its centre. What stands still with the world is left out: it moves nothing.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from models.engines.free_vehicle import Driven
-from models.engines.native_parts import GroundSpring, LineSpring, joint_parts
+from models.engines.native_parts import Coupling, DryFriction, GroundSpring, LineSpring, joint_parts
 from models.own_model.coordinates import BALL, FREE, SLIDE, Coordinates
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -49,7 +49,8 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     gravity = np.zeros(3) if _disabled(model, "GRAVITY") else np.array(model.opt.gravity)
     loads = tuple(_lifted(model, design, gravity))
     lines = tuple(line_springs(model, design))
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, joint_parts(vehicle), loads, lines)
+    ties, parts = (tuple(dry_frictions(model)), tuple(couplings(model))), joint_parts(vehicle)
+    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties)
     return TwinModel(name, model, driven, Coordinates(model, design))
 
 
@@ -198,6 +199,51 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
             start, end = (_vector(design.site_xpos[s]) for s in sites_of(model, t))
             length = float(model.tendon_lengthspring[t, 0])
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
+
+
+def rubs(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a hinge or slide has dry friction."""
+    several = model.jnt_type[joint] in (BALL, FREE)
+    return bool(not several and model.dof_frictionloss[model.jnt_dofadr[joint]] > 0.0)
+
+
+def dry_frictions(model: mujoco.MjModel) -> Iterator[DryFriction]:
+    """Dry friction of hinges and slides."""
+    if _disabled(model, "FRICTIONLOSS"):
+        return
+    for j in (j for j in range(model.njnt) if rubs(model, j)):
+        first = int(model.jnt_dofadr[j])
+        yield DryFriction(label(model, "joint", j), first, float(model.dof_frictionloss[first]))
+
+
+def is_tie(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint makes a hinge or slide follow another one in proportion, or stay where it is."""
+    if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
+        return False
+    joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
+    return not any(model.jnt_type[j] in (BALL, FREE) for j in joints)
+
+
+def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
+    """Equality constraints of two joints, or of one, that act."""
+    if _disabled(model, "EQUALITY"):
+        return
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
+        first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        driver = int(model.jnt_dofadr[second]) if second >= 0 else None
+        offset, ratio = model.eq_data[e, :2].tolist()
+        softness = tuple(model.eq_solref[e].tolist()), tuple(model.eq_solimp[e].tolist())
+        yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
+
+
+def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """(c, n) and (c,): rows q = offsets is what couplings ask of n coordinates."""
+    rows = np.zeros((len(ties), size))
+    for row, coupling in zip(rows, ties, strict=True):
+        row[coupling.driven] = 1.0
+        if coupling.driver is not None:
+            row[coupling.driver] -= coupling.ratio
+    return rows, np.array([coupling.offset for coupling in ties])
 
 
 def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[float, ...], float]:

@@ -1,9 +1,10 @@
-"""Random states of a model, every coordinate within its range."""
+"""Random states of a model, every coordinate within its range, or as its couplings want it."""
 
 import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
+from models.own_model.reading import couplings, tie_rows
 
 COUNT = 100
 SEED = 26
@@ -13,9 +14,17 @@ without limit, the second of which is singular at a quarter turn."""
 
 
 def random_states(model: mujoco.MjModel, count: int = COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates (count, n), uniform in the ranges: the same for the same count and seed."""
+    """Coordinates and rates (count, n), uniform in the ranges: the same for the same count and seed.
+
+    Those that couplings tie go to the nearest place, and the nearest rate, that satisfies them.
+    """
     draw, (low, high) = np.random.default_rng(seed), bounds(model)
-    return draw.uniform(low, high, (count, len(low))), draw.uniform(-SPEED, SPEED, (count, len(low)))
+    q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-SPEED, SPEED, (count, len(low)))
+    rows, offsets = tie_rows(tuple(couplings(model)), model.nv)
+    if not len(rows):
+        return q, v
+    nearest = np.linalg.pinv(rows).T
+    return q - (q @ rows.T - offsets) @ nearest, v - v @ rows.T @ nearest
 
 
 def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

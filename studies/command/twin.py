@@ -1,12 +1,12 @@
 """``twinrig twin``: a user's own model in every build, or two files beside one another."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.own_model.certificate import ALIKE, Agreement, certificate
+from models.own_model.certificate import ALIKE, Agreement, certificate, softness, states_of
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
@@ -37,7 +37,7 @@ class Wanted:
 class Examined:
     """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
     MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
-    lines on what accuracy costs."""
+    lines on what accuracy costs; constraints : lines on dry friction and couplings."""
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
@@ -45,6 +45,7 @@ class Examined:
     misread: tuple[Misread, ...]
     path: PathReport | None
     price: tuple[str, ...] = ()
+    constraints: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -132,7 +133,22 @@ def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
 
         tell("pricing", 2 / 3)
         price = tuple(price_lines(priced(file.twin, wanted.tolerance, wanted.quantity)))
-    return Examined(file, agreements, explained, tuple(lost), report, price)
+    return Examined(file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, wanted.states)))
+
+
+def _constraints(file: ModelFile, count: int) -> Iterator[str]:
+    """What is soft in MuJoCo, and how far that is from the law that the other builds have."""
+    twin = file.twin
+    if frictions := twin.driven.frictions:
+        yield (
+            f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
+            "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
+        )
+    if ties := twin.driven.couplings:
+        yield (
+            f"{len(ties)} couplings of joints: rigid in Exudyn and the plain equations, which are held to the file with"
+            f" rigid ones; soft in MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
+        )
 
 
 def lines(twins: Twins) -> list[str]:
@@ -175,7 +191,7 @@ def _file_lines(each: Examined) -> list[str]:
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
     if each.file.limited:
         rows.append(f"  limits off, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
-    rows += [f"  {note}" for note in each.file.notes]
+    rows += [f"  {note}" for note in (*each.constraints, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
     return rows + [f"  {line}".rstrip() for line in each.price]
 
@@ -198,4 +214,6 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
     if not comparison.alike:
         rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
     rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
-    return rows + [f"  not compared, since it is off: {each.sentence(names)}" for each in comparison.not_compared]
+    return rows + [
+        f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared
+    ]

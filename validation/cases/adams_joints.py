@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from models.own_model.certificate import ALIKE
 from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import joint_tree
 from validation.adams_joints.mechanism import Mechanism, read_mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction
 from validation.adams_joints.output_file import OutputFile, read_output, starts_alike
+from validation.adams_joints.twin_model import examined
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 
@@ -55,6 +57,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _fitting(read_mechanism(model), output)
         rows += [*notes_rows(family, notes), *family_rows(family, mechanism, output, quick)]
+        if mechanism.kind != "distance":
+            rows += own_model_rows(family, mechanism, folder, 1.0 if quick else DURATION)
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
             "digits": output.digits,
@@ -129,6 +133,23 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
         rows.append(_windows(family, mechanism, output, duration))
     for name in ENGINES:
         rows.append(_twin(family, name, mechanism, runs[name], runs["reference"]))
+    return rows
+
+
+def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
+    """Rows of the joint in MJCF, as ``twinrig twin`` certifies it, and of its paths beside those of constraints."""
+    steps = round(duration / STEP)
+    accelerations, paths = examined(mechanism, folder, steps, STEP)
+    motion, _ = ConstrainedBody(mechanism).run(duration, STEP, EVERY)
+    quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
+    said = "rounding; the bound asked for"
+    alike = Observed(_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
+    rows: list[Row] = [alike.at_most(ALIKE, said, "native")]
+    for name, places in paths.items():
+        off = float(np.abs(places[::EVERY] - motion.place).max())
+        quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"
+        observed = Observed(_id(family, f"mjcf.position.{name}"), SYSTEM, quantity, off, "m")
+        rows.append(observed.at_most(TWINS, "no code in common but Runge-Kutta's steps of 5 ms", "native"))
     return rows
 
 

@@ -4,17 +4,20 @@ from importlib import import_module
 from pathlib import Path
 
 from models.core.systems import SYSTEMS, load
-from models.own_model.certificate import Agreement, certificate
+from models.own_model.builds import as_parsed
+from models.own_model.certificate import Agreement, agreement, certificate, moved_at, states_of
 from models.own_model.content import KINDS
 from models.own_model.explain import compare
 from models.own_model.file import ModelFile, read
 from models.own_model.path import ALIKE, paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.own_model.files import ARM_URDF, CART, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.files import ARM_URDF, CART, GEARED, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.soft_couplings import softly_coupled
 
 TITLE = "A user's own model: MJCF and URDF in every build"
 SYSTEM: System = "rolling-vehicle"
 STATES, QUICK_STATES = 100, 5
+SOLVED = 1e-8
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 EXPORTED = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
 """Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
@@ -23,14 +26,14 @@ OUTSIDE = tuple(kind for kind in KINDS if kind not in ("flex", "turning_law"))
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Quick: four models, five states, six planted differences; in full 21 models, eight of them exported, all 30."""
-    texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED}
+    """Quick: five models, five states, six planted differences; in full 22 models, eight of them exported, all 30."""
+    texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
     if not quick:
         texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
     rows = [_agreement(name, _read(folder, name, text), quick) for name, text in texts.items()]
     rows += [] if quick else [_agreement(name, _exported(folder, name), quick) for name in EXPORTED]
-    return [*rows, *_path(folder), _planted(folder, quick)], {}
+    return [*rows, _soft(folder), *_path(folder), _planted(folder, quick)], {}
 
 
 def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> ModelFile:
@@ -57,6 +60,21 @@ def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
         worst.acceleration,
         "of the largest",
     ).at_most(worst.bound, "rounding, by the condition of the mass matrix; 1e-10 or more", "native")
+
+
+def _soft(folder: Path) -> Row:
+    """What MuJoCo's couplings give way, by the law of its documentation on the plain equations."""
+    twin = _read(folder, "geared", GEARED).twin
+    states = states_of(twin, QUICK_STATES)
+    apart = agreement("", moved_at(softly_coupled(twin), states), moved_at(as_parsed(twin), states), twin)
+    return Observed(
+        "twin_files.soft_couplings",
+        SYSTEM,
+        "largest difference of accelerations with soft couplings in MuJoCo from the law of its documentation about the "
+        "plain equations, at states that satisfy them, geared",
+        apart.acceleration,
+        "of the largest",
+    ).at_most(SOLVED, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")
 
 
 def _path(folder: Path) -> list[Row]:

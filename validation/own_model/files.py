@@ -69,6 +69,22 @@ TIED = """<mujoco model="tied"><worldbody><site name="hook" pos="0 .3 1"/>
 """Springs along lines: from the ground, and between two bodies; one has no length, one no force."""
 
 
+GEARED = """<mujoco model="geared"><worldbody>
+<body name="crank" pos="0 0 1"><joint name="turn" axis="0 1 .3" damping=".2"/>
+ <inertial pos=".1 0 .2" mass="1" diaginertia=".1 .12 .05"/>
+ <body name="hand" pos=".3 0 0"><joint name="swing" axis="1 0 .2" ref="20" frictionloss=".4"/>
+  <inertial pos="0 .1 -.2" mass=".6" diaginertia=".03 .03 .01"/></body></body>
+<body name="rack" pos="1 0 0" euler="0 20 10"><joint name="slide" type="slide" axis="1 0 .2" frictionloss="1.5"/>
+ <inertial pos="0 0 .1" mass="2" diaginertia=".1 .1 .1"/>
+ <body name="flap"><joint name="fold" axis="0 1 0" stiffness="3"/>
+  <inertial pos=".2 0 0" mass=".3" diaginertia=".01 .01 .02"/></body>
+ <body name="lid" pos="0 .2 0"><joint name="cover" axis="1 0 0"/>
+  <inertial pos="0 0 .2" mass=".2" diaginertia=".01 .01 .02"/></body></body></worldbody>
+<equality><joint name="gear" joint1="slide" joint2="turn" polycoef=".1 .25 0 0 0"/>
+ <joint name="shut" joint1="cover" polycoef=".3 0 0 0 0" solimp=".95 .99 .001"/></equality></mujoco>"""
+"""Dry friction of a hinge and a slide, a rack that follows a crank, and a lid that stays shut."""
+
+
 def chain(count: int, seed: int = 1) -> str:
     """A chain of hinges and slides with springs, dampers and armatures, all numbers at random."""
     draw = np.random.default_rng(seed)

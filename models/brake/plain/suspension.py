@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.brake.sprung import Sprung
+from models.multibody.plain.joint_elements import joint_numbers, joint_rows
 from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import held_at_rest
@@ -53,7 +54,10 @@ class Suspension:
         free = vehicle.handling.vehicle
         self.bodies, self.tyres = Bodies(free), free.tyres
         self.parts = PlainParts(self.bodies, free, CARRIER)
-        self.held, self.loads = held_at_rest(free, CARRIER)
+        held, self.loads = held_at_rest(free, CARRIER)
+        self.held, self._joint_held = np.split(held, [len(self.parts.names)])
+        self._joints = joint_rows(self.bodies, free)
+        self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(free)
         self._gravity = -free.gravity * UP
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
         self._carrier = self.bodies.row[CARRIER]
@@ -98,7 +102,9 @@ class Suspension:
         mass, force = self.bodies.inertia(motion, self._gravity)
         travels = self.parts.travels(motion, q, v)
         force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
-        force += self._by_tyres(motion, constant) + self._by_air(motion)
+        along = self._joint_held + self._joint_stiffness * (self._joints @ q) + self._joint_damping * (self._joints @ v)
+        mass += self._joints.T * self._joint_inertia @ self._joints
+        force += self._by_tyres(motion, constant) + self._by_air(motion) - along @ self._joints
         accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
 

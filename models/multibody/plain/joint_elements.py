@@ -12,6 +12,8 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 
 Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
 """Two points of bodies (None: the ground) in the design position; N/m, N s/m and m of a spring along their line."""
+Friction = tuple[int, float, float]
+"""A coordinate's number, its dry friction (N, N m), and the speed (m/s, rad/s) from which it has that force."""
 Load = tuple[str, Vector, np.ndarray]
 """A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
 
@@ -35,7 +37,12 @@ class PlainTree:
     """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
     def __init__(
-        self, vehicle: SpatialVehicle, gravity: np.ndarray, loads: Sequence[Load] = (), lines: Sequence[Line] = ()
+        self,
+        vehicle: SpatialVehicle,
+        gravity: np.ndarray,
+        loads: Sequence[Load] = (),
+        lines: Sequence[Line] = (),
+        frictions: Sequence[Friction] = (),
     ) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
         self.size = self.bodies.size
@@ -44,6 +51,8 @@ class PlainTree:
         self._lines, self._ends = lines, self.bodies.points([end for ends, *_ in lines for end in ends])
         self._rows = joint_rows(self.bodies, vehicle)
         self._stiffness, self._damping, self._held, self._inertia = joint_numbers(vehicle)
+        self._rubbing = [coordinate for coordinate, _, _ in frictions]
+        self._friction, self._slides = np.array([rest for _, *rest in frictions]).reshape(-1, 2).T
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mass matrix (n, n) and forces (n,), less what inertia asks without q'', at coordinates and rates (n,)."""
@@ -55,6 +64,7 @@ class PlainTree:
             force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
         if self._lines:
             force += self._line_spring_forces(motion)
+        force[self._rubbing] -= self._friction * np.clip(v[self._rubbing] / self._slides, -1.0, 1.0)
         return mass + self._rows.T * self._inertia @ self._rows, force
 
     def _line_spring_forces(self, motion: PlainMotion) -> np.ndarray:

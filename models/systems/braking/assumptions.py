@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator
 from functools import partial
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -133,7 +132,7 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
             "of an axle's load",
             most=LIFTED,
         )
-    if vehicle.sprung is not None and any(spring.travel_force is None for spring in _springs(vehicle)):
+    if vehicle.sprung is not None and _stopless(vehicle):
         yield Assumption(
             "travel",
             "springs do not reach their stops",
@@ -145,8 +144,10 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
         )
 
 
-def _springs(vehicle: Braked) -> tuple[Any, ...]:
-    return tuple(vehicle.sprung.handling.vehicle.springs)
+def _stopless(vehicle: Braked) -> bool:
+    """Whether a spring of a vehicle on its suspension has no stop."""
+    whole = vehicle.sprung.handling.vehicle
+    return bool(whole.joint_elements) or any(spring.travel_force is None for spring in whole.springs)
 
 
 def _hinges(run: Result) -> Watched:

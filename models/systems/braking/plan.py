@@ -128,8 +128,10 @@ def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
     independent."""
     from models.engines.free_vehicle import native_share
 
+    whole = sprung_of(scene).handling.vehicle
     return [
-        *native_share(sprung_of(scene).handling.vehicle),
+        *(("read", note) for note in whole.notes),
+        *native_share(whole),
         ("shared", "tyres, wheels that turn, brakes and the road: no engine has them"),
         ("reference", "plain code that shares no force with them, where --engine reference asks for it"),
     ]

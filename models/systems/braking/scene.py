@@ -16,6 +16,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import check, read_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted, quantity
+from models.own_model.scene_vehicle import MJCF
 
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
@@ -37,9 +38,9 @@ class VehicleTable(Strict):
     file: str | None = Field(
         default=None,
         description="in their place a vehicle on its suspension: one that comes "
-        "with twinrig, as r19_free, or a TOML file of your own",
+        "with twinrig, as r19_free, a TOML file of your own or a car in MJCF",
     )
-    spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which that file lacks", default=None)
+    spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which a TOML file lacks", default=None)
     accept: list[Query] = accepted()
 
 
@@ -226,7 +227,7 @@ def _of_vehicle(scene: BrakingScene) -> Refusals:
         if vehicle.spin_inertia is not None:
             yield "vehicle.spin_inertia", vehicle.spin_inertia, "has no meaning without vehicle.file"
         return
-    if vehicle.spin_inertia is None:
+    if vehicle.spin_inertia is None and not str(vehicle.file).endswith(MJCF):
         yield "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it"
     for key, named in (("parameters", "parameters" in vehicle.model_fields_set), ("override", vehicle.override)):
         if named:

@@ -1,0 +1,104 @@
+"""Joints of the other code as MJCF, read and built as ``twinrig twin`` does with a user's own file.
+
+A body on one joint has that joint in MJCF, with its axis and anchor. A distance has none: its rod has no mass, and
+MuJoCo's parser refuses a moving body without.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from models.core.errors import Refused
+from models.engines.free_vehicle import free_model
+from models.own_model.certificate import certificate
+from models.own_model.file import read
+from models.own_model.path import file_path
+from models.own_model.reading import TwinModel
+from validation.adams_joints.mechanism import Mechanism, Spring
+
+STATES = 20
+SLIDE, HINGE = "slide", "hinge"
+
+
+def as_mjcf(mechanism: Mechanism) -> str:
+    """The mechanism as MJCF; its body's frame is at the centre, parallel to the ground's axes at the start."""
+    m, inertia = mechanism, mechanism.inertia
+    laws = [spring for spring in m.springs if spring.turns]
+    lines = [spring for spring in m.springs if not spring.turns]
+    six = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    feet = "".join(f'<site name="foot {i}" pos="{_row(spring.ground)}"/>' for i, spring in enumerate(lines))
+    tips = "".join(f'<site name="tip {i}" pos="{_row(spring.body - m.centre)}"/>' for i, spring in enumerate(lines))
+    tendons = "".join(_tendon(i, spring) for i, spring in enumerate(lines))
+    return (
+        f'<mujoco><compiler angle="radian"/><option gravity="{_row(m.gravity)}"/><worldbody>{feet}'
+        f'<body name="body" pos="{_row(m.centre)}">{_joints(m, laws)}'
+        f'<inertial pos="0 0 0" mass="{m.mass!r}" fullinertia="{_row(np.array(six))}"/>{tips}</body></worldbody>'
+        f"<tendon>{tendons}</tendon></mujoco>"
+    )
+
+
+def _row(numbers: np.ndarray) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _joints(m: Mechanism, laws: list[Spring]) -> str:
+    """Joints of the body in the order in which they turn it; Refused where MJCF has none."""
+    first, second = m.ground.axes[:, 2], m.body.axes[:, 2]
+    kinds = {
+        "revolute": [(HINGE, first)],
+        "prismatic": [(SLIDE, first)],
+        "cylindrical": [(SLIDE, first), (HINGE, first)],
+        "spherical": [("ball", first)],
+        "universal": [(HINGE, first), (HINGE, second)],
+        "free": [("free", first)],
+    }
+    if m.kind not in kinds:
+        raise Refused(m.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
+    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.rest!r}"' for s in laws)
+    anchor = m.body.place - m.centre
+    return "".join(
+        f'<joint name="{kind} {i}" type="{kind}"/>'
+        if kind == "free"
+        else f'<joint name="{kind} {i}" type="{kind}" axis="{_row(axis)}" pos="{_row(anchor)}"{law}/>'
+        for i, (kind, axis) in enumerate(kinds[m.kind])
+    )
+
+
+def _tendon(i: int, spring: Spring) -> str:
+    law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.rest!r}"'
+    return f'<spatial name="spring {i}" {law}><site site="foot {i}"/><site site="tip {i}"/></spatial>'
+
+
+def examined(mechanism: Mechanism, folder: Path, steps: int, step: float) -> tuple[float, dict[str, np.ndarray]]:
+    """Largest relative difference of accelerations of all builds from the file, and places (steps + 1, 3) of the centre
+    on the paths of the file's own model in MuJoCo and of Exudyn's build, by steps of so many seconds from its start."""
+    path = folder / "joint.xml"
+    path.write_text(as_mjcf(mechanism), encoding="utf-8")
+    twin = read(path).twin
+    worst = max(row.acceleration for row in certificate(twin, STATES))
+    start = np.zeros(twin.size), _start_rates(mechanism, twin)
+    n, built = twin.size, free_model("exudyn", twin.driven).march(*start, steps, step)
+    in_engine = [twin.coordinates.to_mujoco(row[:n], row[n:]).qpos for row in built]
+    own = file_path(twin, start, (steps, step))[:, : twin.model.nq]
+    return worst, {"mujoco": _centres(twin, own), "exudyn": _centres(twin, np.array(in_engine))}
+
+
+def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
+    """Rates (n,) of the joints at the start, where angles that have no limit are those of the body's own axes."""
+    data, size = mujoco.MjData(twin.model), twin.size
+    mujoco.mj_forward(twin.model, data)
+    moved, turned = np.empty((2, 3, size))
+    mujoco.mj_jacBodyCom(twin.model, data, moved, turned, 1)
+    wanted = np.concatenate((mechanism.velocity, mechanism.turning))
+    rates: np.ndarray = np.linalg.lstsq(np.vstack((moved, turned)), wanted, rcond=None)[0]
+    return rates
+
+
+def _centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
+    """(m, 3): places of the body's centre at MuJoCo's positions (m, nq)."""
+    data, places = mujoco.MjData(twin.model), np.empty((len(positions), 3))
+    for place, data.qpos[:] in zip(places, positions, strict=True):
+        mujoco.mj_kinematics(twin.model, data)
+        place[:] = data.xipos[1]
+    return places
