@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,16 +18,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.whole_files import reason_of
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import (
-    SCENES,
-    causes,
-    checked_study,
-    engines_of,
-    findings_of,
-    load_scene,
-    plain_arrays,
-    plan_of,
-)
+from studies.command.asked import causes, checked_study, engines_of, findings_of, load_scene, plain_arrays, plan_of
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import given_crew
 from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
@@ -110,32 +100,9 @@ def main() -> None:
 @app.command("list")
 def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
-    from models.core.scene_effects import listing
-    from models.core.scene_file import parse
-    from models.core.systems import DEFAULT, SYSTEMS
-    from models.engines.catalogue import CATALOGUE
-    from models.systems.pitch_plane.scene import parameter_sets
+    from studies.command.listing import print_lists
 
-    scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES.glob("*.toml"))}
-    sets = {name: import_module(f"models.vehicles.parameters.{name}").SOURCE for name in parameter_sets()}
-    _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)
-    for system in SYSTEMS:
-        named = "[effects.NAME] in a scene" if system == DEFAULT else "by the tables of its scenes"
-        _print_list(f"effects of {system} ({named}; one that is not named is not computed)", listing(system))
-    _print_list("parameter sets (vehicle.parameters = NAME, or a TOML file of your own)", sets)
-    _print_list(
-        "engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",
-        {name: ", ".join(integrators) for name, integrators in CATALOGUE.items()},
-    )
-
-
-def _print_list(title: str, entries: dict[str, str]) -> None:
-    if not entries:
-        return
-    width = max(map(len, entries))
-    print(title)
-    for name, text in entries.items():
-        print(f"  {name:<{width}} {text}")
+    print_lists()
 
 
 @app.command()

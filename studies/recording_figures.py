@@ -13,7 +13,8 @@ from models.fatigue.counting import Counted
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNITS, Signal
-from models.systems.measured.run import FREE, Examination
+from models.systems.measured.holds import FREE
+from models.systems.measured.run import Examination
 from models.systems.measured.section_run import Outcome
 from models.systems.measured.sections import Answer
 from models.systems.measured.verdict import Compared, overlay

@@ -16,7 +16,8 @@ from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
 from models.fatigue.damage import SLOPE
 from models.systems.measured.consequences import DAMAGE, FORCE
-from models.systems.measured.run import FREE, Examination
+from models.systems.measured.holds import FREE
+from models.systems.measured.run import Examination
 from models.systems.measured.section_run import Outcome
 from models.systems.measured.verdict import DISAGREES, errors
 from studies import recording_figures as draw

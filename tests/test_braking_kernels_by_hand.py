@@ -9,11 +9,13 @@ from models.brake.advance import AT_REST
 from models.brake.brake import Brake
 from models.brake.controllers.five_phase_cycle import Frozen, go_on
 from models.brake.plane_chain import factor, headings, inertia, solve
+from models.brake.plane_step import SPREAD
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.trailer import CHOSEN, hooked, train
 from models.engines.braking import set_held
 from models.tyre.magic_formula import surface
-from validation.braking.braked_truck import Moving, constant, truck_on
+from models.tyre.tyre_table import Tables, TyreTable, stacked
+from validation.braking.braked_truck import Moving, constant, on_road, truck_on
 
 MU = 0.4
 LOCKING = np.full(4, 1e14)
@@ -117,3 +119,38 @@ def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     braked = 0.5 * (150.0 + end.torque) * 2e-3
     assert 1.2 * (end.turning - start.turning) == pytest.approx(0.3 * end.impulse - braked, rel=1e-10)
     assert 0.0 < end.impulse < 1.2 * 4e3 * 2e-3 and not math.isclose(end.turning, start.turning)
+
+
+def falling() -> Tables:
+    """Friction that is greatest at a slip of 0.1, and half as great where a wheel is locked."""
+    along = np.broadcast_to(np.array([0.0, 2.0 * MU, MU]), (3, 1, 3)).copy()
+    nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
+    g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [MU], [MU]])
+    return stacked([TyreTable(*nodes, along, g, h)])
+
+
+@pytest.mark.grounds("closed form")
+@pytest.mark.parametrize(("inertia", "speed", "step", "share"), [(3.0, 0.1, 5.5e-3, 5e-3), (1.0, 0.03, 2e-3, 1.4e-3)])
+def test_wheels_at_the_edge_of_locking_bear_the_load_that_just_locks_them(inertia, speed, step, share):
+    """r mu N = T: a little more load, and the rear wheels roll at once, with more friction, which takes the load away.
+
+    Loads give the acceleration by load transfer, and this the forces; the front wheels are locked. The jump is closed
+    in to ``SPREAD`` on both sides.
+    """
+    plane = truck(PAPER)._replace(spin=np.full(4, inertia))
+    load = (plane.static - plane.by_x * MU * GRAVITY) * (1.0 - share)  # a little less than behind if all are locked
+    torques = np.where(plane.place[:, 0] < 0.0, plane.radius * MU * load, LOCKING)
+    moving = Moving(on_road(plane, falling(), slope=1e-6), speed)
+    moving.turning[:] = 0.0
+    moving.on(torques, step)
+    lift, mass = PAPER.mass * PAPER.height / (2.0 * PAPER.wheelbase), PAPER.mass
+    slowing = (plane.static[2] - load[2]) / lift
+    loads = plane.static + lift * slowing * np.array([1.0, 1.0, -1.0, -1.0])
+    front = MU * loads[0]
+    rear = 0.5 * mass * slowing - front
+    report = moving.report
+    assert rear > 1.01 * MU * loads[2]  # not locked all the time, nor rolling
+    assert -moving.motion.accelerations[0] == pytest.approx(slowing, abs=2.0 * SPREAD)
+    assert report.load == pytest.approx(loads, abs=2.0 * lift * SPREAD)
+    assert -report.force_x == pytest.approx([front, front, rear, rear], abs=2.0 * mass * SPREAD)
+    assert report.force_x.sum() == pytest.approx(mass * moving.motion.accelerations[0], rel=1e-12)

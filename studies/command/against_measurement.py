@@ -18,7 +18,8 @@ from models.measured.formats import open_source
 from models.measured.time_shift import Pair, Shift, time_shift
 from models.measured.timing import timing
 from models.measured.units import factor_between
-from studies.command.comparison import Quantity, channels_of
+from studies.command.comparison import channels_of
+from studies.command.differences import Quantity
 
 OVER = "time [s]"
 DOUBTED = 0.5

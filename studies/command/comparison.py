@@ -3,7 +3,7 @@
 import csv
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from models.core.errors import InputError
 from models.core.result import Result, load
 from models.core.told import SAID, Results
 from models.core.whole_files import whole_file
+from studies.command.differences import Difference, Quantity
 
 SUFFIXES = (".nc", ".csv")
 SHOWN = 20
@@ -22,85 +23,6 @@ KINDS = ("system", "mode")
 """Attributes of a result that must be the same."""
 NEAR = 1e-9
 """Places so near, by the largest of them, are the same."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """values (n,) over ``grid`` (n,), which is a time, a coordinate or the first column of a table, or counts rows.
-
-    kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
-    no number; error : that the result states for its channel, in its unit, nan where it states none.
-    """
-
-    unit: str
-    values: np.ndarray
-    over: str
-    grid: np.ndarray
-    kind: str = ""
-    labels: tuple[str, ...] = ()
-    error: float = np.nan
-
-
-@dataclass(frozen=True)
-class Difference:
-    """``second`` less ``first`` over ``grid`` (n,); ``note`` says how they came onto the same rows.
-
-    stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
-    """
-
-    name: str
-    unit: str
-    over: str
-    grid: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
-    note: str = ""
-    labels: tuple[str, ...] = ()
-    stated: float = np.nan
-
-    @property
-    def within(self) -> bool:
-        """Whether both results differ by less than they say that they err: then the difference tells nothing."""
-        return 0.0 < self.rms <= self.stated
-
-    @property
-    def gap(self) -> np.ndarray:
-        """(n,) nan in both is no difference; infinite where only one of them is a number, or the infinities differ."""
-        with np.errstate(invalid="ignore"):
-            gap = self.second - self.first
-        same = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
-        return np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap))
-
-    @property
-    def row(self) -> int:
-        """Where the difference is largest."""
-        return int(np.abs(self.gap).argmax())
-
-    @property
-    def largest(self) -> float:
-        """Largest magnitude of the difference."""
-        return float(abs(self.gap[self.row]))
-
-    @property
-    def rms(self) -> float:
-        """Root of the mean square of the difference."""
-        return float(np.sqrt(np.mean(self.gap**2)))
-
-    @property
-    def at(self) -> float:
-        """Where on the grid the difference is largest."""
-        return float(self.grid[self.row])
-
-    @property
-    def where(self) -> str:
-        """Place of the largest difference, in words."""
-        return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
-
-    @property
-    def share(self) -> float:
-        """Largest difference by the largest magnitude of the first."""
-        size = np.abs(self.first[np.isfinite(self.first)]).max(initial=0.0)
-        return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf
 
 
 def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:

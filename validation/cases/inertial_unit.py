@@ -29,9 +29,12 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, not_run
+from validation.common.rows import CaseAnswer, Observed, Row, System, not_run
 from validation.common.scenes import on_paper_road, road_scene
 from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
+from validation.drift.ten_minutes import DEVIATION, RATE, TEN_MINUTES
+from validation.drift.ten_minutes import draw as draw
+from validation.drift.ten_minutes import tables as tables
 from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
@@ -43,8 +46,6 @@ UNEQUAL = np.array([0.1, 0.3, 0.6])
 EQUAL = 0.5
 PERIOD, SPAN = 5e-3, 2.0
 """s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
-TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
-"""s, Hz, rad/s per sample: the paper's own example."""
 
 
 @on_paper_road()
@@ -383,39 +384,3 @@ def _recording(paths: int) -> CaseAnswer:
             LEVEL,
         ),
     ], {"off": off[::20].tolist()}
-
-
-def tables(data: Saved) -> list[Table]:
-    """The ten minutes over time."""
-    if not data["ten minutes"]:
-        return []
-    rms, walk = data["ten minutes"]["rms"], math.degrees(random_walk(DEVIATION, RATE))
-    rows = tuple((f"{t}", f"{rms[t]:.2f}", f"{walk * t**0.5:.2f}") for t in (1, 10, 60, 300, 600))
-    note = f"0.1 rad/s on each sample of 1 kHz, {data['ten minutes']['count']} paths; samples are held (Stratonovich)."
-    return [Table("The ten-minute example", note, ("time [s]", "rms angle per axis [deg]", "s sqrt(t) [deg]"), rows)]
-
-
-def draw(data: Saved) -> Drawn:
-    """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import BLUE, WIDE, heading, subplots
-
-    figures = []
-    if data["ten minutes"]:
-        figure, axes = subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
-        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
-        times = np.arange(paths.shape[1])
-        for i, axis in enumerate(axes):
-            axis.plot(times, paths[:, :, i].T, color=BLUE, linewidth=0.6)
-            for sign in (1, -1):
-                axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
-            axis.set(title=f"about global {'xyz'[i]} [deg]", xlabel="time [s]")
-        axes[0].legend(loc="upper left")
-        heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
-        figures.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
-    if data["recording"]:
-        figure, axis = subplots(figsize=(6, 3.2))
-        axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
-        axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
-        heading(figure, "A minute in a real car: attitude from the gyro alone")
-        figures.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
-    return figures

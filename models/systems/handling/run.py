@@ -22,11 +22,11 @@ from models.engines.native_parts import joint_parts
 from models.multibody import forces as at
 from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
+from models.systems.handling.limits import check_step, check_upright
 from models.systems.handling.scene import HandlingScene
 from models.systems.handling.towed_springs import divided, numbers_beside
-from models.tyre.bristles import SLOW
-from models.vehicles.free_vehicle import SWAY, chassis_of, spinning
-from models.vehicles.spatial import Freedom, JointElement, hitch_of
+from models.vehicles.free_vehicle import chassis_of
+from models.vehicles.spatial import JointElement
 from models.vehicles.spatial_linear import mass
 
 if TYPE_CHECKING:
@@ -34,11 +34,6 @@ if TYPE_CHECKING:
 
 REFERENCE = "reference"
 """The independent reference: plain equations that share no force with the engines; half a minute for every second."""
-LIMIT = 2.78
-"""Step times rate up to which the classical Runge-Kutta method damps what is damped."""
-UPRIGHT, FOLDED = 0.5, 1.57
-"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane; and
-yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
 ORDER, NET_ORDER = 3.0, 2.0
 """Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
 UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
@@ -327,14 +322,14 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
         yield
     except RunFailed as error:
         if error.state is not None:
-            _check_upright(handling, np.array([error.time]), error.state[None], engine)
+            check_upright(handling, np.array([error.time]), error.state[None], engine)
         raise
 
 
 def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
     """``reported``, of a run in fixed steps; RunFailed where they cannot follow."""
     drive = reported(handling, run, engine, seconds)
-    _check_step(drive, engine)
+    check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return drive
 
@@ -344,7 +339,7 @@ def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
     report, ledger = _reports(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
-    _check_upright(handling, run.times, run.positions, engine)
+    check_upright(handling, run.times, run.positions, engine)
     return Drive(handling, run, report, ledger, seconds)
 
 
@@ -368,46 +363,3 @@ def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) 
     places = handling.vehicle.coordinates()
     columns = [places.index(place) for place in element.coordinates]
     return np.asarray(values[..., columns] @ np.array(element.factors))
-
-
-def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
-    """Refuse a run whose car turns over, or whose train jackknifes: what follows is no motion of theirs."""
-    for body, freedoms, most, what in _bounds(h):
-        columns = [
-            i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
-        ]
-        over = (np.abs(positions[:, columns]) > most).any(axis=1)
-        if over.any():
-            raise RunFailed(engine, f"{what}; drive more slowly or steer less", float(times[np.argmax(over)]))
-
-
-def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
-    """Turns of a body that have a largest angle (rad), and what it means to go beyond."""
-    yield SWAY, ("rx", "ry"), UPRIGHT, f"the car turns over: it leans by more than {UPRIGHT} rad"
-    for name in h.vehicle.towed:
-        beside = f"by more than {{}} rad beside what tows it: {name!r}"
-        yield hitch_of(name), ("rx", "ry"), UPRIGHT, f"a trailer turns over: it leans {beside.format(UPRIGHT)}"
-        yield hitch_of(name), ("rz",), FOLDED, f"the train jackknifes: a trailer turns {beside.format(FOLDED)}"
-
-
-def _check_step(drive: Drive, engine: str) -> None:
-    """Bristles that hold damp a wheel at C / u, u the speed of the tread: refuse a step that lets it swing up."""
-    h, times = drive.handling, drive.run.times
-    step, force = float(times[1] - times[0]), np.hypot(drive["fx"], drive["fy"])
-    for i, tyre in enumerate(h.vehicle.tyres):
-        n, load, tread = h.tyre_numbers(i), drive["load"][:, i], drive["tread"][:, i]
-        stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
-        lightness = 1.0 / h.vehicle.body(tyre.body).mass
-        if n[at.ROTOR] >= 0.0:
-            lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
-        holds = force[:, i] < 0.95 * n[at.GRIP] * load
-        damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
-        if step * damped.max() > LIMIT:
-            row = int(np.argmax(step * damped > LIMIT))
-            raise RunFailed(
-                engine,
-                f"tyre {tyre.name!r}, at {tread[row]:.3g} m/s, damps its wheel faster than "
-                f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
-                "or end the run before",
-                float(times[row]),
-            )

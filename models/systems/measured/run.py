@@ -28,7 +28,7 @@ from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
 from models.measured.checks.weight import moments
 from models.measured.recording import Progress, Recording, no_progress
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record
@@ -36,10 +36,11 @@ from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
+from models.systems.measured.holds import FREE, NOISE, holds_of
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import mapped, opened
-from models.systems.measured.scene import Deviations, MeasuredScene, Rig
+from models.systems.measured.scene import MeasuredScene, Rig
 from models.systems.measured.section_run import Hold, Outcome, SectionRun
 from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
@@ -52,9 +53,6 @@ from models.vehicles.cut_vehicle import CutVehicle
 
 WORK = "work"
 """Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
-FREE = "free"
-NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
-"""Keys of the scene's table ``noise``, and the quantities that they are of."""
 
 
 @dataclass
@@ -233,28 +231,6 @@ def read(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -
     """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
     sources, rig = opened(scene), scene.rig()
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
-
-
-def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
-    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
-    stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
-    held = {
-        stabilised.method: Hold(
-            stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
-        )
-    }
-    return {FREE: Hold("none", **deviations)} | ({} if stabilised.method == "none" else held)
-
-
-def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
-    """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
-    deviations = dict[str, float]()
-    for key, quantity in NOISE.items():
-        sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
-        known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
-        least = float(getattr(Hold, key))
-        deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
-    return deviations
 
 
 def _lap(exam: Examination, stage: str, begun: float) -> None:

@@ -1,0 +1,65 @@
+"""Limits of a manoeuvre: car and trailers stay upright, a train does not fold, steps follow what damps the wheels."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.multibody import forces as at
+from models.multibody.numbers import Handling
+from models.tyre.bristles import SLOW
+from models.vehicles.free_vehicle import SWAY, spinning
+from models.vehicles.spatial import Freedom, hitch_of
+
+if TYPE_CHECKING:
+    from models.systems.handling.run import Drive
+
+LIMIT = 2.78
+"""Step times rate up to which the classical Runge-Kutta method damps what is damped."""
+UPRIGHT, FOLDED = 0.5, 1.57
+"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane; and
+yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
+
+
+def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
+    """Refuse a run whose car turns over, or whose train jackknifes: what follows is no motion of theirs."""
+    for body, freedoms, most, what in _bounds(h):
+        columns = [
+            i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
+        ]
+        over = (np.abs(positions[:, columns]) > most).any(axis=1)
+        if over.any():
+            raise RunFailed(engine, f"{what}; drive more slowly or steer less", float(times[np.argmax(over)]))
+
+
+def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
+    """Turns of a body that have a largest angle (rad), and what it means to go beyond."""
+    yield SWAY, ("rx", "ry"), UPRIGHT, f"the car turns over: it leans by more than {UPRIGHT} rad"
+    for name in h.vehicle.towed:
+        beside = f"by more than {{}} rad beside what tows it: {name!r}"
+        yield hitch_of(name), ("rx", "ry"), UPRIGHT, f"a trailer turns over: it leans {beside.format(UPRIGHT)}"
+        yield hitch_of(name), ("rz",), FOLDED, f"the train jackknifes: a trailer turns {beside.format(FOLDED)}"
+
+
+def check_step(drive: "Drive", engine: str) -> None:
+    """Bristles that hold damp a wheel at C / u, u the speed of the tread: refuse a step that lets it swing up."""
+    h, times = drive.handling, drive.run.times
+    step, force = float(times[1] - times[0]), np.hypot(drive["fx"], drive["fy"])
+    for i, tyre in enumerate(h.vehicle.tyres):
+        n, load, tread = h.tyre_numbers(i), drive["load"][:, i], drive["tread"][:, i]
+        stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
+        lightness = 1.0 / h.vehicle.body(tyre.body).mass
+        if n[at.ROTOR] >= 0.0:
+            lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
+        holds = force[:, i] < 0.95 * n[at.GRIP] * load
+        damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
+        if step * damped.max() > LIMIT:
+            row = int(np.argmax(step * damped > LIMIT))
+            raise RunFailed(
+                engine,
+                f"tyre {tyre.name!r}, at {tread[row]:.3g} m/s, damps its wheel faster than "
+                f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
+                "or end the run before",
+                float(times[row]),
+            )

@@ -1,0 +1,36 @@
+"""How the runs of a recording are held: free, and by the stabiliser of its scene, which weighs noise as it is."""
+
+import numpy as np
+
+from models.measured.checks.spectra import noise
+from models.measured.recording import Recording
+from models.measured.signal import Quantity
+from models.systems.measured.scene import Deviations, MeasuredScene
+from models.systems.measured.section_run import Hold
+
+FREE = "free"
+"""Name of the run without a stabiliser."""
+NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
+"""Keys of the scene's table ``noise``, and the quantities that they are of."""
+
+
+def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
+    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
+    stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
+    held = {
+        stabilised.method: Hold(
+            stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
+        )
+    }
+    return {FREE: Hold("none", **deviations)} | ({} if stabilised.method == "none" else held)
+
+
+def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
+    """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
+    deviations = dict[str, float]()
+    for key, quantity in NOISE.items():
+        sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
+        known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
+        least = float(getattr(Hold, key))
+        deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
+    return deviations
