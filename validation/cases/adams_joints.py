@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import joint_tree
@@ -37,6 +38,8 @@ LOSES = 1e-4
 """Share of the largest kinetic energy that a file's own motion may lose without friction."""
 WINDOW = 10
 """Rows of a file, a tenth of a second, after which a march from its own state is compared."""
+SAME = {"Spherical": 0.0, "Universal": 90.0}
+"""Families whose file is of the pendulum of Revolute's, and by how many degrees about z it is turned from that."""
 READ_OFF = 1.0
 """s of a file from which a spring's constants are read off, where the model file describes another case."""
 
@@ -55,6 +58,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         output = read_output(model.with_name(f"{family}_Case01.csv.gz"))
         mechanism, notes = _fitting(read_mechanism(model), output)
         rows += [*notes_rows(family, notes), *family_rows(family, mechanism, output, quick)]
+        if family in SAME:
+            rows += _same_pendulum(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
             "digits": output.digits,
@@ -196,6 +201,35 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
     return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE, why, "published")
+
+
+def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolute: Path) -> list[Row]:
+    """The joint beside the other code's file of the same pendulum on a hinge, whose motion keeps its energy.
+
+    A body that starts at rest on a ball or a cross swings in a plane, with the mass, the arm and the moment of inertia of
+    the Revolute case: the other code's files of one motion must agree with one another, too.
+    """
+    other = read_output(revolute)
+    turn = Rotation.from_euler("z", SAME[family], degrees=True)
+    places, forces = turn.apply(other.columns["Pos"]), turn.apply(other.columns["Rforce"])
+    motion, reaction = ConstrainedBody(mechanism).run(float(output.times[-1]), STEP, EVERY)
+    weight = _largest(mechanism, Reaction(forces, 0.0 * forces))[0]
+    ours = float((np.abs(motion.place - places) - other.rounding("Pos")).max())
+    pushed = float((np.abs(reaction.force - forces) - other.rounding("Rforce")).max()) / weight
+    theirs = np.abs(output.columns["Pos"] - places).max(axis=1)
+    apart = theirs > PLACE
+    since = f"; apart by more than {PLACE:g} m from {output.times[np.argmax(apart)]:.2f} s on" if apart.any() else ""
+    why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
+    said = f"{family}: position of the centre beside the Revolute file, which is of the same pendulum, reference"
+    push = f"{family}: force of the joint by the largest, beside the Revolute file, reference"
+    files = f"{family}: the other code's two files of one pendulum differ in position by{since}"
+    return [
+        Observed(_id(family, "hinge"), SYSTEM, said, max(0.0, ours), "m").at_most(PLACE, why, "published"),
+        Observed(_id(family, "hinge_force"), SYSTEM, push, max(0.0, pushed), "").at_most(FORCE, why, "published"),
+        Observed(_id(family, "files"), SYSTEM, files, float(theirs.max()), "m").beside(
+            PLACE, "one motion: what is left is the error of the file that loses energy", "published"
+        ),
+    ]
 
 
 def _twin(
