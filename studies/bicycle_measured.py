@@ -13,10 +13,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from models.bicycle.suspects import NEUTRAL, UNITS, Choice, chosen, deviations, forecast, predicted
+from models.bicycle.suspects import SUSPECTS, UNITS, chosen, deviations, forecast, predicted
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import InputError
+from models.identification.subsets import Choice
 
 FEEDBACK = Control(gain=2.0, until=6.5)
 """Of the experimenters during these runs."""
@@ -71,14 +72,14 @@ def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[
     for name, value, error in zip(best.names, best.values, errors, strict=True):
         told.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNITS.get(name, '')}")
     told += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
-    for name in NEUTRAL:
+    for name in SUSPECTS:
         calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
         why = "no measured number depends on it" if name in choice.blind else calls
         told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
     for name, (ratio, chance) in choice.calls.items():
-        if name not in NEUTRAL:
+        if name not in SUSPECTS:
             told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
-    for one, other, correlation in correlated_suspects(choice):
+    for one, other, correlation in choice.hard_to_tell_apart():
         told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
     told += ["", "predicted without their own speed, in standard deviations:"]
     for speed, (mean, gap) in answer.predictions.items():
@@ -88,20 +89,6 @@ def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[
             f"({gap[1]:+.2f}): {verdict}"
         )
     return told
-
-
-def correlated_suspects(choice: Choice, bound: float = 0.9) -> list[tuple[str, str, float]]:
-    """Pairs of suspects whose estimates in the fullest subset correlate by more than a bound."""
-    fullest = max(choice.fits, key=lambda fit: len(fit.names))
-    size = np.sqrt(np.diag(fullest.covariance))
-    correlation = fullest.covariance / np.outer(size, size)
-    names = fullest.names
-    return [
-        (names[i], names[j], float(correlation[i, j]))
-        for i in range(len(names))
-        for j in range(i)
-        if abs(correlation[i, j]) > bound
-    ]
 
 
 def main(

@@ -13,7 +13,9 @@ from models.core.errors import InputError, Refused
 from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import BodyMotion, joint_tree
 from validation.adams_joints.mechanism import read_mechanism
+from validation.adams_joints.output_file import OutputFile
 from validation.adams_joints.twin_model import as_mjcf, examined
+from validation.cases import adams_joints
 
 HEAD = """ADAMS/View model name: own
 UNITS/
@@ -224,3 +226,29 @@ def test_joints_in_mjcf_move_as_the_constraints_do(model, tmp_path, name):
 def test_a_rod_without_mass_is_no_mjcf(model):
     with pytest.raises(Refused, match="no mass"):
         as_mjcf(model("distance"))
+
+
+def test_a_ball_swings_as_a_hinge_does_and_a_fault_is_seen(model, monkeypatch, tmp_path):
+    hinge, ball = (_level_pendulum(model(name)) for name in ("revolute", "spherical"))
+    file = _file_of(hinge)
+    monkeypatch.setattr(adams_joints, "read_output", lambda path: file)
+    for mechanism, status in (ball, "passed"), (replace(ball, inertia=1.01 * ball.inertia), "failed"):
+        place, force, files = adams_joints._same_pendulum("Spherical", mechanism, file, tmp_path)
+        assert (place.status, force.status, files.value) == (status, status, 0.0)
+
+
+def _level_pendulum(mechanism):
+    """2 m long and at rest, level: it swings in a plane on a ball as on a hinge about y."""
+    place, axes = np.array([2.0, 0.0, 0.0]), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    ground, body = (replace(each, place=np.zeros(3), axes=axes.T) for each in (mechanism.ground, mechanism.body))
+    still = {"velocity": np.zeros(3), "turning": np.zeros(3), "gravity": np.array([0.0, 0.0, -9.80665])}
+    inertia = np.diag([0.04, 0.1, 0.1])
+    return replace(
+        mechanism, mass=1.0, centre=place, inertia=inertia, axes=np.eye(3), ground=ground, body=body, **still
+    )
+
+
+def _file_of(mechanism):
+    """Half a second of its motion, as a file of twelve digits."""
+    motion, reaction = ConstrainedBody(mechanism).run(0.5, 5e-3, 2)
+    return OutputFile(motion.times, {"Pos": motion.place, "Rforce": reaction.force}, 12)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from models.bicycle.rolling_tyres import FRONT, RADIUS, TYRES, BicycleTyre, RollingBicycle
+from models.bicycle.four_bodies import FRONT
+from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
 from models.bicycle.whipple import Control, load_bicycle
 from models.core.errors import InputError, RunFailed
+from models.multibody.forces import OF_TYRES, RADIUS
 from models.systems.bicycle.plan import check
 from models.systems.bicycle.run import engine_eigenvalues, run
 from models.systems.bicycle.scene import build
@@ -20,7 +22,7 @@ def test_stiff_tyres_tend_to_ideal_rolling_with_order_one(engine):
     wanted = BENCHMARK.eigenvalues(5.0, Control(friction=0.1))
     gaps = [np.abs(engine_eigenvalues(engine, rolling, 5.0) - wanted).max() for rolling in stiff]
     assert np.log(gaps[0] / gaps[1]) / np.log(4.0) == pytest.approx(1.0, abs=0.02)
-    stiff[1].numbers[TYRES + RADIUS] *= 1.01  # a planted fault: the rear wheel
+    stiff[1].numbers[int(stiff[1].numbers[OF_TYRES]) + RADIUS] *= 1.01  # a planted fault: the rear wheel
     assert np.abs(engine_eigenvalues(engine, stiff[1], 5.0) - wanted).max() > 1.2 * gaps[1]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from models.bicycle.suspects import NEUTRAL, chosen, deviations
+from models.bicycle.suspects import chosen, deviations
 from models.bicycle.weave import decaying_sinusoid, observations
 from models.bicycle.whipple import Control, load_bicycle
 from models.core.errors import InputError
@@ -103,4 +103,3 @@ def test_a_folder_without_windows_and_an_unknown_speed_are_refused(folder, tmp_p
         measured(folder, (9.0,))
     with pytest.raises(InputError, match="no such suspect"):
         chosen(BICYCLE, Control(), observations(folder), ("fricton",))
-    assert "friction" in NEUTRAL

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from models.own_model.certificate import ALIKE
 from validation.adams_joints.constrained import ConstrainedBody
@@ -39,6 +40,8 @@ LOSES = 1e-4
 """Share of the largest kinetic energy that a file's own motion may lose without friction."""
 WINDOW = 10
 """Rows of a file, a tenth of a second, after which a march from its own state is compared."""
+SAME = {"Spherical": 0.0, "Universal": 90.0}
+"""Families whose file is of the pendulum of Revolute's, and by how many degrees about z it is turned from that."""
 READ_OFF = 1.0
 """s of a file from which a spring's constants are read off, where the model file describes another case."""
 
@@ -59,6 +62,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [*notes_rows(family, notes), *family_rows(family, mechanism, output, quick)]
         if mechanism.kind != "distance":
             rows += own_model_rows(family, mechanism, folder, 1.0 if quick else DURATION)
+        if family in SAME:
+            rows += _same_pendulum(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
             "digits": output.digits,
@@ -219,6 +224,41 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
     return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE, why, "published")
+
+
+def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolute: Path) -> list[Row]:
+    """The joint beside the other code's file of the same pendulum on a hinge, whose motion keeps its energy.
+
+    A body that starts at rest on a ball or a cross swings in a plane. Mass, arm and moment of inertia are those of the
+    Revolute case: the other code's files of one motion must agree with one another, too.
+    """
+    hinge, back = read_output(revolute), Rotation.from_euler("z", -SAME[family], degrees=True)
+    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, EVERY)
+    place, force = hinge.columns["Pos"], hinge.columns["Rforce"]
+    off = float((np.abs(back.apply(motion.place) - place) - hinge.rounding("Pos")).max())
+    pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding("Rforce")).max())
+    files = np.abs(back.apply(output.columns["Pos"]) - place).max(axis=1)
+    since = output.times[np.argmax(files > PLACE)]
+    why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
+    hinged = f"{family}: %s beside the other code's file of the same pendulum on a hinge, reference"
+    both = (
+        f"{family}: largest distance of the other code's files of one pendulum, above {PLACE:g} m from {since:.2f} s on"
+    )
+    return [
+        Observed(_id(family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
+            PLACE, why, "published"
+        ),
+        Observed(
+            _id(family, "hinge_force"),
+            SYSTEM,
+            hinged % "force by the largest",
+            max(0.0, pushed) / float(np.abs(force).max()),
+            "",
+        ).at_most(FORCE, why, "published"),
+        Observed(_id(family, "files"), SYSTEM, both, float(files.max()), "m").beside(
+            PLACE, "one motion: what is left is the error of the file that loses energy", "published"
+        ),
+    ]
 
 
 def _twin(

@@ -8,10 +8,11 @@ import numpy as np
 
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
-from models.bicycle.suspects import Choice, chosen, deviations, predicted
+from models.bicycle.suspects import chosen, deviations, predicted
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import RunFailed
+from models.identification.subsets import Choice
 from models.systems.bicycle.run import engine_eigenvalues, run
 from models.systems.bicycle.scene import build
 from validation.common.bicycle_published import CAPSIZE_SPEED, MATRICES, PUBLISHED, WEAVE_SPEED

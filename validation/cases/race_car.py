@@ -11,7 +11,7 @@ from models.identification.bands import bands, error_model
 from models.identification.fit import fit
 from models.identification.held_out import Identified, Search, identified
 from models.identification.of_scene import problem_of
-from models.identification.problem import Problem
+from models.identification.problem import Clock, Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
 from models.measured.drive import read_drive
 from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
@@ -47,7 +47,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if data is None or not (data / FILE).is_file():
         return [*rows, *_not_run(f"needs {FILE} in the folder that TWINRIG_DATA names")], {}
     chosen = _race(data / FILE, folder)
-    return [*rows, *_race_rows(chosen)], _saved(chosen)
+    return [*rows, *_race_rows(chosen), _sensors_row(folder / "race.csv")], _saved(chosen)
 
 
 def _car(folder: Path, values: dict[str, float]) -> SingleTrackScene:
@@ -153,6 +153,29 @@ def _race_rows(chosen: Identified) -> list[Row]:
             ).at_most(WIDEST, "asked for: bands that are not merely wide", "measured"),
         ]
     return rows
+
+
+def _sensors_row(path: Path) -> Row:
+    """Measured lateral acceleration beside what measured speed, yaw rate and side slip say of it, no model in between.
+
+    A sensor that rolls with the body reads g sin(roll) beside, a share of the lateral acceleration; one that lies
+    elsewhere or is late differs as the motion changes.
+    """
+    times, _, speed, turning, sensed, slip = np.genfromtxt(path, delimiter=",", skip_header=1).T[:6]
+    times, speed, turning, sensed, slip = (
+        row[: round(SHARE * len(times))] for row in (times, speed, turning, sensed, slip)
+    )
+    clock = Clock(times, 5.0)
+    moved = clock.filtered(np.gradient(speed * np.tan(slip), clock.period) + speed * turning)
+    felt = clock.filtered(sensed)
+    slope, offset = np.polyfit(moved, felt, 1)
+    error = float(np.sqrt(np.mean((felt - moved) ** 2) / np.mean(felt**2)))
+    said = (
+        "lateral acceleration of the first stretch beside that of measured speed, yaw rate and side slip: error by its "
+        f"rms; slope {slope:.3f}, offset {offset:.2f} m/s^2"
+    )
+    why = "no model takes part: what sensors leave of the error of a prediction"
+    return Observed("race_car.sensors", SYSTEM, said, error, "").beside(0.0, why, "measured")
 
 
 def _not_run(reason: str) -> list[Row]:

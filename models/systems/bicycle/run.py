@@ -1,30 +1,27 @@
 """A bicycle in an engine or with ideal rolling: motion, tyre forces, energy ledger; and its linearised motion."""
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
-from models.bicycle import rolling_tyres as rt
-from models.bicycle.ideal_rolling import FALLEN, IdealBicycle
+from models.bicycle.four_bodies import FALLEN, LEAN, STEER, YAW, Ride, Y, straight
+from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
-from models.bicycle.whipple import Whipple
 from models.core.assumptions import Assumption, with_assumptions
 from models.core.discretisation import Series, by_steps, not_estimated, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import FreeModel, free_model
+from models.multibody.forces import DISSIPATED, FX, FY, POTENTIAL, PRESS, STEER_POWER
 from models.systems.bicycle.scene import BicycleScene
 
 REFERENCE = "reference"
 COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
 COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
-"""Channels in the order of ``models.bicycle.rolling_tyres``; each with its rate, whose name ends in _rate."""
-TO_IDEAL = [rt.X, rt.Y, rt.YAW, rt.HEIGHT, rt.LEAN, rt.PITCH, rt.STEER, rt.REAR, rt.FRONT]
-"""Coordinates of engines in the order of ``models.bicycle.ideal_rolling``, which is the way back, too."""
-LATERAL = [rt.Y, rt.YAW, rt.LEAN, rt.STEER]
+"""Channels in the order of ``models.bicycle.four_bodies``; each with its rate, whose name ends in _rate."""
+LATERAL = [Y, YAW, LEAN, STEER]
 MOVED = 1e-7
 """m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
 SHOWN = ("lean", "steer", "yaw")
@@ -37,26 +34,6 @@ LARGEST_LEAN = 1.0
 """rad: beyond, the frame or the pedals touch the ground."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ride:
-    """Times (n,), positions and rates (n, 9) in the order of engines, energy (n,) and work (n,) of tyres and control
-    since the start (J), reports (n, 2, REPORTED) of the tyres; none of the tyres where wheels roll ideally.
-
-    Rows lie ROWS_APART or less apart, whatever the steps; the work is that of all steps."""
-
-    times: np.ndarray
-    positions: np.ndarray
-    rates: np.ndarray
-    energy: np.ndarray
-    work: np.ndarray
-    steps: int
-    tyres: np.ndarray | None = None
-
-    def unaccounted(self) -> float:
-        """Largest energy that neither tyres nor control account for, by the energy at the start."""
-        return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
-
-
 def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     """The scene's run in "exudyn", "mujoco" or "reference"; its detail is the ``Ride``. Raises RunFailed.
 
@@ -65,17 +42,16 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     begun = time.process_time()
     ride = ideal(scene) if engine == REFERENCE else ridden(scene, engine, scene.run.step)
     seconds = time.process_time() - begun
-    channels = {name: Channel("time", ride.positions[:, i], unit) for i, (name, unit) in enumerate(COORDINATES.items())}
-    channels |= {
-        f"{name}_rate": Channel("time", ride.rates[:, i], f"{unit}/s")
-        for i, (name, unit) in enumerate(COORDINATES.items())
-    }
-    encoder = scene.control.encoder_gain * ride.positions[:, rt.STEER]
-    channels |= {"encoder": Channel("time", encoder, "rad", "steer angle as the encoder tells it")}
+    channels = dict[str, Channel]()
+    for i, (name, unit) in enumerate(COORDINATES.items()):
+        channels[name] = Channel("time", ride.positions[:, i], unit)
+        channels[f"{name}_rate"] = Channel("time", ride.rates[:, i], f"{unit}/s")
+    encoder = scene.control.encoder_gain * ride.positions[:, STEER]
+    channels["encoder"] = Channel("time", encoder, "rad", "steer angle as the encoder tells it")
     channels |= {"energy": Channel("time", ride.energy, "J"), "work": Channel("time", ride.work, "J")}
     axes = {"time": Channel("time", ride.times, "s")}
     if ride.tyres is not None:
-        for name, column in (("load", rt.NORMAL), ("fx", rt.FX), ("fy", rt.FY)):
+        for name, column in (("load", PRESS), ("fx", FX), ("fy", FY)):
             channels[name] = Channel(("time", "wheel"), ride.tyres[:, :, column], "N")
         axes["wheel"] = Channel("wheel", ["rear", "front"])
     counts = {"steps": ride.steps}
@@ -104,34 +80,24 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
 
 
 def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
-    """The run on tyres in an engine by steps (s)."""
+    """The run on tyres in an engine by steps (s); rows lie ROWS_APART or less apart, the work is that of all steps."""
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
-    path = model.run(*rolling.straight(run.speed, run.lean_rate))
-    fallen = np.abs(path.positions[:, rt.LEAN]) > FALLEN
+    path = model.run(*straight(rolling.bicycle, run.speed, run.lean_rate))
+    fallen = np.abs(path.positions[:, LEAN]) > FALLEN
     if fallen.any():
         raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
-    tyres, ledger = rolling.report(path.times, path.positions, path.rates)
-    work = cumulative_simpson(ledger[:, rt.DISSIPATED] + ledger[:, rt.STEER_POWER], x=path.times, initial=0.0)
+    tyres, ledger = rolling.report(path.positions, path.rates)
+    work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
     steps, most = len(path.times) - 1, max(1, int(ROWS_APART / step * (1.0 + 1e-9)))
     kept = slice(None, None, next(every for every in range(most, 0, -1) if steps % every == 0))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept], path.rates[kept]
-    motion = [
-        plain.energy(_to_ideal(q_row, rolling.bicycle), v_row[TO_IDEAL]) for q_row, v_row in zip(q, v, strict=True)
-    ]
-    ride = Ride(path.times[kept], q, v, motion + ledger[kept, rt.POTENTIAL], work[kept], steps, tyres[kept])
+    motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
+    ride = Ride(path.times[kept], q, v, motion + ledger[kept, POTENTIAL], work[kept], steps, tyres[kept])
     if not ride.unaccounted() < OPEN:
         why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
         raise RunFailed(engine, why, float(path.times[-1]))
     return ride
-
-
-def _to_ideal(q: np.ndarray, bicycle: Whipple) -> np.ndarray:
-    """Positions (9,) of an engine in the order of the reference, whose pitch and height begin elsewhere."""
-    positions = q[TO_IDEAL]
-    positions[3] += bicycle.rear_wheel.radius
-    positions[5] += bicycle.tilt
-    return positions
 
 
 def ideal(scene: BicycleScene) -> Ride:
@@ -139,14 +105,7 @@ def ideal(scene: BicycleScene) -> Ride:
     rolling, run = scene.rolling(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
     rows = max(3, round(run.duration / ROWS_APART) + 1)
-    motion = bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
-    back = np.argsort(TO_IDEAL)
-    positions, rates = motion.positions[:, back], motion.rates[:, back]
-    positions[:, rt.HEIGHT] -= rolling.bicycle.rear_wheel.radius
-    positions[:, rt.PITCH] -= rolling.bicycle.tilt
-    power = np.array([bicycle.applied(v) @ v for v in motion.rates])
-    work = cumulative_simpson(power, x=motion.times, initial=0.0)
-    return Ride(motion.times, positions, rates, motion.energy, work, motion.steps)
+    return bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
 
 
 def _told(run: Result, scene: BicycleScene) -> Result:
@@ -167,7 +126,7 @@ def _told(run: Result, scene: BicycleScene) -> Result:
 
 def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
     """(8, 8): rates of lateral place, yaw, lean, steer and of their rates about straight rolling at a speed (m/s)."""
-    q, v = rolling.straight(speed)
+    q, v = straight(rolling.bicycle, speed)
     matrix = np.eye(8, 8, 4)
     for j in range(8):
         ends = []

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
+from models.bicycle.rolling_tyres import USUAL, BicycleTyre, RollingBicycle
 from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
 from models.core.errors import InputError
 from models.core.scene_effects import extended, with_own
@@ -23,18 +23,6 @@ class BicycleTable(Strict):
     """[bicycle]: a parameter set or the user's own file."""
 
     parameters: str = Field(default="benchmark", description="a parameter set, or a TOML file with every parameter")
-
-
-class TyreTable(Strict):
-    """[tyres]: both wheels; the reference rolls ideally, as tyres do in the limit of stiffness."""
-
-    cornering: float = quantity("1/rad", "side force by slip angle and load", default=20.0)
-    vertical: float = quantity("N/m", "vertical stiffness", default=2e5)
-    damping: float = quantity("N s/m", "vertical damping", default=200.0, zero=True)
-    half_width: float = quantity("m", "half the width of the patch", default=5e-3)
-    friction: float = quantity("-", "coefficient of friction", default=1.0)
-    cells: int = Field(default=9, ge=3, le=200, description="of the patch's net per strip")
-    stiffness: float = quantity("-", "how many times as stiff: s C, s^2 k, half width by s", default=1.0)
 
 
 class RunTable(Strict):
@@ -60,7 +48,7 @@ class BicycleScene(SceneFile):
     system: Literal["bicycle"] = "bicycle"
     study: str = Field(default="bicycle", description="the study that runs the scene")
     bicycle: BicycleTable = BicycleTable()
-    tyres: TyreTable = TyreTable()
+    tyres: BicycleTyre = USUAL
     control: Control = Control()
     speeds: SpeedsTable = SpeedsTable()
     run: RunTable = RunTable()
@@ -73,7 +61,7 @@ class BicycleScene(SceneFile):
 
     def rolling(self) -> RollingBicycle:
         """The bicycle on its tyres with the scene's control and effects."""
-        return extended(RollingBicycle(self.whipple, BicycleTyre(**self.tyres.model_dump()), self.control), self)
+        return extended(RollingBicycle(self.whipple, self.tyres, self.control), self)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BicycleScene:

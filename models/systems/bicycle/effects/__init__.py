@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from models.bicycle.suspects import NEUTRAL
 from models.core.scene_effects import Entry, Table
 
 
@@ -25,8 +24,8 @@ def _of_control(key: str, neutral: float, usual: float, says: str, **more: Any) 
 SENSED = {"needs": ("feedback",), "why": "whose command or sensor it changes"}
 TABLE = {
     "feedback": _of_control("gain", 0.0, 2.0, "Steer torque by the lean rate, less the faster the bicycle is"),
-    "steering_friction": _of_control("friction", NEUTRAL["friction"], 0.15, "Viscous friction of the steering"),
-    "dry_friction": _of_control("dry_friction", NEUTRAL["dry_friction"], 0.16, "Dry friction of the steering"),
+    "steering_friction": _of_control("friction", 0.0, 0.15, "Viscous friction of the steering"),
+    "dry_friction": _of_control("dry_friction", 0.0, 0.16, "Dry friction of the steering"),
     "torque_gain": _of_control("torque_gain", 1.0, 0.9, "A motor that gives less than its command", **SENSED),
     "encoder_gain": _of_control("encoder_gain", 1.0, 0.8, "An encoder that tells less than the steer angle"),
     "speed_gain": _of_control("speed_gain", 1.0, 1.066, "A speed sensor of another slope", **SENSED),

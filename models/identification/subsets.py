@@ -1,0 +1,180 @@
+"""Which parameters a measurement calls for: every subset fitted, judged by an information criterion.
+
+The deviations that a fit makes small are whitened: standard normal where the model is right. The criterion is that of
+quasi-likelihood (Burnham and Anderson, Model selection, 2002, ch. 2.5): the sum of squares by the inflation that the
+fullest subset leaves, c = chi^2 / degrees of freedom, at least 1.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import f as f_distribution
+
+BLIND = 1e-6
+"""Share of the largest singular value of a fit's sensitivities below which a combination is not determined."""
+STEP, LEAST = 1e-4, 0.1
+"""Of differences, by a value, which counts as LEAST at least."""
+ALIKE = 0.9
+"""Correlation of two estimates from which on they are hard to tell apart."""
+
+Deviations = Callable[[dict[str, float]], np.ndarray]
+"""Values of some parameters by name, all others absent -> whitened deviations (n,)."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A parameter that may be called for: where its fit starts, its lowest value, the scale of steps."""
+
+    start: float
+    lowest: float = -np.inf
+    scale: float = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Subset:
+    """Parameters (k,) of a subset with their values and covariance (k, k), chi^2 and how many numbers were fitted.
+
+    undetermined : of those that the data do not tell: names of parameters that no number depends on, or sums of them.
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+    chi2: float
+    count: int
+    undetermined: tuple[str, ...]
+
+    @property
+    def named(self) -> dict[str, float]:
+        """Values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    @property
+    def rank(self) -> int:
+        """How many parameters the data determine."""
+        return len(self.names) - len(self.undetermined)
+
+    @property
+    def freedoms(self) -> int:
+        """Numbers less parameters that they determine."""
+        return self.count - self.rank
+
+    def criterion(self, inflation: float) -> float:
+        """Quasi-likelihood information criterion with the correction for few numbers."""
+        k = self.rank + 1
+        return self.chi2 / inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.count - k - 1, 1)
+
+    def spread(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """What ``predict`` says (m,) by these values, and its variances (m,) by their covariance."""
+        here = predict(self.named)
+        slopes = np.zeros((len(here), len(self.names)))
+        for i, (name, value) in enumerate(self.named.items()):
+            step = STEP * max(abs(value), LEAST)
+            slopes[:, i] = (predict(self.named | {name: value + step}) - here) / step
+        return here, np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """All subsets by rising criterion, their weights (probabilities among them), the inflation c of chi^2.
+
+    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart; blind : parameters
+    on which no measured number depends.
+    """
+
+    fits: list[Subset]
+    criteria: np.ndarray
+    weights: np.ndarray
+    inflation: float
+    calls: dict[str, tuple[float, float]]
+    blind: tuple[str, ...]
+
+    @property
+    def best(self) -> Subset:
+        """The subset of the least criterion."""
+        return self.fits[0]
+
+    def importance(self, name: str) -> float:
+        """Summed weight of all subsets that have the parameter."""
+        return float(sum(w for fit, w in zip(self.fits, self.weights, strict=True) if name in fit.names))
+
+    def forecast(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """What all subsets predict (m,) by their weights, and its standard deviations (m,).
+
+        The variance is that within the subsets and that among them (Burnham and Anderson, ch. 4.3).
+        """
+        means, variances = map(np.array, zip(*(fit.spread(predict) for fit in self.fits), strict=True))
+        mean = self.weights @ means
+        return mean, np.sqrt(self.weights @ (self.inflation * variances + (means - mean) ** 2))
+
+    def hard_to_tell_apart(self) -> list[tuple[str, str, float]]:
+        """Pairs of parameters whose estimates in the fullest subset are ALIKE, and their correlation."""
+        fullest = max(self.fits, key=lambda fit: len(fit.names))
+        size = np.sqrt(np.diag(fullest.covariance))
+        pairs = combinations(range(len(size)), 2)
+        each = [(i, j, float(fullest.covariance[i, j] / (size[i] * size[j]))) for j, i in pairs]
+        return [(fullest.names[i], fullest.names[j], c) for i, j, c in sorted(each) if abs(c) > ALIKE]
+
+
+def fitted(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
+    """All candidates fitted."""
+    names = tuple(candidates)
+    if not names:
+        left = deviations({})
+        return Subset((), np.empty(0), np.empty((0, 0)), float(np.sum(left**2)), len(left), ())
+    start, lower, scale = (np.array([getattr(c, k) for c in candidates.values()]) for k in ("start", "lowest", "scale"))
+    fit = least_squares(
+        lambda values: deviations(dict(zip(names, values.tolist(), strict=True))),
+        start,
+        bounds=(lower, np.inf),
+        x_scale=scale,
+        diff_step=1e-5,
+        method="dogbox",
+    )
+    _, sizes, rows = np.linalg.svd(fit.jac * scale)
+    told = sizes > BLIND * max(sizes.max(initial=0.0), 1e-300)
+    covariance = (rows[: len(sizes)][told].T / sizes[told] ** 2) @ rows[: len(sizes)][told] * np.outer(scale, scale)
+    undetermined = tuple(_combination(names, row) for row in rows[np.count_nonzero(told) :])
+    return Subset(names, fit.x, covariance, float(np.sum(fit.fun**2)), len(fit.fun), undetermined)
+
+
+def chosen(
+    deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
+) -> Choice:
+    """Every subset of the candidates fitted and judged; together : sets by name that are left out as a whole, too."""
+    everything = fitted(deviations, candidates)
+    blind = tuple(name for name in candidates if name in everything.undetermined)
+    told = [name for name in candidates if name not in blind]
+    subsets = [names for size in range(len(told) + 1) for names in combinations(told, size)]
+    fits = [fitted(deviations, {name: candidates[name] for name in names}) for names in subsets]
+    determined = [fit for fit in fits if not fit.undetermined and fit.freedoms > 0]
+    fullest = max(determined, key=lambda fit: (len(fit.names), -fit.chi2))
+    inflation = max(fullest.chi2 / fullest.freedoms, 1.0)
+    kept = sorted(determined, key=lambda fit: fit.criterion(inflation))
+    criteria = np.array([fit.criterion(inflation) for fit in kept])
+    weights = np.exp(-0.5 * (criteria - criteria[0]))
+    calls = _calls(fits, fullest, inflation, together or {})
+    return Choice(kept, criteria, weights / weights.sum(), inflation, calls, blind)
+
+
+def _calls(
+    fits: list[Subset], fullest: Subset, inflation: float, together: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[float, float]]:
+    """F and p of leaving each parameter out of the fullest subset, and each set that it holds."""
+    by_names = {fit.names: fit for fit in fits}
+    leaving: dict[str, Sequence[str]] = {name: (name,) for name in fullest.names}
+    leaving |= {said: names for said, names in together.items() if {*names} <= {*fullest.names}}
+    calls = {}
+    for said, gone in leaving.items():
+        less = by_names[tuple(name for name in fullest.names if name not in gone)]
+        ratio = max(less.chi2 - fullest.chi2, 0.0) / inflation / len(gone)
+        calls[said] = (ratio, float(f_distribution.sf(ratio, len(gone), fullest.freedoms)))
+    return calls
+
+
+def _combination(names: tuple[str, ...], row: np.ndarray) -> str:
+    """A combination of parameters in words, those that take part by more than a hundredth."""
+    return " with ".join(name for name, part in zip(names, row, strict=True) if abs(part) > 1e-2)
