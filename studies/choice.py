@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
+from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, TOGETHER, Choice, Chooser
 from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
+from models.ensemble.workers import Crew, places_of
 from studies.command.asked import ANY, load_scene, plan_of
 
 SYSTEM = ANY
@@ -155,8 +156,9 @@ def search(scene: Any) -> str:
 def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> SceneChoice:
     """A scene's choice by one implementation."""
     engine = engine_of(scene, engines)
-    chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress)
-    choice, none = chooser.choose(), chooser.work(frozenset())
+    with Crew.of(scene, usual=1).at_work(TOGETHER, *places_of(scene)) as pool:
+        chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
+        choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
         Alone(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))

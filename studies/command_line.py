@@ -206,15 +206,20 @@ def price(
     tolerance: Annotated[float, typer.Option(help="Largest error that is allowed, in the unit of the quantity.")],
     quantity: Annotated[str | None, typer.Option(help="Channels of the result, e.g. f1,f2, if not the usual.")] = None,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
     changes: Changes = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance."""
+    """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance.
+
+    What is timed runs in this process alone; workers compute the rest.
+    """
     from models.advice.price.recommendation import price as price_of
     from models.advice.price.text import as_dict
     from models.advice.price.text import lines as price_lines
 
-    loaded = load_scene(scene, changes)
+    loaded = load_scene(scene, changes).model_copy(update=given_crew(workers, cluster))
     _say_user_code(loaded)
     with waiting("runs of every engine in ever finer steps", loaded.system):
         priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))

@@ -55,6 +55,7 @@ class Made(Variants):
 
     def __init__(self, function, effects):
         self.function, self.names, self.calls, self._kept, self._costs, self._broken = function, effects, 0, {}, {}, {}
+        self._ready = {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
         self.system = type(
             "System",
@@ -75,7 +76,7 @@ class Made(Variants):
 
 
 def chooser(monkeypatch, function, effects, tolerance=0.05):
-    monkeypatch.setattr(choose, "Variants", lambda scene, engine: Made(function, effects))
+    monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: Made(function, effects))
     return Chooser(None, "", ["q"], tolerance)
 
 

@@ -9,7 +9,7 @@ first axis is the paths, together.
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from models.core.errors import RunFailed
+from models.core.errors import InputError, RunFailed
 from models.core.whole_files import FULL, reason_of
 from models.ensemble.store import Arrays, Store
 
@@ -104,6 +104,7 @@ class _Failure:
     reason: str
     full: bool = False
     gone: bool = False
+    error: InputError | RunFailed | None = None
 
 
 @dataclass
@@ -239,6 +240,23 @@ def in_order(
         yield here[i], kept.load(i)
 
 
+def each_of(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
+    """What a function gives for each of a few blocks, in their order.
+
+    Raises what the function raises for the first block that fails: InputError and RunFailed as they are, by whatever
+    executor; any other error is a RunFailed where an executor computes.
+    """
+    if executor is None:
+        return [function(block) for block in blocks]
+    with closing(_answers(function, iter(enumerate(blocks)), executor, AHEAD)) as answers:
+        kept = {i: answer for i, _, answer in answers}
+    ordered = [kept[i] for i in sorted(kept)]
+    for answer in ordered:
+        if isinstance(answer, _Failure):
+            raise answer.error or RunFailed("ensemble", answer.reason)
+    return ordered
+
+
 def _next_kept(
     answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _Memory,
@@ -369,4 +387,4 @@ def _said(error: BaseException) -> _Failure:
         return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", gone=True)
     full = isinstance(error, OSError) and error.errno in FULL
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
-    return _Failure(said, full)
+    return _Failure(said, full, error=error if isinstance(error, InputError | RunFailed) else None)

@@ -1,6 +1,7 @@
 """Least squares in stages, each of which can be kept and gone on from: the same bits with and without interruption."""
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,18 +40,23 @@ class Fit:
 
 
 def fit(
-    problem: Problem, stage_store: Store | None = None, tell: Told = lambda text, share: None, first: int = 0
+    problem: Problem,
+    stage_store: Store | None = None,
+    tell: Told = lambda text, share: None,
+    first: int = 0,
+    executor: Executor | None = None,
 ) -> Fit:
     """Estimates by scipy's least squares; InputError where the model fails at the start.
 
-    stage_store : finished stages, the first of them block ``first``; tell : told after each stage.
+    stage_store : finished stages, the first of them block ``first``; tell : told after each stage; executor : computes
+    the columns of Jacobians.
     """
     values, cost, converged = problem.start, np.inf, False
     for stage in range(MOST_STAGES):
         if stage_store is not None and stage_store.has(first + stage):
             block = stage_store.load(first + stage)
         else:
-            block = _stage(problem, values)
+            block = _stage(problem, values, executor)
             if stage_store is not None:
                 stage_store.save(first + stage, block)
         values, before, cost = block["values"], cost, float(block["cost"])
@@ -68,19 +74,19 @@ def _share(stage: int, before: float, cost: float) -> float:
     return 0.9 * max(settled, stage / MOST_STAGES)
 
 
-def _stage(problem: Problem, values: np.ndarray) -> dict[str, np.ndarray]:
+def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
     """A few trials from values on."""
     from scipy.optimize import least_squares
 
-    scale, (low, high) = problem.scale, problem.bounds
+    scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
     begin = np.clip(values / scale, low / scale + INSIDE, high / scale - INSIDE)
-    if np.abs(problem.residuals(begin * scale)).max() >= FAILED:
+    if np.abs(residuals(begin * scale)).max() >= FAILED:
         names = ", ".join(f"{each.name} = {value:.4g}" for each, value in zip(problem.parameters, values, strict=True))
         raise InputError("identify", "start", names, "the model fails at these values: start from others")
     solved = least_squares(
-        lambda x: problem.residuals(x * scale).ravel(),
+        lambda x: residuals(x * scale).ravel(),
         begin,
-        jac=lambda x: problem.jacobian(x * scale).reshape(-1, len(x)),
+        jac=lambda x: problem.jacobian(x * scale, residuals, executor).reshape(-1, len(x)),
         bounds=(low / scale, high / scale),
         max_nfev=STAGE,
         ftol=0.1 * SETTLED,

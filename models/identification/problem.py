@@ -1,13 +1,15 @@
 """A measurement beside a model with parameters: residuals on one clock, scaled, with spikes and gaps left out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.smoothing import smoothed
+from models.ensemble.runner import each_of
 from models.measured.outliers import without_outliers
 
 FAILED = 1e3
@@ -116,15 +118,13 @@ def _nearest(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Model, parameters and channels. runs : of the model, counted in its only entry. taking_part (n,) : times that
-    residuals count, all of them where None."""
+    """Model, parameters and channels. taking_part (n,) : times that residuals count, all of them where None."""
 
     model: Model
     parameters: Sequence[Parameter]
     channels: Sequence[Measured]
     clock: Clock
     taking_part: np.ndarray | None = None
-    runs: list[int] = field(default_factory=lambda: [0])
 
     @property
     def start(self) -> np.ndarray:
@@ -143,7 +143,6 @@ class Problem:
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
         """(channels, n): what the model says at all times of the clock, low-passed as the measurement is."""
-        self.runs[0] += 1
         run = self.model(values)
         rows = []
         for channel in self.channels:
@@ -171,26 +170,33 @@ class Problem:
             return np.where(self.weights > 0.0, FAILED, 0.0)
         return (predicted - self.target) * self.weights
 
-    def jacobian(self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
-        """(channels, m, p): derivatives by parameters in their scales, forward, or backward where that fails."""
+    def jacobian(
+        self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray] | None = None, executor: Executor | None = None
+    ) -> np.ndarray:
+        """(channels, m, p): derivatives by parameters in their scales, forward, or backward where that fails.
+
+        of : what is derived, the residuals if nothing else is named; executor : computes its columns.
+        """
         answer = self.residuals if of is None else of
-        base, columns = answer(values), []
-        for k, parameter in enumerate(self.parameters):
-            step = STEP * parameter.scale * (-1.0 if values[k] + STEP * parameter.scale > parameter.high else 1.0)
-            columns.append(self._column(answer, values, base, k, step))
+        ways = [self._ways(values, k) for k in range(len(self.parameters))]
+        base, *there = each_of(answer, [values, *(way[0][0] for way in ways)], executor)
+        again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED]
+        chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
+        for k, moved in zip(again, each_of(answer, [chosen[k][0] for k in again], executor), strict=True):
+            there[k] = moved
+        columns = [(row - base) / change for row, (_, change) in zip(there, chosen, strict=True)]
         return np.stack(columns, axis=-1)
 
-    def _column(
-        self, answer: Callable[[np.ndarray], np.ndarray], values: np.ndarray, base: np.ndarray, k: int, step: float
-    ) -> np.ndarray:
+    def _ways(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
+        """Values (p,) with parameter ``k`` moved forward, and backward, and by how much of its scale; within its
+        bounds, the other way round near the upper one."""
+        each, ways = self.parameters[k], list[tuple[np.ndarray, float]]()
+        step = STEP * each.scale * (-1.0 if values[k] + STEP * each.scale > each.high else 1.0)
         for signed in (step, -step):
             moved = values.copy()
             moved[k] += signed
-            if self.parameters[k].low <= moved[k] <= self.parameters[k].high:
-                there = answer(moved)
-                if np.abs(there).max() < FAILED:
-                    break
-        return (there - base) / (signed / self.parameters[k].scale)
+            ways.append((moved, signed / each.scale))
+        return [way for way in ways if each.low <= way[0][k] <= each.high] or ways[:1]
 
 
 STEP = 1e-4

@@ -7,6 +7,7 @@ residuals as alike as they are, where it is larger: short records scatter. Sourc
 Econometrica 55 (1987), 703-708; for the whole, Ljung, System Identification (1999), section 9.
 """
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -75,10 +76,10 @@ class Uncertainty:
         return answer
 
 
-def uncertainty(solved: Fit) -> Uncertainty:
-    """Covariance of the estimates by the fit's own residuals."""
+def uncertainty(solved: Fit, executor: Executor | None = None) -> Uncertainty:
+    """Covariance of the estimates by the fit's own residuals; executor : computes the columns of their Jacobian."""
     problem = solved.problem
-    jacobian = problem.jacobian(solved.values)
+    jacobian = problem.jacobian(solved.values, executor=executor)
     free = ~solved.at_bound
     inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
     scores = np.einsum("cmp,cm->mp", jacobian, solved.residuals)

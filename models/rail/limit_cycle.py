@@ -5,6 +5,8 @@ steps to the period, so that halving the step asks the same question again. Newt
 besides state and period, either the amplitude or the speed is unknown. With a given amplitude, branches can be
 followed that stand upright over the speed or turn back.
 
+Where an ``executor`` is given, it computes the marches that linearise the return, two by two; no bit depends on it.
+
 Floquet multipliers are those of the return map of the section without lateral rate: beyond 1 the orbit repels.
 
 Above the critical speed a motion grows until creep forces saturate and flanges touch. Below it, down to a speed of
@@ -13,7 +15,9 @@ its own, a large disturbance may end in the same cycle: the branch then begins w
 
 import math
 from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from typing import Literal
 
@@ -21,6 +25,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
+from models.ensemble.runner import each_of
 from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, WheelsetPath, Y
 from models.rail.linear import critical_speed
 from models.rail.wheelset import Wheelset
@@ -109,14 +114,16 @@ class Orbit:
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
-def guess_near_state(equations: Equations, state: Array, period: float, step: float) -> Orbit:
+def guess_near_state(
+    equations: Equations, state: Array, period: float, step: float, executor: Executor | None = None
+) -> Orbit:
     """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
     start = state.copy()
     start[Y_RATE] = 0.0
-    return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)))
+    return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
 
 
-def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
+def beginning(equations: Equations, amplitude: float, step: float, executor: Executor | None = None) -> Orbit:
     """The orbit of a small amplitude (m), from the motion that neither grows nor decays by the equations' own law.
 
     step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
@@ -131,7 +138,8 @@ def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
-    return solved(guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
+    guess = guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step, executor)
+    return solved(guess, "speed", executor=executor)
 
 
 def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
@@ -140,18 +148,18 @@ def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
     return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
 
 
-def branch(first: Orbit, amplitudes: Iterable[float]) -> Iterator[Orbit]:
+def branch(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
     """Orbits of one amplitude (m) after the other, each from the ones before; the speed of each is found.
 
     Raises RunFailed where the branch cannot be followed.
     """
     before, last = replace(first, state=first.equations.rest), first
     for amplitude in amplitudes:
-        before, last = last, _onwards(before, last, amplitude, HALVINGS)
+        before, last = last, _onwards(before, last, amplitude, HALVINGS, executor)
         yield last
 
 
-def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int) -> Orbit:
+def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int, executor: Executor | None) -> Orbit:
     """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
     way = last.amplitude - before.amplitude
     share = (amplitude - last.amplitude) / way
@@ -160,15 +168,15 @@ def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int) -> Orb
     ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
     guess = replace(last, equations=ahead, state=state, period=last.period + share * (last.period - before.period))
     try:
-        return solved(guess, "speed")
+        return solved(guess, "speed", executor=executor)
     except RunFailed:
         if halvings == 0:
             raise
-    middle = _onwards(before, last, (last.amplitude + amplitude) / 2.0, halvings - 1)
-    return _onwards(last, middle, amplitude, halvings - 1)
+    middle = _onwards(before, last, (last.amplitude + amplitude) / 2.0, halvings - 1, executor)
+    return _onwards(last, middle, amplitude, halvings - 1, executor)
 
 
-def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
+def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:
     """The orbit near a guess, with the speed or the amplitude of the guess, and its slopes if it is to be precise.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
@@ -183,16 +191,16 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
         missed = ((end - orbit.state) / SIZES)[RETURNS]
         size = float(np.abs(missed).max())
         if size < CLOSED:
-            return orbit if fresh or not precise else _linearised(orbit)
+            return orbit if fresh or not precise else _linearised(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
-            orbit, fresh = _linearised(orbit), True
+            orbit, fresh = _linearised(orbit, executor), True
         orbit, left, fresh = _corrected(orbit, missed, unknown), size, False
     raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
 
 
-def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
+def refined(orbit: Orbit, unknown: Unknown, executor: Executor | None = None) -> Orbit:
     """The orbit at half the step, with the changes that halving made."""
-    half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False)
+    half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
     return replace(
         half,
         error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
@@ -204,19 +212,25 @@ def _state_after(equations: Equations, state: Array, period: float, steps: int) 
     return equations.run(state, period, period / steps, steps).states[-1]
 
 
-def _linearised(orbit: Orbit) -> Orbit:
+Guess = tuple[Equations, Array, float]
+"""Equations, state (10,) and period (s)."""
+
+
+def _linearised(orbit: Orbit, executor: Executor | None) -> Orbit:
     """The orbit with slopes from its own linearisation."""
-    eq, T, n, state, signs = orbit.equations, orbit.period, orbit.steps, orbit.state, (-1.0, 1.0)
-    ends = [
-        *(
-            [_state_after(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs]
-            for k in RETURNS
-        ),
-        [_state_after(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
-        [_state_after(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
+    eq, T, state, signs = orbit.equations, orbit.period, orbit.state, (-1.0, 1.0)
+    pairs: list[list[Guess]] = [
+        *([(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T) for sign in signs] for k in RETURNS),
+        [(replace(eq, speed=eq.speed + sign * SHIFT), state, T) for sign in signs],
+        [(eq, state, T * (1.0 + sign * SHIFT)) for sign in signs],
     ]
+    ends = each_of(partial(_ends, steps=orbit.steps), pairs, executor)
     columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
     return replace(orbit, slopes=np.array(columns).T)
+
+
+def _ends(pair: list[Guess], steps: int) -> list[Array]:
+    return [_state_after(*guess, steps) for guess in pair]
 
 
 def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
@@ -237,7 +251,9 @@ def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
     return replace(orbit, equations=replace(orbit.equations, speed=speed), state=state, period=period)
 
 
-def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -> Orbit | None:
+def attained(
+    equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
+) -> Orbit | None:
     """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None where it dies out.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
@@ -252,7 +268,8 @@ def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -
         tops = maxima(y)
         if tops.size > 2 and np.ptp(y[tops[-2:]]) < STEADY * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
-            return solved(guess_near_state(equations, path.states[tops[-1]], period, step), "amplitude")
+            guess = guess_near_state(equations, path.states[tops[-1]], period, step, executor)
+            return solved(guess, "amplitude", executor=executor)
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 
@@ -262,7 +279,9 @@ def maxima(values: Array) -> np.ndarray:
     return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
 
 
-def bifurcation(equations: Equations, slowest: float, fastest: float, step: float = 5e-4) -> Iterator[Orbit]:
+def bifurcation(
+    equations: Equations, slowest: float, fastest: float, step: float = 5e-4, executor: Executor | None = None
+) -> Iterator[Orbit]:
     """Cycles by rising amplitude, from the critical speed on until one leaves a range of speeds (m/s).
 
     Each at half the step (s), with the changes that halving made: of the speed, and of the frequency. Raises
@@ -271,17 +290,17 @@ def bifurcation(equations: Equations, slowest: float, fastest: float, step: floa
     clearance = equations.wheelset.flange_clearance
     for share in FIRST:
         try:
-            first = beginning(equations, share * clearance, step)
+            first = beginning(equations, share * clearance, step, executor)
             break
         except RunFailed:
             if share == FIRST[-1]:
                 raise
     inner = np.linspace(first.amplitude, clearance, INNER)[1:]
     outer = (clearance * (1.0 + OUTER * k) for k in count(1))
-    yield refined(first, "speed")
+    yield refined(first, "speed", executor)
     for amplitudes in (inner, outer):
-        for orbit in branch(first, amplitudes):
+        for orbit in branch(first, amplitudes, executor):
             if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST * clearance:
                 return
             first = orbit
-            yield refined(orbit, "speed")
+            yield refined(orbit, "speed", executor)

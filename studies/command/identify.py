@@ -38,14 +38,15 @@ def identify(
 
     scene : as ``load_scene`` gives it; measurement : its channels have the names of the run's; parameters : KEY or
     KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; folder : keeps finished stages.
-    Raises InputError and RunFailed.
+    The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
-    if folder is None:
-        return uncertainty(fit(problem, None, tell))
-    store = Store(folder / STAGES)
-    with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
-        return uncertainty(fit(problem, store, tell))
+    with Crew.of(scene, usual=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
+        if folder is None:
+            return uncertainty(fit(problem, None, tell, executor=pool), pool)
+        store = Store(folder / STAGES)
+        with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
+            return uncertainty(fit(problem, store, tell, executor=pool), pool)
 
 
 def profiles_of(

@@ -16,6 +16,7 @@ and larger sets were not tried.
 
 import math
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -44,6 +45,8 @@ SHORTER = 2
 """Times that steps become shorter where a confirmation fails, before effects are taken back."""
 ROUNDS = 30
 """Sets that are confirmed at most."""
+TOGETHER = 16
+"""Pairs whose runs are computed ahead at once, where there is somebody to compute them."""
 RUNS = 100
 """Runs of the scene, by their calls, that the search may take."""
 
@@ -80,7 +83,9 @@ class Choice:
 class Chooser:
     """A scene's effects in one implementation, for quantities (see ``models.advice.choice.answer``) and a tolerance.
 
-    progress(share) is told the share that is spent of the runs that the search may take."""
+    progress(share) is told the share that is spent of the runs that the search may take. executor : computes the runs
+    without one effect or two that the screen is about to ask for; those that confirm, and those that are timed, are
+    this process's."""
 
     def __init__(
         self,
@@ -90,9 +95,10 @@ class Chooser:
         tolerance: float,
         window: float = WINDOW,
         progress: Callable[[float], None] = lambda share: None,
+        executor: Executor | None = None,
     ) -> None:
         self.tolerance, self.progress = tolerance, progress
-        self.whole = Screen(Variants(scene, engine), quantities)
+        self.whole = Screen(Variants(scene, engine, executor), quantities)
         self.alike = self.whole.sampled == set(quantities)
         part = self._part(window)
         self.step_factor, self.error = self._steps(part)
@@ -116,7 +122,7 @@ class Chooser:
     def _coarse(self, screen: Screen) -> Screen:
         """The screen of the scene in the screen's longer steps."""
         runs = screen.variants
-        coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine)
+        coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
     def _steps(self, screen: Screen) -> tuple[int, np.ndarray]:
@@ -303,19 +309,31 @@ class Chooser:
             alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
             pairs = [pair for pair in combinations(self.effects, 2) if max(alone[effect] for effect in pair) > BUDGET]
             pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
-            self._pairs = [
-                frozenset(pair) for pair in pairs if not self._budget_spent() and self.share(frozenset(pair)) <= BUDGET
-            ]
+            self._pairs = self._within([frozenset(pair) for pair in pairs])
         return self._pairs
+
+    def _within(self, pairs: list[Set]) -> list[Set]:
+        """The pairs that the budget of errors allows, of those for which there is budget left to tell."""
+        within = list[Set]()
+        for i, pair in enumerate(pairs):
+            if self._budget_spent():
+                break
+            if i % TOGETHER == 0:
+                self.screen.ahead(pairs[i : i + TOGETHER])
+            within += [pair] if self.share(pair) <= BUDGET else []
+        return within
 
     def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
         """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
         best, most = frozenset[str](), 0.0
         now, work = self.share(chosen), self.work(chosen)
+        steps = [step for step in steps if not (step <= chosen or step - chosen in banned or step in banned)]
+        if steps and not self._budget_spent():
+            self.screen.ahead(chosen | step for step in steps)
         for step in steps:
             further = chosen | step
-            if further == chosen or step - chosen in banned or step in banned or self._budget_spent():
-                continue
+            if self._budget_spent():
+                break
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
             score = saved / max(share - now, LEAST) if saved > 0.0 else 0.0

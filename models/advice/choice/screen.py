@@ -8,6 +8,7 @@ over the effects of S and their pairs. What is left out of that is estimated by 
 second as the second does to the first.
 """
 
+from collections.abc import Iterable
 from itertools import combinations
 from typing import NoReturn
 
@@ -92,6 +93,10 @@ class Screen:
             return None
         return {name: added(both[name], *(_minus(part[name]) for part in known)) for name in self.quantities}
 
+    def ahead(self, sets: Iterable[Set]) -> None:
+        """Have the runs computed that ``change`` of these sets will ask for."""
+        self.variants.ahead((part, 1) for chosen in sets for part in _parts(chosen))
+
     def change(self, chosen: Set) -> Changes | None:
         """Predicted differences of a set; None where they cannot be told."""
         parts: list[Changes | None] = [None]
@@ -122,6 +127,13 @@ class Screen:
         if times == 1:
             return np.zeros(len(self.quantities))
         return self.shares(self.between(self.variants.of(chosen, times), self.variants.of(chosen)))
+
+
+def _parts(chosen: Set) -> list[Set]:
+    """Sets whose runs tell what a set changes."""
+    if len(chosen) <= 2:
+        return [chosen]
+    return [frozenset(few) for count in (1, 2) for few in combinations(sorted(chosen), count)]
 
 
 def _minus(cases: Cases) -> Cases:

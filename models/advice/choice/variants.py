@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Iterable
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -14,8 +16,13 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.core.scene_effects import absent_effects, module_of, named, own_table, rebuilt, with_effects, without
 from models.core.systems import modules_of
+from models.ensemble.runner import each_of
 
 Set = frozenset[str]
+Key = tuple[Set, int]
+"""A variant: the effects that are left out, and how many times as long its steps are."""
+Outcome = tuple[Answer | None, dict[str, Broken]]
+"""A variant's run, and the assumptions that it breaks."""
 LONGEST = 128
 """No step is tried that is more times as long as the scene's."""
 FINE = 60
@@ -43,21 +50,25 @@ def system_of(scene: Any) -> ModuleType:
 class Variants:
     """Runs of a ``scene`` by one implementation; a variant is the effects that are left out, and the step by its own.
 
-    None stands for one that cannot be, or whose run fails. ``calls`` : of all runs made so far, without those that were
-    repeated for their seconds.
+    None stands for one that cannot be, or whose run fails. ``executor`` : computes runs ``ahead``. ``calls`` : of all
+    runs that were asked for so far, without those that were repeated for their seconds; runs ahead that nobody asks for
+    do not count, so that no choice depends on who computes.
     """
 
     scene: Any
     engine: str
+    executor: Executor | None = None
     system: ModuleType = field(init=False)
     calls: int = 0
-    _kept: dict[tuple[Set, int], Answer | None] = field(default_factory=dict)
+    _kept: dict[Key, Answer | None] = field(default_factory=dict)
     _costs: dict[Set, float] = field(default_factory=dict)
-    _broken: dict[tuple[Set, int], dict[str, Broken]] = field(default_factory=dict)
+    _broken: dict[Key, dict[str, Broken]] = field(default_factory=dict)
+    _ready: dict[Key, Outcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.system = system_of(self.scene)
         self.scene = self.system.opened(self.scene) if self._opened else self.scene
+        self._job = partial(_run, self.scene, self.engine)
 
     @property
     def _opened(self) -> bool:
@@ -87,10 +98,22 @@ class Variants:
         """The run without these effects, with steps so many times as long."""
         key = (frozenset(left_out), times)
         if key not in self._kept:
-            with breaches() as self._broken[key]:
-                answer = self._kept[key] = self._run(*key)
+            answer, self._broken[key] = self._ready.pop(key, None) or self.run(key)
+            self._kept[key] = answer
             self.calls += answer.counts["calls"] if answer else 0
         return self._kept[key]
+
+    def ahead(self, keys: Iterable[Key]) -> None:
+        """Have the executor compute runs that will probably be asked for; without an executor each waits until it
+        is."""
+        if self.executor is not None:
+            new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._ready]
+            self._ready |= zip(new, each_of(self._job, new, self.executor), strict=True)
+
+    def run(self, key: Key) -> Outcome:
+        """The run of a variant, made anew."""
+        with breaches() as broken:
+            return self._run(*key), broken
 
     def _run(self, left_out: Set, times: int) -> Answer | None:
         try:
@@ -135,9 +158,9 @@ class Variants:
         return float(run.counts["calls"] * max(each, 1))
 
     def per_call(self, left_out: Set) -> float:
-        """CPU seconds of one call, the least of a few runs; infinite where there is none."""
+        """CPU seconds of one call, the least of a few runs of this process; infinite where there is none."""
         if left_out not in self._costs:
-            took, run = list[float](), self.of(left_out)
+            took, run = list[float](), self.of(left_out) if self.executor is None else self._run(left_out, 1)
             while run is not None and (len(took) < 2 or (len(took) < REPEATS and sum(took) < ENOUGH)):
                 took.append(run.seconds)
                 self._costs[left_out] = min(took) / run.counts["calls"]
@@ -155,11 +178,16 @@ class Variants:
 
         Of a length that the scene may have: whole samples of what it measures, for one."""
         if self._opened:
-            return Variants(self.scene.fewer(steps), self.engine)
+            return Variants(self.scene.fewer(steps), self.engine, self.executor)
         count = self.system.steps(self.scene)
         for few in (n for n in range(steps, count) if n % FINE == 0 or count % n == 0):
             table = own_table(self.scene)
             self.system.shorten(table, self.scene, few)
             with suppress(InputError):
-                return Variants(rebuilt(table, self.scene), self.engine)
+                return Variants(rebuilt(table, self.scene), self.engine, self.executor)
         return self
+
+
+def _run(scene: Any, engine: str, key: Key) -> Outcome:
+    """``Variants.run``, in a worker."""
+    return Variants(scene, engine).run(key)

@@ -17,7 +17,8 @@ class Ladder:
 
     values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
     declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not its
-    default; sure : a reference is known where a finer rung changes it by less than this part of the tolerance
+    default; sure : a reference is known where a finer rung changes it by less than this part of the tolerance; said :
+    what that rung is, before the change, where it is not half the step, or cells and steps together
     """
 
     engine: str
@@ -28,6 +29,7 @@ class Ladder:
     default: float = 0.0
     cells: bool = False
     sure: float = 20.0
+    said: str = ""
 
     def setting(self, i: int) -> Setting:
         """The setting on a rung."""

@@ -4,11 +4,15 @@ Counts are the same in every run, so the least count wins. Seconds wander: they 
 which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
 interval of its ratio to the fastest lies above SLOWER. So what is recommended in its place is faster beyond doubt, and
 what is recommended beside it is never slower than it by more than that.
+
+Whatever is timed runs in this process, with nothing beside it. What is not may be shared among workers: the first two
+settings of a reference, the runs that confirm the winners, and those whose errors are told against a finer truth.
 """
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -21,6 +25,8 @@ from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
+from models.ensemble.runner import each_of
+from models.ensemble.workers import Crew, places_of
 from models.machine.timing import interleave, paired_ratio
 
 NEAR = 2.0
@@ -39,6 +45,8 @@ ATTEMPTS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
 RESOLVED = 3.0
 """An error is told against a truth which is known that many times better, where one can be had within PATIENCE."""
+SHARED = 8
+"""Runs at once that are not timed, about: two settings of a reference, or two for each engine."""
 DEARER = 8.0
 """A finer reference takes at most about so many times the seconds: twice the cells, half the step."""
 
@@ -91,10 +99,15 @@ class Recommendation:
 
 
 def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
-    """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known."""
+    """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known.
+
+    The scene's crew computes what is not timed.
+    """
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
-    return recommend(priced(scene, quantity, engines), tolerance)
+    to_price = priced(scene, quantity, engines)
+    with Crew.of(scene, usual=1).at_work(SHARED, *places_of(scene)) as pool:
+        return recommend(to_price, tolerance, pool)
 
 
 def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
@@ -110,16 +123,19 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> Priced
     )
 
 
-def recommend(scene: PricedScene, tolerance: float) -> Recommendation:
-    """Search the first part of the run, time what is near the best, confirm it over the whole run."""
-    searched = known = truth(scene, tolerance, scene.first)
+def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = None) -> Recommendation:
+    """Search the first part of the run, time what is near the best, confirm it over the whole run.
+
+    executor : computes what is not timed.
+    """
+    searched = known = truth(scene, tolerance, scene.first, executor=executor)
     search = Search(scene, searched, tolerance, scene.first).everything()
     timed = _timed(search)
     engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
     winners = _winners(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.whole > scene.first * (1 + 1e-9) and winners:
-        known, timed, winners = _confirmed(search, timed, winners)
-    known, timed, winners = _resolved(scene, known, timed, winners)
+        known, timed, winners = _confirmed(search, timed, winners, executor)
+    known, timed, winners = _resolved(scene, known, timed, winners, executor)
     defaults = {
         ladder.engine: settings
         for ladder in scene.ladders()
@@ -212,16 +228,18 @@ def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
 Known = tuple[Truth, list[SettingChoice], Winners]
 
 
-def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners) -> Known:
+def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None) -> Known:
     """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
-    known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
-    over = Search(scene, known, search.tolerance, scene.whole)
+    rung = max(0, search.truth.rung - 1)
+    known = truth(scene, search.tolerance, scene.whole, rung, twice=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
     able = {choice.tried.setting: choice for choice in _shown(timed, winners)}
-    confirmed = (_over_all(over, ladders[setting.curve], choice) for setting, choice in able.items())
-    held = [choice for choice in confirmed if choice is not None]
-    search.tried += [choice for choice in over.tried if choice.status != "ok"]
+    over = Search(scene, known, search.tolerance, scene.whole)
+    blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
+    confirmed = each_of(partial(_over_all, over), blocks, executor)
+    held = [each.choice for each in confirmed if each.choice is not None]
+    search.tried += [attempt for each in confirmed for attempt in each.failed]
     return known, held, _winners(held, winners)
 
 
@@ -230,32 +248,48 @@ def _shown(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
     return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
 
 
-def _over_all(over: Search, ladder: Ladder, choice: SettingChoice) -> SettingChoice | None:
-    """A setting, or the next finer one of its method that meets the tolerance over the whole run."""
+@dataclass(frozen=True)
+class _Confirmed:
+    """A setting that meets the tolerance over the whole run, None where none does; attempts that had other failures
+    than an error that is too large."""
+
+    choice: SettingChoice | None
+    failed: list[Tried] = field(default_factory=list)
+
+
+def _over_all(over: Search, block: tuple[Ladder, SettingChoice]) -> _Confirmed:
+    """A setting, or the next finer one of its method that meets the tolerance over the whole run.
+
+    The seconds of all attempts are told by the rounds in which the first was timed.
+    """
+    (ladder, choice), failed = block, list[Tried]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
     for _ in range(ATTEMPTS):
+        ratio = ladder.work(first.setting.value, ladder.values[i])
         now = over.attempt(ladder.setting(i))
+        now = replace(now, seconds=ratio * choice.seconds) if now.seconds else now
+        failed += [now] if now.status != "ok" else []
         if over.meets(now):
-            ratio = ladder.work(first.setting.value, now.setting.value)
-            return SettingChoice(
-                now, now.error, now.calls, ratio * choice.seconds, True, tuple(ratio * s for s in choice.rounds)
-            )
+            rounds = tuple(ratio * s for s in choice.rounds)
+            return _Confirmed(SettingChoice(now, now.error, now.calls, now.seconds, True, rounds), failed)
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
         if i < 0:
-            return None
-    return None
+            break
+    return _Confirmed(None, failed)
 
 
-def _resolved(scene: PricedScene, known: Truth, timed: list[SettingChoice], winners: Winners) -> Known:
+def _resolved(
+    scene: PricedScene, known: Truth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+) -> Known:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
     shown = _shown(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _blurred(known, errors):
-        answers = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
-        known, errors = _finer(scene, known, answers)
+        answers = dict(zip(errors, each_of(partial(_whole_answer, scene), errors, executor), strict=True))
+        known, errors = _finer(scene, known, answers, executor)
     told = {
         choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], known.uncertainty))
         for choice in shown
@@ -267,17 +301,24 @@ def _resolved(scene: PricedScene, known: Truth, timed: list[SettingChoice], winn
     )
 
 
+def _whole_answer(scene: PricedScene, setting: Setting) -> Answer:
+    return scene.answer(scene.solve(setting, scene.whole))
+
+
 def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
     """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
     return min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE
 
 
-def _finer(scene: PricedScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
+def _finer(
+    scene: PricedScene, known: Truth, answers: dict[Setting, Answer], executor: Executor | None
+) -> tuple[Truth, dict[Setting, float]]:
     """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
     while _blurred(known, errors):
         try:
-            finer = truth(scene, scene.reference().sure * known.uncertainty, scene.whole, known.rung, twice=False)
+            tolerance = scene.reference().sure * known.uncertainty
+            finer = truth(scene, tolerance, scene.whole, known.rung, twice=False, executor=executor)
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
         if not finer.uncertainty < known.uncertainty:

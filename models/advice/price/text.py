@@ -26,8 +26,9 @@ def lines(recommendation: Recommendation) -> list[str]:
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
         f"within {recommendation.tolerance:g} {scene.unit} even zero would do"
     )
+    extent = getattr(scene, "extent", f"over {scene.whole:g} s")
     return [
-        f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} over {scene.whole:g} s",
+        f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} {extent}",
         f"  truth: {recommendation.truth.how} {recommendation.truth.uncertainty:.1e} {scene.unit}",
         *([] if recommendation.whole else [first]),
         *([f"  {scene.note}"] if scene.note else []),

@@ -2,7 +2,10 @@
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +13,7 @@ from models.advice.price import Answer, Ladder, PricedScene
 from models.advice.price.problem import Setting
 from models.core.assumptions import Broken, breaches
 from models.core.errors import InputError, RunFailed
+from models.ensemble.runner import each_of
 
 AGREED = 4.0
 """A solver of another family differs by less than this part of the tolerance."""
@@ -22,8 +26,9 @@ MOST_ROWS = 4_000_000
 @dataclass(frozen=True)
 class Truth:
     """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder;
-    kink_period : s between kinks of the quantity, 0 where there are none; seconds : that the reference took; broken :
-    assumptions that the reference breaks, and with it every setting that is right."""
+    kink_period : s between kinks of the quantity, 0 where there are none; seconds : of the processor that the reference
+    took, which tell how patient to be and are no price; broken : assumptions that the reference breaks, and with it
+    every setting that is right."""
 
     answer: Answer
     uncertainty: float
@@ -72,16 +77,26 @@ def at(answer: Answer, times: np.ndarray, kink_period: float = 0.0) -> np.ndarra
     return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
-def truth(scene: PricedScene, tolerance: float, duration: float, rung: int = 0, twice: bool = True) -> Truth:
+def truth(
+    scene: PricedScene,
+    tolerance: float,
+    duration: float,
+    rung: int = 0,
+    twice: bool = True,
+    executor: Executor | None = None,
+) -> Truth:
     """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``twice`` : by a second family too.
+
+    executor : computes the first two settings of the reference beside one another: fewer tell nothing.
 
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    settled, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung)
+    settled, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung, executor)
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
+    finer = ladder.said or finer
     alone = Truth(settled, change, f"{said}; {finer}", rung, scene.kink_period, seconds, tuple(broken.values()))
     if other is None:
         return alone
@@ -102,27 +117,45 @@ def _named(setting: Setting) -> str:
     return f"{setting.engine} {setting.method} at {setting.label()}"
 
 
+class _Rung(NamedTuple):
+    """A reference's answer, None where it failed; why it did; seconds of the processor; what it broke."""
+
+    answer: Answer | None
+    failure: str
+    seconds: float
+    broken: dict[str, Broken]
+
+
+def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
+    begun = time.process_time()
+    with breaches() as broken:
+        try:
+            answer = scene.answer(scene.solve(setting, duration))
+        except (InputError, RunFailed) as error:
+            return _Rung(None, str(error), 0.0, broken)
+    return _Rung(answer, "", time.process_time() - begun, broken)
+
+
 def _settled(
-    scene: PricedScene, ladder: Ladder, tolerance: float, duration: float, rung: int
+    scene: PricedScene, ladder: Ladder, tolerance: float, duration: float, rung: int, executor: Executor | None
 ) -> tuple[Answer, int, float, float, dict[str, Broken]]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
     seconds that it took; what it broke."""
     before: Answer | None = None
     change, failure = float("inf"), ""
-    for i in range(rung, len(ladder.values)):
-        if duration / ladder.values[i] > MOST_ROWS:
-            break
-        begun = time.perf_counter()
-        try:
-            with breaches() as broken:
-                now = scene.answer(scene.solve(ladder.setting(i), duration))
-        except (InputError, RunFailed) as error:
-            before, failure = None, str(error)
+    rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
+    job = partial(_of_rung, scene, duration)
+    together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
+    ready = dict(zip(rungs, each_of(job, together, executor), strict=False))
+    for i in rungs:
+        now, failed, seconds, broken = ready.pop(i, None) or job(ladder.setting(i))
+        if now is None:
+            before, failure = None, failed
             continue
         if before is not None:
             last, change = change, _change(scene, before, now)
             if change <= tolerance / ladder.sure:
-                return now, i, change, time.perf_counter() - begun, broken
+                return now, i, change, seconds, broken
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now

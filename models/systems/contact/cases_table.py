@@ -50,6 +50,8 @@ HEADER = (
     "moment_error_of_theory [N m]",
     "status",
 )
+COLUMNS = tuple(head.partition(" ")[0] for head in HEADER[1:-1])
+"""Names of the columns of numbers, in the order of ``forces`` of ``solved_rows``."""
 SOUND = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g}", ",{:.4g},{:.4g},{:.4g},{:.4g}", ",ok\n"
 """A row: numbers, errors if they are asked for, status."""
 ERRORS = slice(6, 10)
@@ -81,7 +83,10 @@ def answer(
     """
     built(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
-    reading, solve = blocks(path, (BY_AXES, BY_CURVATURES)), partial(_solved, built=built, method=method, errors=errors)
+    reading, solve = (
+        blocks(path, (BY_AXES, BY_CURVATURES)),
+        partial(solved_rows, built=built, method=method, errors=errors),
+    )
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(out) as part, part.open("w") as file:
         heads = HEADER if errors else tuple(head for head in HEADER if head not in HEADER[ERRORS])
@@ -102,7 +107,7 @@ def compile_first(built: Build, method: Method) -> None:
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, built, method)
 
 
-def _solved(block: Block, built: Build, method: Method, errors: bool) -> Arrays:
+def solved_rows(block: Block, built: Build, method: Method, errors: bool) -> Arrays:
     """``forces`` (rows, columns) of a block, the rows (m,) that are ``wrong``, and ``why`` (m,)."""
     columns = len(HEADER) - 2 - (0 if errors else ERRORS.stop - ERRORS.start)
     forces, wrong = _answered(block, partial(_forces, built=built, method=method, errors=errors), columns)

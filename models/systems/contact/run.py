@@ -38,7 +38,8 @@ from models.core.scene_effects import extended
 from models.core.tables import BLOCK as TABLE_BLOCK
 from models.ensemble.store import Store, named_files
 from models.ensemble.workers import Crew, places_of
-from models.systems.contact.assumptions import assumptions, of_rows
+from models.systems.contact.assumptions import assumptions
+from models.systems.contact.assumptions import of_rows as assumptions_of_rows
 from models.systems.contact.cases_table import answer, compile_first, kept_rows, sizes
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.stated_error import with_error, with_error_of_rows
@@ -183,14 +184,14 @@ def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
 
 def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: bool) -> Result:
     """The first rows of the answers, which the file has in full."""
-    built = partial(_of_rows, scene)
+    built = partial(of_rows, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
     counts = _answered(scene, answers, built, progress, error)
     seconds = time.perf_counter() - start
     rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
     table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
-    with_assumptions(table, of_rows(scene.cases_file()))
+    with_assumptions(table, assumptions_of_rows(scene.cases_file()))
     return with_error_of_rows(table, scene) if error else table
 
 
@@ -217,7 +218,7 @@ def _count(progress: Progress, most: int, rows: int) -> None:
     progress(f"{rows:,} of {most:,} rows", min(rows / max(most, 1), 1.0))
 
 
-def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
+def of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
     """The contacts in the rows of a table of cases."""
     return extended(Built(scene.pair, friction, load), scene)
 

@@ -15,6 +15,8 @@ from models.core.discretisation import Estimate, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, join_results, result
 from models.core.told import gathered
+from models.ensemble.runner import each_of
+from models.ensemble.workers import Crew, places_of
 from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
 from models.rail.limit_cycle import Orbit, Unknown, attained, bifurcation, guess_from_orbit, refined, solved
@@ -37,6 +39,8 @@ CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz":
 SPEED: Unknown = "speed"
 AMPLITUDE: Unknown = "amplitude"
 """What is sought of a cycle: along a branch, and at a speed."""
+MARCHES = 11
+"""Pairs of marches that linearise a return: what workers can share."""
 ORBIT = {
     "speed": "m/s",
     "amplitude": "m",
@@ -145,21 +149,22 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
     """Limit cycles by rising amplitude within the scene's speeds, by the written equations; the detail are its orbits.
 
     Where no branch begins because nothing is stable, cycles that motions reach at these speeds. Why it ends or never
-    begins is a doubt. progress : called with the number of cycles after each; error : whether one is solved on half the
-    cells, too, which tells the error of cells.
+    begins is a doubt. The scene's crew computes what linearises. progress : called with the number of cycles after
+    each; error : whether one is solved on half the cells, too, which tells the error of cells.
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    try:
-        for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step):
-            orbits.append(orbit)
-            progress(len(orbits))
-    except NoCriticalSpeed as none:
-        why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
-        reached = (_attained(scene, float(speed)) for speed in speeds) if none.unstable else ()
-        orbits = [refined(orbit, "amplitude") for orbit in reached if orbit is not None]
-    except RunFailed as failure:
-        why = [f"the branch is followed no further: {failure.reason}"]
+    with Crew.of(scene, usual=1).at_work(MARCHES, *places_of(scene)) as pool:
+        try:
+            for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
+                orbits.append(orbit)
+                progress(len(orbits))
+        except NoCriticalSpeed as none:
+            why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
+            reached = each_of(partial(_reached, scene), speeds.tolist() if none.unstable else [], pool)
+            orbits = [orbit for orbit in reached if orbit is not None]
+        except RunFailed as failure:
+            why = [f"the branch is followed no further: {failure.reason}"]
     channels = {
         name: Channel("cycle", np.array([getattr(orbit, name) for orbit in orbits]), unit)
         for name, unit in ORBIT.items()
@@ -186,6 +191,12 @@ def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> 
         )
     except RunFailed:
         return None
+
+
+def _reached(scene: WheelsetScene, speed: float) -> Orbit | None:
+    """The refined cycle that a motion reaches at a speed (m/s), None where it dies out."""
+    orbit = _attained(scene, speed)
+    return None if orbit is None else refined(orbit, AMPLITUDE)
 
 
 def _attained(scene: WheelsetScene, speed: float) -> Orbit | None:

@@ -1,0 +1,148 @@
+"""A user's rolling contact, or table of contacts, as the search of the price of accuracy sees it: cells and marches.
+
+The truth is the scene's own theory on ever finer cells: what the theory itself leaves out is no part of the price.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder
+from models.advice.price.problem import Setting
+from models.core.errors import InputError
+from models.core.tables import Block, blocks
+from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, COLUMNS, solved_rows
+from models.systems.contact.run import of_rows, run
+from models.systems.contact.scene import ContactScene, Method
+
+ROWS = 1000
+"""Rows of a table by which it is priced, the first ones."""
+CELLS = (5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 181, 255)
+"""Cells along each axis that are tried, and those of the scene."""
+REFERENCE = (25, 50, 100, 200, 400)
+"""Cells of the reference's rungs."""
+MARCHES = {"fastsim": ("second-order", "plain"), "simplified": ("",)}
+"""Theories whose cells can be chosen, with the marches of each."""
+UNITS = {"fx": "N", "fy": "N", "mz": "N m"}
+USUAL = "fx,fy"
+
+
+@dataclass(frozen=True, eq=False)
+class PricedContact:
+    """See ``models.advice.price.PricedScene``. channels : of the quantity; rows : of a table, those that are sound;
+    None for one contact at its creepages."""
+
+    scene: ContactScene
+    channels: tuple[str, ...]
+    rows: Block | None
+    kink_period = 0.0
+    whole = first = 1.0
+    counted = "contact cells"
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene.title
+
+    @property
+    def quantity(self) -> str:
+        """Channels that the tolerance is set on."""
+        return " and ".join(self.channels)
+
+    @property
+    def unit(self) -> str:
+        """The one unit of the channels."""
+        return UNITS[self.channels[0]]
+
+    @property
+    def extent(self) -> str:
+        """What the quantity is asked of."""
+        return "at every creepage" if self.rows is None else f"in the first {len(self.rows.lines):,} sound rows"
+
+    @property
+    def note(self) -> str:
+        """What the price leaves out."""
+        return "errors are those of cells: how far the theory is off stands beside the forces of a run"
+
+    def ladders(self) -> list[Ladder]:
+        """Every march of the scene's theory over the cells."""
+        name, usual = self.scene.method.name, self.scene.method
+        values = tuple(1.0 / n for n in sorted({*CELLS, usual.cells}))
+        return [
+            Ladder(name, march or name, values, self._order(march), default=self._default(march), cells=True)
+            for march in MARCHES[name]
+        ]
+
+    def _default(self, march: str) -> float:
+        return 1.0 / self.scene.method.cells if march in ("", self.scene.method.march) else 0.0
+
+    def _order(self, march: str) -> int:
+        return int(self._method(march, self.scene.method.cells).order)
+
+    def reference(self) -> Ladder:
+        """The march of the highest order on cells that halve."""
+        name = self.scene.method.name
+        march = MARCHES[name][0]
+        values = tuple(1.0 / n for n in REFERENCE)
+        said = "half the cells change it by"
+        return Ladder(name, march or name, values, self._order(march), cells=True, said=said)
+
+    def second(self, last: Setting) -> Setting | None:
+        """No other family has the same theory."""
+        return None
+
+    def _method(self, march: str, cells: int) -> Method:
+        update = {"cells": cells, **({"march": march} if march in MARCHES["fastsim"] else {})}
+        return self.scene.method.model_copy(update=update)
+
+    def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:
+        """Values (n, k) of the channels, and the number of cells that all rows took."""
+        method = self._method(setting.method, round(1.0 / setting.value))
+        if self.rows is None:
+            contact = run(self.scene.model_copy(update={"method": method}), error=False)
+            values = np.column_stack([contact[name] for name in self.channels])
+        else:
+            answered = solved_rows(self.rows, partial(of_rows, self.scene), method, False)["forces"]
+            values = answered[:, [COLUMNS.index(name) for name in self.channels]]
+        return values, len(values) * method.cells**2
+
+    def answer(self, solution: tuple[np.ndarray, int]) -> Answer:
+        """Rows stand in for times; one row stands there twice, as a span of time has two ends."""
+        values, cells = solution
+        values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
+        return Answer(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
+
+    def lines(self, setting: Setting) -> list[str]:
+        """Cells and march."""
+        march = [f'march = "{setting.method}"'] if setting.method in MARCHES["fastsim"] else []
+        return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]
+
+
+def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, ...]) -> PricedContact:
+    """The scene with a quantity: forces fx, fy in the plane of the contact, or the moment mz."""
+    channels = tuple(name.strip() for name in (quantity or USUAL).split(","))
+    for name in channels:
+        if name not in UNITS:
+            raise InputError("--quantity", "", name, "is nothing that cells change", tuple(UNITS))
+    if len({UNITS[name] for name in channels}) > 1:
+        allowed = "has forces and a moment, of two units: one tolerance cannot hold for both"
+        raise InputError("--quantity", "", ",".join(channels), allowed)
+    if scene.method.name not in MARCHES:
+        allowed = "has no cells that could be chosen by their price; the study contact_price compares all theories"
+        raise InputError(scene.file, "method.name", scene.method.name, allowed, tuple(MARCHES))
+    return PricedContact(scene, channels, None if scene.cases is None else _sound_rows(scene))
+
+
+def _sound_rows(scene: ContactScene) -> Block:
+    """The first rows of a table that can be answered; InputError where there are none."""
+    file = scene.cases_file()
+    for block in islice(blocks(file, (BY_AXES, BY_CURVATURES), ROWS), 1):
+        coarse = scene.method.model_copy(update={"cells": CELLS[0]})
+        wrong = solved_rows(block, partial(of_rows, scene), coarse, False)["wrong"]
+        sound = np.setdiff1d(np.arange(len(block.lines)), wrong)
+        if len(sound):
+            columns = {name: column[sound] for name, column in block.values.items()}
+            return Block([block.lines[i] for i in sound], columns, {})
+    raise InputError(file, "", None, f"has no sound row among its first {ROWS:,}")

@@ -1,0 +1,65 @@
+"""Memory of a long table of contacts, which is answered as a stream.
+
+``python -m validation.price.contact_stream [ROWS ...]`` answers tables of so many rows, each in a fresh process, and
+prints what memory and time that takes; 10,000,000 rows need 2 GB of disk.
+"""
+
+import resource
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from models.contact.material import Pair
+from models.ensemble.workers import processes
+from models.systems.contact.cases_table import answer
+from models.systems.contact.run import Built
+from models.systems.contact.scene import Method
+
+ROWS = (100_000, 1_000_000)
+PERIOD = 1000
+"""Rows after which a table repeats itself."""
+HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
+
+
+class Taken(NamedTuple):
+    """Largest memory (bytes) of the process that answered, and seconds."""
+
+    memory: int
+    seconds: float
+
+
+def write(path: Path, rows: int) -> None:
+    """A table of creepages from rolling to sliding; rows : a multiple of PERIOD."""
+    lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(PERIOD))
+    text = "".join(lines)
+    with path.open("w") as file:
+        file.write(HEADER)
+        file.writelines(text for _ in range(rows // PERIOD))
+
+
+def answered(folder: Path, rows: int) -> Taken:
+    """Answer a table of so many rows into ``forces.csv``, without errors, on few cells."""
+    write(folder / "cases.csv", rows)
+    begun = time.perf_counter()
+    counts = answer(folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False)
+    if counts != {"rows": rows, "wrong": 0}:
+        raise AssertionError(f"{counts} in place of {rows} sound rows")
+    memory = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return Taken(memory, time.perf_counter() - begun)
+
+
+def in_fresh_process(function: Callable[[Path, int], Taken], rows: int) -> Taken:
+    """What a function of a folder and a number of rows gives in a process of its own."""
+    with TemporaryDirectory() as name, processes(1) as executor:
+        taken: Taken = executor.submit(function, Path(name), rows).result()
+        return taken
+
+
+if __name__ == "__main__":
+    for rows in map(int, sys.argv[1:]) if sys.argv[1:] else ROWS:
+        taken = in_fresh_process(answered, rows)
+        print(f"{rows:>12,} rows: {taken.memory / 1e6:.0f} MB, {taken.seconds:.0f} s", flush=True)

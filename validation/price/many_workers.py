@@ -1,0 +1,134 @@
+"""What a thousand workers would do: blocks of an ensemble in a simulated cluster, event by event.
+
+    command --(block's number)--> a free worker --(arrays)--> link --> command and its disk
+
+The command, with the scheduler beside it, and the link to it each serve a block at a time; workers compute beside one
+another. So many blocks are under way as ``models.ensemble.runner`` allows, none further before the first that is not
+back. Costs are those measured with two workers (``validation.price.two_workers``) for paths of 60 s at 1 kHz; rates of
+the link and the disk are assumed. ``python -m validation.price.many_workers`` prints the table of the docs.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
+
+import numpy as np
+
+from models.ensemble.runner import AHEAD
+
+PATH_SECONDS, PATH_BYTES = 0.8 / 50, 0.4e6 / 50
+"""A path of 60 s in a worker (s), and its states at 121 rows (bytes)."""
+FIXED, PER_BYTE = 12e-3, 2e-3 / 0.4e6
+"""Processor time of command and scheduler for a block of any size (s), and for each byte of it."""
+LINK, DISK = 1.25e9, 500e6
+"""Bytes per second into the command, by 10 Gbit/s, and onto its disk: assumed."""
+SCATTER = 0.1
+"""Standard deviation of a block's time, by its mean."""
+SEED = 25
+WORKERS = (2, 10, 100, 1000)
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Blocks of an ensemble: paths in each, and by how many times farther apart the rows are that travel."""
+
+    block: int = 50
+    thinned: int = 1
+
+    @property
+    def seconds(self) -> float:
+        """A block takes a worker so long."""
+        return self.block * PATH_SECONDS
+
+    @property
+    def bytes(self) -> float:
+        """What travels back of a block."""
+        return self.block * PATH_BYTES / self.thinned
+
+    @property
+    def stations(self) -> dict[str, float]:
+        """Seconds of a block at what serves one block at a time."""
+        return {"command": FIXED + PER_BYTE * self.bytes, "link": self.bytes / LINK, "disk": self.bytes / DISK}
+
+    @property
+    def most_workers(self) -> float:
+        """Workers that the slowest station can feed."""
+        return self.seconds / max(self.stations.values())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Share of the time for which workers compute, and for which each station is busy; blocks per second."""
+
+    workers: float
+    stations: dict[str, float]
+    rate: float
+
+    @property
+    def bottleneck(self) -> str:
+        """What is busiest."""
+        shares = {"workers": self.workers, **self.stations}
+        return max(shares, key=lambda name: shares[name])
+
+
+def simulated(ensemble: Ensemble, workers: int, blocks: int) -> Outcome:
+    """A run of so many blocks by so many workers, from the first block that is sent to the last that is kept."""
+    seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, SCATTER, blocks).clip(0.5, 1.5)
+    half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
+    idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
+    kept, first, sent, now = set[int](), 0, 0, 0.0
+    ahead = max(AHEAD, 2 * workers)
+
+    def serve(station: str, takes: float, then: str, block: int) -> None:
+        """Take a block as soon as the station is idle."""
+        idle[station] = max(idle[station], now) + takes
+        heappush(events, (idle[station], next(order), then, block))
+
+    while len(kept) < blocks:
+        while sent < min(blocks, first + ahead) and sent - len(kept) < ahead:
+            serve("command", half, "sent", sent)
+            sent += 1
+        now, _, event, block = heappop(events)
+        if event == "sent":
+            waiting.append(block)
+        elif event == "computed":
+            free += 1
+            serve("link", ensemble.stations["link"], "here", block)
+        elif event == "here":
+            serve("command", half, "taken", block)
+        elif event == "taken":
+            serve("disk", ensemble.stations["disk"], "kept", block)
+        else:
+            kept.add(block)
+            while first in kept:
+                first += 1
+        while free and waiting:
+            free -= 1
+            begun = waiting.pop(0)
+            heappush(events, (now + float(seconds[begun]), next(order), "computed", begun))
+    busy = {name: blocks * takes / now for name, takes in ensemble.stations.items()}
+    return Outcome(float(seconds.sum()) / (workers * now), busy, blocks / now)
+
+
+SETTINGS = {
+    "blocks of 50 paths, as they come": Ensemble(),
+    "`options.block=1000`": Ensemble(1000),
+    "`options.block=1000`, `options.rows=5`": Ensemble(1000, 10),
+    "`options.block=2000`, `options.rows=5`": Ensemble(2000, 10),
+}
+"""Ensembles of the table, by what a user types."""
+
+
+def table(rounds: int = 20) -> Iterator[str]:
+    """Rows of the table in the docs: share of the time for which workers compute, and what is busiest with the most of
+    them; rounds : blocks of each worker."""
+    for name, ensemble in SETTINGS.items():
+        outcomes = [simulated(ensemble, workers, rounds * workers) for workers in WORKERS]
+        shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
+        sent = outcomes[-1].rate * ensemble.bytes / 1e6
+        yield f"| {name} | {shares} | {outcomes[-1].bottleneck} | {sent:.0f} MB/s | {ensemble.most_workers:.0f} |"
+
+
+if __name__ == "__main__":
+    print("\n".join(table()))

@@ -1,0 +1,138 @@
+"""Two workers beside two lone processes: efficiency of the layer that shares blocks, and what a block costs it.
+
+Rounds alternate, in a random order: two processes that each take half of the blocks in one go and send nothing back,
+then the same blocks by two workers through ``models.ensemble.runner``, and through a Dask cluster of this machine where
+the extra ``cluster`` is installed. The efficiency is the ratio of the first's seconds to the others', with its 95 %
+interval. It says nothing on a machine with fewer than two idle cores.
+
+``python -m validation.price.two_workers [ROUNDS]`` prints it, with the seconds of the processor that a block costs the
+command, by the size of what a block sends.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, wait
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from models.ensemble.runner import Blocks, run_paths
+from models.ensemble.workers import cluster, processes
+from models.machine.timing import interleave, median, paired_ratio
+from models.systems.pitch_plane.noise_paths import noise_paths
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import force_scene, road_scene
+
+ROUNDS = 9
+PATHS, CUT = 400, Blocks(25)
+"""Paths of a turn and their blocks: about 3 s by two workers, and 8 blocks each."""
+SIZES = (1_000, 50_000, 500_000)
+"""Numbers that a block sends back, where its cost is told."""
+EMPTY = 100
+"""Blocks that do nothing but send."""
+
+
+def ensemble_job(duration: float = 60.0) -> Any:
+    """Noise paths of 60 s at 1 kHz of the half car on the road of the study, as ``run ensemble`` computes them."""
+    with TemporaryDirectory() as name:
+        write_measurement(run(road_scene(duration=duration), "reference"), Path(name), 1e-3)
+        scene = force_scene(Path(name), duration=duration, effects={"force_noise": {"deviation": 30.0, "seed": 3}})
+        return noise_paths(scene, np.linspace(0.0, duration, 121))
+
+
+def stretch(job: Any, numbers: list[int]) -> None:
+    """Blocks of a lone process, one after the other."""
+    for number in numbers:
+        job(CUT.block(number, PATHS))
+
+
+def lone(pools: list[Executor], job: Any) -> None:
+    """Half of the blocks in each of two processes."""
+    count = CUT.count(PATHS)
+    wait([pool.submit(stretch, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
+
+
+@dataclass(frozen=True)
+class Sender:
+    """A job of blocks that only send so many numbers."""
+
+    numbers: int
+
+    def __call__(self, paths: range) -> dict[str, np.ndarray]:
+        """Rows of zeros."""
+        return {"x": np.zeros((len(paths), self.numbers))}
+
+    def facts(self) -> dict[str, Any]:
+        """What a block depends on."""
+        return {"numbers": self.numbers}
+
+
+def cost_of_blocks(executor: Executor) -> dict[int, float]:
+    """Seconds of this process's processor for a block, by the numbers that it sends."""
+    costs = {}
+    for numbers in SIZES:
+        run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
+        begun = time.process_time()
+        run_paths(Sender(numbers), EMPTY, executor=executor, blocks=Blocks(1))
+        costs[numbers] = (time.process_time() - begun) / EMPTY
+    return costs
+
+
+@contextmanager
+def crews() -> Iterator[dict[str, Executor]]:
+    """Two workers of this machine, and two of a Dask cluster on it where that is installed."""
+    with ExitStack() as stack:
+        pools: dict[str, Executor] = {"processes": stack.enter_context(processes(2))}
+        with suppress(ImportError):
+            from distributed import LocalCluster
+
+            here = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+            local = stack.enter_context(here)
+            pools["Dask"] = stack.enter_context(cluster(local.scheduler_address))
+        yield pools
+
+
+def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+    """By crew: ``efficiency``, ``seconds`` of a turn, each with the ends of its interval; ``cost`` of a block (s)."""
+    job = ensemble_job() if job is None else job
+    with ExitStack() as stack, crews() as pools:
+        alone: list[Executor] = [stack.enter_context(processes(1)) for _ in range(2)]
+        turns: list[Callable[[], Any]] = [partial(lone, alone, job)]
+        turns += [partial(run_paths, job, PATHS, executor=pool, blocks=CUT) for pool in pools.values()]
+        seconds = interleave(turns, rounds)
+        return {
+            name: {
+                "efficiency": paired_ratio(seconds[0], took),
+                "seconds": median(took),
+                "cost": cost_of_blocks(pools[name]),
+            }
+            for name, took in zip(pools, seconds[1:], strict=True)
+        }
+
+
+def lines(told: dict[str, dict[str, Any]]) -> list[str]:
+    """The measurement in words."""
+    answer = []
+    for name, crew in told.items():
+        ratio, low, high = crew["efficiency"]
+        answer.append(
+            f"{name}: efficiency {ratio:.3f} ({low:.3f} to {high:.3f}) of two lone processes, "
+            f"{crew['seconds'][0]:.2f} s a turn"
+        )
+        answer += [
+            f"  a block of {8e-6 * n:.3g} MB: {1e3 * took:.2f} ms of the command" for n, took in crew["cost"].items()
+        ]
+    return answer
+
+
+if __name__ == "__main__":
+    print(f"{os.cpu_count()} cores; load before: {os.getloadavg()[0]:.2f}")
+    print("\n".join(lines(measured(int(sys.argv[1]) if sys.argv[1:] else ROUNDS))))
