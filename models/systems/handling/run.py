@@ -19,11 +19,11 @@ from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.native_parts import joint_parts
+from models.engines.towed_springs import divided, numbers_beside
 from models.multibody import forces as at
 from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
-from models.systems.handling.towed_springs import divided, numbers_beside
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of, spinning
 from models.vehicles.spatial import Freedom, JointElement, hitch_of
