@@ -19,7 +19,7 @@ from models.vehicles.spatial import SpatialVehicle, hitch_of
 from validation.braking.plain_sprung import towing
 from validation.braking.sprung_box import LOCKS, SPIN, braked, constant, steady
 
-SLIPPERY, GRIP = 0.05, 0.2
+SLIPPERY, GRIP = 0.05, 0.1
 """Friction under wheels that all lock, and under those of a caravan that brakes alone."""
 SETTLED = 0.4
 """Share of a stop over whose end a deceleration and loads are taken: springs and hitch are at rest before."""
