@@ -61,8 +61,8 @@ def test_a_torque_that_drives_is_refused():
 
 def test_compiled_samples_are_kept_on_disk_for_other_processes():
     """Numba knows a function by the cells of its closure too, and those of compiled functions differ by process."""
-    assert by_steps.py_func.__closure__ is None is by_lagging_steps.py_func.__closure__
-    assert by_steps.py_func.__qualname__ != by_lagging_steps.py_func.__qualname__
+    assert by_steps.march.py_func.__closure__ is None is by_lagging_steps.march.py_func.__closure__
+    assert by_steps.march.py_func.__qualname__ != by_lagging_steps.march.py_func.__qualname__
 
 
 def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one():

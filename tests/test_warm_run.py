@@ -66,6 +66,28 @@ print(json.dumps([refused, kept, wave.__name__]))
     assert last_line(code, ROOT) == [True, True, "wave"]
 
 
+def test_nothing_is_left_out_that_this_process_has_looked_for_already():
+    """A notebook that labels arrays and then calls the command: xarray keeps what it has seen of dask."""
+    code = """
+import json, sys, xarray
+from models.machine.left_out import OF_LABELS, leave_out
+leave_out(*OF_LABELS)
+print(json.dumps([name for name in OF_LABELS if name in sys.modules and sys.modules[name] is None]))
+"""
+    assert last_line(code, ROOT) == []
+
+
+def test_units_are_read_where_a_run_left_their_library_out():
+    code = """
+import json
+from models.machine.left_out import leave_out
+leave_out("pint")
+from models.measured.units import conversion
+print(json.dumps(conversion("kN", "force", "", "")))
+"""
+    assert last_line(code, ROOT) == 1000.0
+
+
 @pytest.mark.parametrize("kernel", ["coefficient_at", "_tabulated", "_narrow", "_long"])
 def test_linear_creep_compiles_each_of_kalkers_functions_once(coefficients, kernel):
     """Numbers that are written out in a call would give a function each: five times the compilation, 8 s of 20."""

@@ -9,13 +9,19 @@ from typing import Any
 
 OF_LABELS = ("dask", "pint")
 """Array libraries that xarray looks for."""
+SEEKER = "xarray"
+"""It keeps what it has seen: what it has looked for before must not be left out afterwards."""
 
 
 def leave_out(*names: str) -> None:
-    """Make libraries that are not imported yet count as not installed in this process, until they are let in."""
+    """Make libraries count as not installed in this process, until they are let in.
+
+    Those that are imported already stay, and all stay where xarray is: it may count on them.
+    """
     modules: dict[str, Any] = sys.modules
-    for name in names:
-        modules.setdefault(name, None)
+    if SEEKER not in modules:
+        for name in names:
+            modules.setdefault(name, None)
 
 
 def let_in(*names: str) -> None:

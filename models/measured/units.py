@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 from models.core.errors import InputError, suggestion
+from models.machine.left_out import let_in
 from models.measured.signal import UNITS, Quantity
 
 SPELT = {
@@ -107,6 +108,7 @@ def quantities(unit: str) -> tuple[Quantity, ...]:
 
 @cache
 def _registry() -> Any:
+    let_in("pint")
     import pint
 
     return pint.UnitRegistry()
