@@ -17,7 +17,7 @@ from models.systems.braking.of_scene import measured_of, plane_of
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import WHEELS, Stop
+from models.systems.braking.stop_report import Stop, wheel_names
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -66,7 +66,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             remarks = [f"    {error}"]
         except RunFailed as error:
             failed[f"{name}, figures of merit"] = str(error)
-        train = stop.of_hitch() if scene.trailer is not None else {}
+        train = stop.of_hitch()
         remarks += [f"    {key:<40}{value:>10.2f}" for key, value in train.items()]
         wheels = stop.of_wheels() | rim_speed_differences(measured, stop, rims)
         answer[name] = {
@@ -120,7 +120,7 @@ def lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np
     ]
     rows += [f"    ({NOT_CHECKED})"] if figures else []
     rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in figures else []
-    names = WHEELS[: stop.path.turning.shape[1]]
+    names = wheel_names(stop.path.turning.shape[1])
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
     return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheels.items()]
 

@@ -27,7 +27,7 @@ from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, sides, vehicle_of
 from models.systems.braking.plan import behind
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
+from models.systems.braking.stop_report import SLOWEST, Stop, wheel_names
 
 COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
@@ -53,7 +53,7 @@ def stop_figure(
     _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
     _wheels(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     if aside:
-        _angles(axes["angles"], stop, scene.trailer is not None)
+        _angles(axes["angles"], stop)
         axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
@@ -85,8 +85,8 @@ def _moves_aside(stop: Stop) -> bool:
 
 
 def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
-    for i, values in enumerate(rims.T):
-        axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=WHEELS[i])
+    for i, (name, values) in enumerate(zip(wheel_names(rims.shape[1]), rims.T, strict=True)):
+        axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=name)
     if measured is not None and measured.speeds is not None:
         for i, values in enumerate(measured.speeds.T):
             axis.plot(measured.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None)
@@ -95,8 +95,8 @@ def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressure
 
 
 def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
-    for i, row in enumerate(values.T):
-        axis.plot(times, row, color=COLOURS[i], lw=0.8, label=WHEELS[i])
+    for i, (name, row) in enumerate(zip(wheel_names(values.shape[1]), values.T, strict=True)):
+        axis.plot(times, row, color=COLOURS[i], lw=0.8, label=name)
     axis.set(xlabel="time [s]", ylabel=label, title=title)
 
 
@@ -110,23 +110,30 @@ def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
     axis.legend(fontsize=SMALL)
 
 
-def _angles(axis: Axes, stop: Stop, trailer: bool) -> None:
+def _angles(axis: Axes, stop: Stop) -> None:
     """Yaw, side slip and, of a train, the hitch."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color=VERMILION, label="side slip")
-    if trailer:
-        axis.plot(stop.times, np.degrees(stop.hitch), color=PINK, label="hitch")
+    if (hitch := stop.hitch) is not None:
+        axis.plot(stop.times, np.degrees(hitch), color=PINK, label="hitch")
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Angles to the direction of travel")
     axis.legend(fontsize=SMALL)
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
-    """Unit and corners (m, 2) in m in its axes: of the truck, the drawbar and the trailer's body."""
+    """Unit and corners (m, 2) in m in its axes: of the truck, the drawbar and the trailer's body, or of a vehicle on
+    its suspension and what it tows, each with a line to its hitch."""
     truck, trailer = vehicle_of(scene), scene.trailer
     boxes = [(0, _box(truck.front.x, truck.rear.x))]
     if trailer is not None:
         boxes += [(1, np.array([[trailer.drawbar, 0.0], [0.0, 0.0]])), (2, _box(trailer.front.x, trailer.rear.x))]
+    if scene.vehicle.file is not None:
+        plane = plane_of(scene)
+        for k in range(1, plane.masses.size):
+            axles = plane.place[plane.unit == k, 0]
+            line = np.array([[-plane.reach[k, k], 0.0], [float(axles.max()) + OVERHANG, 0.0]])
+            boxes += [(k, line), (k, _box(float(axles.max()), float(axles.min())))]
     return boxes
 
 
@@ -144,7 +151,8 @@ def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     """The path from above with the vehicle's outline now and then, on its surfaces."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
-    behind_it = 0.0 if scene.trailer is None else scene.trailer.drawbar - scene.trailer.hook
+    plane, drawn = plane_of(scene), outlines(scene)
+    behind_it = -float(plane.reach[-1, :-1].sum())
     first, last = x.min() - 6.0 - behind_it, x.max() + 6.0
     lacking = max(0.2 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
     low, high = low - lacking, high + lacking
@@ -163,10 +171,10 @@ def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
             )
             told.add(surface)
     axis.plot(x, y, color=DARK, label="centre of mass")
-    plane, drawn = plane_of(scene), outlines(scene)
+    units = stop.units
     for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
         for unit, corners in drawn:
-            axis.plot(*on_ground(unit, corners, stop.path.states[i, 0], plane).T, color=DARK, lw=0.7)
+            axis.plot(*on_ground(unit, corners, units[i], plane).T, color=DARK, lw=0.7)
     axis.set(
         xlabel="x [m]",
         ylabel="y [m]",

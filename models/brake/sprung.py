@@ -3,22 +3,30 @@
 Its coordinates begin with those of the plane vehicle of the same file, x, y and heading of its centre of mass in the
 design position; heave, roll and pitch of the chassis follow (see ``models.vehicles.free_vehicle``). Loads are those
 that springs and tyres have at the time. Wheels turn as in the plane and are no bodies of their own.
+
+What the vehicle tows is a unit of its own in the plane, hinged to the one before it: its heading is that of the vehicle
+and the yaws of all hitches up to its own. Surfaces under wheels, and the end of a stop, go by these units.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from models.brake.plane_vehicle import Axle, Truck
+from models.brake.plane_vehicle import Axle, Plane, Truck, truck
 from models.core.errors import InputError
 from models.multibody.numbers import Handling, Tyres
 from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
-from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
+from models.vehicles.spatial import Body, Freedom, SpatialVehicle, Tyre, Vector, hitch_of
 
 ROLL, PITCH = 4, 5
 """Places of the chassis' roll and pitch among the coordinates."""
+FOLD = math.pi / 2.0
+"""Yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
+MOST_WHEELS = 8
+"""Wheels of the longest train: a controller's frame has room for as many."""
 LEADING: tuple[tuple[str, Freedom], ...] = (
     (CARRIER, "x"),
     (CARRIER, "y"),
@@ -31,10 +39,14 @@ LEADING: tuple[tuple[str, Freedom], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Sprung:
-    """The vehicle as the engines build it, and the plane one that has its mass, axles and wheels."""
+    """The vehicle as the engines build it, and the plane one that has its mass, axles and wheels, without what it tows.
+
+    spins : (W,) kg m^2, of its wheels and of those of what it tows
+    """
 
     handling: Handling
     plane: Truck
+    spins: tuple[float, ...]
 
     @property
     def size(self) -> int:
@@ -46,38 +58,151 @@ class Sprung:
         """Names of the coordinates."""
         return tuple(" ".join(place) for place in self.handling.vehicle.coordinates())
 
+    @property
+    def turns(self) -> np.ndarray:
+        """(towed,) numbers of the coordinates by which what is towed yaws beside what tows it."""
+        return self._turning("rz")
 
-def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> Sprung:
-    """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel
+    @property
+    def leans(self) -> np.ndarray:
+        """Numbers of the coordinates of roll and pitch: of the chassis, then of what is towed beside what tows it."""
+        return np.concatenate(([ROLL, PITCH], self._turning("rx"), self._turning("ry")))
+
+    def _turning(self, freedom: Freedom) -> np.ndarray:
+        free = self.handling.vehicle
+        places = [(hitch_of(name), freedom) for name in free.towed]
+        known = free.coordinates()
+        return np.array([known.index(place) for place in places if place in known], dtype=np.int64)
+
+    def in_plane(self, transfer: bool = True) -> Plane:
+        """Numbers of the vehicle and its wheels in the plane; of a train loads are those at rest, by its springs.
+
+        Each hitch is taken to lie in the middle plane of what tows by it.
+        """
+        alone, free = truck(self.plane, transfer), self.handling.vehicle
+        if not free.towed:
+            return alone
+        units = [_unit(free, name) for name in (None, *free.towed)]
+        masses, inertias, centres = (np.array(column) for column in zip(*units, strict=True))
+        of = [free.towed_under(tyre.body) for tyre in free.tyres]
+        unit = np.array([0 if name is None else 1 + free.towed.index(name) for name in of])
+        place = np.array([tyre.point[:2] for tyre in free.tyres])
+        place[:, 0] -= centres[unit]
+        none = np.zeros(unit.size)
+        return alone._replace(
+            masses=masses,
+            inertias=inertias,
+            reach=_reach(np.array([free.body(hitch_of(name)).position[0] for name in free.towed]), centres),
+            unit=unit,
+            group=unit.copy(),
+            place=place,
+            radius=np.array([tyre.point[2] for tyre in free.tyres]),
+            spin=np.array(self.spins),
+            static=np.array([self.handling.held.tyres[tyre.name] for tyre in free.tyres]),
+            by_x=none,
+            by_y=none.copy(),
+            fold=FOLD,
+            units=np.arange(len(units)),
+        )
+
+
+def _reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """reach (U, U) of ``Plane``, m: hitches (U - 1,) and centres (U,) ahead of the vehicle's centre."""
+    reach = np.zeros((centres.size, centres.size))
+    for k in range(1, centres.size):
+        reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
+        reach[k, k] = centres[k] - hitches[k - 1]
+    return reach
+
+
+def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
+    """Mass (kg), yaw inertia (kg m^2) and place ahead (m) of the centre of a towed body with all that it carries, or of
+    the vehicle without what it tows."""
+    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
+    masses, places = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
+    x, y, _ = masses @ places / masses.sum()
+    return float(masses.sum()), _yaw_inertia(bodies, float(x), float(y)), float(x)
+
+
+def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
+    """Inertia (kg m^2) of bodies about the vertical through a place (m)."""
+    return sum(
+        body.inertia[2][2] + body.mass * ((body.position[0] - x) ** 2 + (body.position[1] - y) ** 2) for body in bodies
+    )
+
+
+def sprung(
+    vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
+) -> Sprung:
+    """A vehicle of two axles with two wheels each, and what it tows; spin_inertia (kg m^2): of a wheel
     whose tyre names none.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
-    here. Raises InputError for a vehicle of other axles, that tows, or that cannot be steered.
+    here; forces : whose the springs of what is towed are, see ``Handling``. Raises InputError for a vehicle of other
+    axles, that tows other than in a row, or that cannot be steered.
     """
-    if vehicle.towed:
-        allowed = "must not be towed: the wheels of a braked vehicle on its suspension are those of its chassis"
-        raise InputError(vehicle.name, f"bodies[{vehicle.towed[0]}].hitch", None, allowed)
-    tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
-    if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
-        left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])
-    ):
-        raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
-    inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
-    for tyre, inertia, beside in zip(tyres, inertias, (1, 0, 3, 2), strict=True):
-        if not inertia > 0.0 or inertia != inertias[beside]:
-            allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"
-            raise InputError(vehicle.name, f"tyres[{tyre.name}]", inertia, allowed)
+    tyres = _ordered(vehicle)
+    _check_row(vehicle)
+    inertias = _spins(vehicle.name, tyres, spin_inertia)
     centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
-    handling = Handling(centred, Tyres(spin_inertia=0.0))
+    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=forces)
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
         raise ValueError("the carrier and the sway are not the first bodies")
-    return Sprung(handling, _plane(centred, inertias[::2], front))
+    return Sprung(handling, _plane(centred, inertias, front), tuple(inertias))
+
+
+def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
+    """Tyres axle by axle, the left one first; InputError unless two are on each of the vehicle's two axles, and on
+    each one behind them, which is towed."""
+    tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
+    names, ahead = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
+    pairs = list(zip(tyres[::2], tyres[1::2], strict=False))
+    beside = all(left.axle == right.axle and left.point[1] > right.point[1] for left, right in pairs)
+    if not beside or [tyre.axle for tyre in tyres] != [k // 2 for k in range(2 * len(pairs))] or sum(ahead) != 4:
+        of_towed = ", and of each axle behind them that is towed" if vehicle.towed else ""
+        raise InputError(vehicle.name, "tyres", names, f"must be two of each of two axles{of_towed}")
+    if not all(ahead[:4]):
+        raise InputError(vehicle.name, "axles", names, "must be first those of the vehicle, then those of what it tows")
+    if len(tyres) > MOST_WHEELS:
+        allowed = f"must be at most {MOST_WHEELS} of a braked train on its suspension"
+        raise InputError(vehicle.name, "tyres", names, allowed)
+    return tyres
+
+
+def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
+    """Inertias (kg m^2) of the wheels of these tyres, axle by axle; InputError unless both of an axle are alike."""
+    inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
+    for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
+        if not inertia > 0.0 or inertia != inertias[number ^ 1]:
+            allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"
+            raise InputError(name, f"tyres[{tyre.name}]", inertia, allowed)
+    return inertias
+
+
+def _check_row(vehicle: SpatialVehicle) -> None:
+    """Refuse what is not towed in a row, or whose coupling does not yaw."""
+    before: str | None = None
+    for name in vehicle.towed:
+        hitch = vehicle.body(hitch_of(name))
+        if vehicle.towed_under(hitch.parent) != before:
+            allowed = f"must be on {before!r} or on what it carries: a braked train is a row"
+            raise InputError(vehicle.name, f"bodies[{name}].parent", hitch.parent, allowed)
+        if "rz" not in hitch.freedoms:
+            allowed = "must have rz: what is towed by a braked vehicle yaws beside it"
+            raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(hitch.freedoms), allowed)
+        before = name
+
+
+def alone(vehicle: SpatialVehicle) -> list[Body]:
+    """Bodies of a vehicle without those of what it tows."""
+    return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:
-    """(3,) m: centre of mass in the design position."""
-    masses = np.array([body.mass for body in vehicle.bodies])
-    return masses @ np.array([body.position for body in vehicle.bodies]) / masses.sum()
+    """(3,) m: centre of mass, in the design position, of a vehicle without what it tows."""
+    bodies = alone(vehicle)
+    masses = np.array([body.mass for body in bodies])
+    return masses @ np.array([body.position for body in bodies]) / masses.sum()
 
 
 PLACES = ("position", "point", "first_point", "second_point", "point_left", "point_right")
@@ -101,11 +226,8 @@ def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
 
 
-def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
-    """The plane vehicle of a centred one."""
-    turn = sum(
-        body.inertia[2][2] + body.mass * (body.position[0] ** 2 + body.position[1] ** 2) for body in vehicle.bodies
-    )
+import math
+from collections.abc import Sequence
     front_axle, rear_axle = (
         Axle(
             x=left.point[0],
@@ -115,12 +237,12 @@ def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float
             roll_share=share,
         )
         for left, right, inertia, share in zip(
-            vehicle.tyres[::2], vehicle.tyres[1::2], spin_inertias, (front, 1.0 - front), strict=True
+            vehicle.tyres[:4:2], vehicle.tyres[1:4:2], spin_inertias[:4:2], (front, 1.0 - front), strict=True
         )
     )
     return Truck(
-        mass=sum(body.mass for body in vehicle.bodies),
-        yaw_inertia=turn,
+        mass=sum(body.mass for body in bodies),
+        yaw_inertia=_yaw_inertia(bodies, 0.0, 0.0),
         height=float(centre(vehicle)[2]),
         front=front_axle,
         rear=rear_axle,

@@ -6,7 +6,7 @@ method around the compiled forces, the tyres' mean ones held at their contacts a
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
 then what the wheels hold, see ``WheelForces``. What the road has beside the moment that speeds up a wheel's turning is
-on the chassis: brakes hold on to it, and locked wheels do."""
+on the chassis, or on the towed body that carries the wheel: brakes hold on to it, and locked wheels do."""
 
 from collections.abc import Callable
 from types import FunctionType
@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE
+from models.brake.advance import AT_REST, FINE, FOLDED
 from models.brake.plane_records import TURNING, Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
-from models.brake.sprung import PITCH, ROLL
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
 from models.machine.compiled import inlined, lean, named, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,
+    CARRYING,
     COUNT,
     HEADER,
     JOINTS,
@@ -46,7 +46,7 @@ from models.multibody.forces import (
     touch,
 )
 from models.multibody.moving_vehicle import WheelContact
-from models.multibody.tree import dot, three, times, twist
+from models.multibody.tree import PER_LINK, dot, three, times, twist
 
 HELD = 4
 """Numbers that each wheel holds."""
@@ -111,7 +111,8 @@ def held_forces(numbers, q, v, f, contacts):
         contacts.across[i], contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
         creeping[0], creeping[1] = held.force_x[i], held.force_y[i]
         creep(tyre_row, creeping, vehicle, wheel)
-        twist(vehicle.chassis, vehicle.tree.ground, times(three(way, AXLE), -held.moment[i]))
+        carrying = row(vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
+        twist(carrying, vehicle.tree.ground, times(three(way, AXLE), -held.moment[i]))
     leave(numbers, vehicle)
 
 
@@ -167,6 +168,42 @@ OVER, GAVE_UP = 6, 7
 """How a sample may end besides: the vehicle turns over; the engine gives up."""
 UPRIGHT = 0.5
 """Roll and pitch (rad) beyond which the vehicle turns over."""
+PLANE = 3
+"""The first coordinates: x, y and heading of the vehicle."""
+
+
+class Units(NamedTuple):
+    """The vehicle and what it tows as units in the plane.
+
+    turns (U - 1,) : numbers of the coordinates by which each one behind yaws beside the one before; leans (L,) : of
+    those of roll and pitch; motion (2, 2 + U) : place of the first and headings of all, and their rates.
+    """
+
+    turns: np.ndarray
+    leans: np.ndarray
+    motion: np.ndarray
+
+
+@lean
+def to_units(whole, turns, plane):
+    """Fill values (2 + U,) of the ``Units`` from those of all coordinates (n,): positions, rates or accelerations."""
+    for a in range(PLANE):
+        plane[a] = whole[a]
+    for k in range(turns.size):
+        plane[PLANE + k] = plane[PLANE + k - 1] + whole[turns[k]]
+
+
+@inlined
+def ended(q, units, fold):
+    """Whether positions (n,) leave the vehicle FINE, or how they end a run: it turns over, or a train jackknifes."""
+    status = FINE
+    for k in range(units.turns.size):
+        if not abs(q[units.turns[k]]) <= fold:
+            status = FOLDED
+    for k in range(units.leans.size):
+        if not abs(q[units.leans[k]]) <= UPRIGHT:
+            status = OVER
+    return status
 
 
 class OnEngine(NamedTuple):
@@ -174,7 +211,7 @@ class OnEngine(NamedTuple):
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
-    its model; lag : of ``models.brake.sprung_relaxation``, empty where tyres answer at once.
+    its model; units : ``Units``; lag : of ``models.brake.sprung_relaxation``, empty where tyres answer at once.
     """
 
     numbers: np.ndarray
@@ -185,6 +222,7 @@ class OnEngine(NamedTuple):
     rates: np.ndarray
     liveliness: float
     engine: Any
+    units: Units
     lag: Any = ()
 
 
@@ -212,16 +250,18 @@ def advance(motion, torques, step, steer, vehicle, course):
     taken to change as they did in the last one.
     """
     angles, known, contacts, middle = vehicle.tables.angles, course.known, course.contacts, course.middle
-    wheels = known.wheels
+    wheels, units = known.wheels, course.units
     q, v, turning, accelerations = motion.state[0], motion.state[1], motion.turning, motion.accelerations
-    rates, size = course.rates, accelerations.size
+    rates, turns, plane = course.rates, units.turns, units.motion
     regular, half, time = vehicle.slope * course.liveliness * step, 0.5 * step, 0.0
     if not accelerations.any():
         wheels.rate[:] = 0.0
     known.held.steer[:] = steer
     for n in range(torques.shape[0] - 1):
         before, after = torques[n], torques[n + 1]
-        under_wheels(motion.state, step, vehicle, known.surfaces)
+        to_units(q, turns, plane[0])
+        to_units(v, turns, plane[1])
+        under_wheels(plane, step, vehicle, known.surfaces)
         course.forces[:] = 0.0
         held_forces(course.numbers, q, v, course.forces, contacts)
         wheels.start[:] = contacts.along
@@ -229,11 +269,13 @@ def advance(motion, torques, step, steer, vehicle, course):
         meet(contacts, regular, known.surfaces.lag, angles, wheels)
         hold(known, before, 0.5 * (before + after), half, motion, vehicle)
         accelerate(course.engine, q, v, rates)
-        accelerations[:] = rates[:size]
-        rest = comes_to_rest(v[:size], turning, accelerations, step, vehicle.plane)
+        to_units(rates, turns, accelerations)
+        rest = comes_to_rest(plane[1], turning, accelerations, step, vehicle.plane)
         if rest >= 0.0:
             q += rest * v + 0.5 * rest**2 * rates
-            v[:size], turning[:] = 0.0, 0.0
+            v[:PLANE], turning[:] = 0.0, 0.0
+            for k in range(turns.size):
+                v[turns[k]] = 0.0
             if rest < step:
                 return AT_REST, time + rest
         else:
@@ -247,8 +289,9 @@ def advance(motion, torques, step, steer, vehicle, course):
                 return GAVE_UP, time
             turning[:] = motion.report[TURNING]
         time += step
-        if not max(abs(q[ROLL]), abs(q[PITCH])) <= UPRIGHT:
-            return OVER, time
+        status = ended(q, units, vehicle.plane.fold)
+        if status != FINE:
+            return status, time
     return FINE, time
 
 

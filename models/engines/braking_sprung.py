@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from models.brake.advance import FOLDED
 from models.brake.plane_records import KNOWN, PlaneMotion, Wheels, motion_of
 from models.brake.samples import moved
-from models.brake.sprung import Sprung
+from models.brake.sprung import FOLD, Sprung
 from models.brake.sprung_step import (
     GAVE_UP,
     HELD,
     OVER,
+    PLANE,
     UPRIGHT,
     AtWheels,
     Contacts,
     OnEngine,
+    Units,
     WheelForces,
     advance,
     advance_with,
@@ -28,6 +31,7 @@ from models.brake.sprung_step import (
     hold,
     meet,
     set_held,
+    to_units,
 )
 from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
@@ -36,6 +40,7 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
+from models.engines.towed_springs import divided, numbers_beside
 from models.vehicles.spatial_linear import linearise, mass
 
 if TYPE_CHECKING:
@@ -46,13 +51,24 @@ BLINK = 1e-5
 """s: time over which wheels that only roll are looked at."""
 
 
+def driven(vehicle: Sprung, engine: str) -> Driven:
+    """The vehicle for "exudyn" or "mujoco": what the engine has of springs, and the table of all other forces."""
+    handling = vehicle.handling
+    division = divided(handling, engine)
+    wheels = np.zeros(HELD * len(handling.vehicle.tyres))
+    table = np.concatenate((numbers_beside(handling, division), wheels))
+    native = (*joint_parts(handling.vehicle), *division.native)
+    return Driven(handling.vehicle, handling.gravity, table, held, set_held, native)
+
+
 class OnSprings:
     """The vehicle in an engine; ``advance`` stands in for the compiled one of that name, with all coordinates."""
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
-        handling, self.wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
-        self._table = np.concatenate((handling.numbers, np.zeros(HELD * self.wheels)))
+        self.wheels = len(vehicle.handling.vehicle.tyres)
+        self._driven = driven(vehicle, engine)
+        self._units = Units(vehicle.turns, vehicle.leans, np.zeros((2, PLANE + vehicle.turns.size)))
         self._allowed = set[float]()
 
     @cached_property
@@ -64,7 +80,7 @@ class OnSprings:
         handling, size = self.vehicle.handling, self.size
         contacts, across = Contacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
         for j, rate in enumerate(np.eye(size)):
-            held_forces(self._table, np.zeros(size), rate, np.zeros(size), contacts)
+            held_forces(self._driven.numbers, np.zeros(size), rate, np.zeros(size), contacts)
             across[:, j] = contacts.across
         loads = np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
         damping = np.linalg.solve(mass(handling.vehicle), across.T @ (loads[:, None] * across))
@@ -73,9 +89,7 @@ class OnSprings:
     @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
-        handling = self.vehicle.handling
-        parts = joint_parts(handling.vehicle)
-        return free_model(self.engine, Driven(handling.vehicle, handling.gravity, self._table, held, set_held, parts))
+        return free_model(self.engine, self._driven)
 
     def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called
@@ -104,6 +118,7 @@ class OnSprings:
             np.zeros(size),
             self.liveliness,
             engine or self._model,
+            self._units,
         )
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
@@ -130,7 +145,7 @@ class OnSprings:
         """
         go, _ = self._go(lag is not None)
         with self._model.at_step(step):
-            status, time = go(motion, torques, step, steer, vehicle, self._on_engine._replace(lag=lag or ()))
+            status, time = go(motion, torques, step, steer, _alike(vehicle), self._on_engine._replace(lag=lag or ()))
         return self._sound(status, time), time
 
     def moving(
@@ -152,7 +167,7 @@ class OnSprings:
             from models.brake.sprung_relaxation import ContactLag
 
             on_engine = on_engine._replace(lag=ContactLag(*lag, np.zeros(1)))
-        rows = by_steps(commands, record, sample, braking, motion, vehicle, on_engine)
+        rows = by_steps(commands, record, sample, braking, motion, _alike(vehicle), on_engine)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)
@@ -172,6 +187,8 @@ class OnSprings:
     def _sound(self, status: int, time: float) -> int:
         if status == OVER:
             raise RunFailed(self.engine, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+        if status == FOLDED:
+            raise RunFailed(self.engine, f"the train jackknifes: a hitch yaws by more than {FOLD:.2f} rad", time)
         if status == GAVE_UP:
             raise RunFailed(self.engine, "the engine gave up", time)
         return status
@@ -185,8 +202,15 @@ class OnSprings:
         known.held.steer[:] = steer
         held_forces(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
         turning = on_engine.contacts.along / vehicle.plane.radius
-        under_wheels(state, 0.0, vehicle, known.surfaces)
+        for whole, of_units in zip(state, on_engine.units.motion, strict=True):
+            to_units(whole, on_engine.units.turns, of_units)
+        under_wheels(on_engine.units.motion, 0.0, _alike(vehicle), known.surfaces)
         known.wheels.start[:] = on_engine.contacts.along
         meet(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
-        hold(known, none, none, BLINK, motion_of(state, turning), vehicle)
+        hold(known, none, none, BLINK, motion_of(state, turning), _alike(vehicle))
         return self._model.acceleration(0.0, *state), turning
+
+
+def _alike(vehicle: OnRoad) -> OnRoad:
+    """The vehicle in the one type for which steps are compiled, whatever it tows: they do not count its units."""
+    return vehicle._replace(plane=vehicle.plane._replace(units=(0,)))

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE
+from models.brake.advance import AT_REST, FINE, FOLDED
 from models.brake.plain.pressure import Pressures
 from models.brake.plain.step import BLINK, OVER, UPRIGHT, Course, Moving, Steps
 from models.brake.plain.suspension import Suspension
 from models.brake.plane_records import PlaneMotion
 from models.brake.samples import Braking, Commands, Record
-from models.brake.sprung import Sprung
+from models.brake.sprung import FOLD, Sprung
 from models.brake.surfaces import OnRoad
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
@@ -63,13 +63,15 @@ class PlainOnSprings:
             time += used
             if status == OVER:
                 raise RunFailed(NAME, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+            if status == FOLDED:
+                raise RunFailed(NAME, f"the train jackknifes: a hitch yaws by more than {FOLD:.2f} rad", time)
             if status == AT_REST:
                 return AT_REST, time
         return FINE, time
 
     def _moving(self, motion: PlaneMotion, lag: "Lagging | None") -> Moving:
         """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
-        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3], lag)
+        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations, lag)
 
     def moving(
         self,

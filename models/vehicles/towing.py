@@ -1,6 +1,6 @@
-"""What a towed body weighs on its hitch."""
+"""What a towed body weighs on its hitch, and a line of a plan on both."""
 
-from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial import SpatialVehicle, hitch_of
 from models.vehicles.spatial_linear import Preloads
 
 
@@ -11,3 +11,12 @@ def hitch_load(vehicle: SpatialVehicle, held: Preloads, towed: str) -> float:
     """
     weight = sum(body.mass for body in vehicle.bodies if towed in vehicle.chain(body.name)) * vehicle.gravity
     return weight - sum(held.tyres[tyre.name] for tyre in vehicle.tyres if towed in vehicle.chain(tyre.body))
+
+
+def hitch_line(vehicle: SpatialVehicle, held: Preloads, towed: str) -> str:
+    """Text on a towed body: what tows it, where and how it turns there, and what it weighs on its hitch (N)."""
+    hitch, load = vehicle.body(hitch_of(towed)), hitch_load(vehicle, held, towed)
+    x, y, z = hitch.position
+    towing = vehicle.chain(towed)[2]
+    turns = " ".join(hitch.freedoms)
+    return f"{towed}, towed by {towing} at ({x:g}, {y:g}, {z:g}) m, turns {turns}; {load:.0f} N on it"

@@ -70,7 +70,7 @@ def load_vehicle(
             "has a table [reduced], which only the study ride of linear vehicles reads: name the whole vehicle here",
         )
     if vehicle.towed and not towing:
-        allowed = f"tows {vehicle.towed[0]!r} by a hitch, which only the system handling drives: name a vehicle alone"
+        allowed = f"tows {vehicle.towed[0]!r} by a hitch, which only handling and braking drive: name a vehicle alone"
         raise InputError(file, place, name, allowed)
     return vehicle
 

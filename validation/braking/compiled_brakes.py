@@ -11,11 +11,12 @@ from models.brake.plane_vehicle import PAPER, Plane, truck
 from models.brake.relaxation import Lag
 from models.brake.relaxation import lag_on as compiled_lag_on
 from models.brake.sprung import Sprung
-from models.brake.sprung_step import HELD, held, set_held
+from models.brake.sprung_step import HELD
 from models.brake.surfaces import EVEN, OnRoad, Road, surfaces
 from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.braking_sprung import driven
+from models.engines.free_vehicle import FreeModel, free_model
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
 
@@ -65,12 +66,10 @@ def lag_on(
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
     """A vehicle on its suspension in an engine, around the compiled forces; ``wheel_forces_in`` its table is what its
     wheels hold."""
-    handling = vehicle.handling
-    table = np.concatenate((handling.numbers, np.zeros(HELD * len(handling.vehicle.tyres))))
-    return free_model(engine, Driven(handling.vehicle, handling.gravity, table, held, set_held))
+    return free_model(engine, driven(vehicle, engine))
 
 
-def wheel_forces_in(numbers: np.ndarray) -> WheelForces:
-    """Constant quantities of four wheels in a table of numbers: views, to read and to write."""
-    rows = numbers[-4 * HELD :].reshape(HELD, 4)
+def wheel_forces_in(numbers: np.ndarray, wheels: int = 4) -> WheelForces:
+    """Constant quantities of so many wheels in a table of numbers: views, to read and to write."""
+    rows = numbers[-wheels * HELD :].reshape(HELD, wheels)
     return WheelForces(rows[0], rows[1:3].T, rows[3])

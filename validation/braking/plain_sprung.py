@@ -9,7 +9,6 @@ from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plain.suspension import Suspension, WheelForces
-from models.brake.plane_vehicle import truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
 from models.brake.surfaces import EVEN, Stretch, road
@@ -23,10 +22,11 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.compiled_brakes import in_engine, wheel_forces_in
 from validation.braking.sprung_box import SPIN, car, steady
 from validation.spatial.cars import twin
+from validation.spatial.trains import caravan, train
 
 STATES, SEED = 100, 22
 LENGTHS = np.array([0.4, 0.4, 0.3, 0.3])
-"""m, over which tyres relax where they do."""
+"""m, over which tyres relax where they do; those of what is towed as the last one."""
 LEAN = 0.3
 """rad: largest roll and pitch of the states."""
 
@@ -52,17 +52,44 @@ def bent() -> Sprung:
     return sprung(replace(whole, springs=springs, tyres=tyres), SPIN)
 
 
+@cache
+def towing() -> Sprung:
+    """The car with the caravan on its ball, without drag."""
+    return sprung(replace(caravan(), drags=()), SPIN)
+
+
+@cache
+def in_row() -> Sprung:
+    """The twin with a trailer of a drawbar and a box, all of it without symmetry."""
+    return sprung(train(), SPIN)
+
+
+@cache
+def compiled_springs() -> Sprung:
+    """The twin with its trailer, all of whose springs are compiled forces."""
+    return sprung(train(), SPIN, forces="compiled")
+
+
 VEHICLES = {"car": car, "twin": asymmetric, "bent": bent}
+TRAINS = {"caravan": towing, "train": in_row, "compiled train": compiled_springs}
+EVERY = {**VEHICLES, **TRAINS}
 
 
-def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, list[WheelForces]]:
+def wheels_of(vehicle: Sprung) -> int:
+    """How many wheels a vehicle has, with those of what it tows."""
+    return len(vehicle.handling.vehicle.tyres)
+
+
+def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
     """Random coordinates and rates (count, 2, size) at any heading, and what is held at their wheels."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(SEED)
     both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
     both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
     both[:, 0, 4:6], both[:, 1, :2] = random.uniform(-LEAN, LEAN, (count, 2)), random.normal(0.0, 15.0, (count, 2))
     kept = [
-        WheelForces(random.normal(0.0, 0.2, 4), random.normal(0.0, 3e3, (4, 2)), random.normal(0.0, 300.0, 4))
+        WheelForces(
+            random.normal(0.0, 0.2, wheels), random.normal(0.0, 3e3, (wheels, 2)), random.normal(0.0, 300.0, wheels)
+        )
         for _ in range(count)
     ]
     return both, kept
@@ -71,16 +98,17 @@ def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray
 @cache
 def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
     """(count, n) by plain code."""
-    suspension = Suspension(VEHICLES[vehicle]())
-    both, kept = states(suspension.size, count)
+    suspension = Suspension(EVERY[vehicle]())
+    both, kept = states(suspension.size, count, len(suspension.tyres))
     return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
 
 
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
     """(count, n) by an engine around the compiled forces."""
     model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
-    rows = wheel_forces_in(model.numbers)
-    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count), strict=True)):
+    wheels = wheels_of(vehicle)
+    rows = wheel_forces_in(model.numbers, wheels)
+    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count, wheels), strict=True)):
         rows.steer[:], rows.forces[:], rows.spun[:] = kept_state.steer, kept_state.forces, kept_state.spun
         computed[i] = model.acceleration(0.0, *state)
     return computed
@@ -99,31 +127,32 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
     )
-    four = np.ones(4)
+    plane = vehicle.in_plane()
+    each, ahead = np.ones(plane.wheels), np.arange(plane.wheels) < 2
     return on_tyres(
-        truck(vehicle.plane),
+        plane,
         [surface(name) for name in ("wet", "dry", "ice")],
-        of_wheels(front, front, rear, rear),
-        Chambers(0.05 * four, 0.04 * four, 6.0, 0.5 * four, 200.0, 3e-3),
+        of_wheels(front, front, *[rear] * (plane.wheels - 2)),
+        Chambers(0.05 * each, 0.04 * each, 6.0, 0.5 * each, 200.0, 3e-3),
         road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
-        steer=np.array([0.05, 0.05, 0.0, 0.0]),
+        steer=np.where(ahead, 0.05, 0.0),
         substeps=2,
         engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
         sprung=vehicle,
-        relaxation=LENGTHS if lags else None,
+        relaxation=np.where(ahead, LENGTHS[0], LENGTHS[-1]) if lags else None,
     )
 
 
-def controller(valves: bool) -> Controller:
+def controller(valves: bool, wheels: int = 4) -> Controller:
     """Valves that a slip controller sets, or pressures that stay."""
-    return SlipBangBang(wheels=4) if valves else steady(*4 * (4e4,))
+    return SlipBangBang(wheels=wheels) if valves else steady(*wheels * (4e4,))
 
 
 def run(
     vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
     """Run so many seconds of a stop from a speed (m/s)."""
-    return vehicle_on(vehicle, engine, valves, lags).run(controller(valves), speed, duration)
+    return vehicle_on(vehicle, engine, valves, lags).run(controller(valves, wheels_of(vehicle)), speed, duration)
 
 
 @cache
@@ -131,7 +160,7 @@ def plain_run(
     vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
     """``run`` by plain code."""
-    return run(VEHICLES[vehicle](), "reference", duration, valves, speed, lags)
+    return run(EVERY[vehicle](), "reference", duration, valves, speed, lags)
 
 
 def paths_apart(first: BrakingPath, other: BrakingPath) -> float:
@@ -152,7 +181,7 @@ def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np
         on_suspension = vehicle_on(vehicle, engine, False)
         turn = steady_turn(replace(on_suspension, road=EVEN), speed, radius)
         if turn is None:
-            rows.append(np.full(8 + 2 * vehicle.size, np.nan))
+            rows.append(np.full(2 * wheels_of(vehicle) + 2 * vehicle.size, np.nan))
         else:
             rows.append(np.concatenate((turn.steer, turn.start.turning, turn.start.state.ravel())))
     return rows[0], rows[1]

@@ -8,7 +8,7 @@ import numpy as np
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Pressures
 from models.brake.plane_records import REPORTED, PlaneMotion
-from models.brake.plane_vehicle import GRAVITY, truck
+from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
 from models.engines.braking_sprung import OnSprings
@@ -86,7 +86,7 @@ def constant(mu: float) -> TyreTable:
 
 
 def steady(*torques: float) -> Pressures:
-    """Torques (4,) in N m of the brakes of ``braked``, which stay."""
+    """Torques (W,) in N m of the brakes of ``braked``, which stay."""
     return Pressures(np.array(torques) / GRADIENT)
 
 
@@ -103,13 +103,14 @@ def braked(
 
     steer : rad, of the front wheels; gradient : N m/bar. A controller of valves has SUPPLY.
     """
-    brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
+    brake, plane = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), sprung.in_plane()
+    none = np.zeros(plane.wheels)
     return on_tyres(
-        truck(sprung.plane),
+        plane,
         [tyre],
-        of_wheels(brake, brake, brake, brake),
+        of_wheels(*[brake] * plane.wheels),
         Chambers(none + 0.03, none + 0.02, SUPPLY),
-        steer=np.array([steer, steer, 0.0, 0.0]),
+        steer=np.where(np.arange(plane.wheels) < 2, steer, 0.0),
         substeps=substeps,
         sample=step,
         engine=None if engine is None else OnSprings(engine, sprung),
@@ -119,7 +120,8 @@ def braked(
 
 def stays(vehicle: Braked, path: BrakingPath, duration: float = 2.0) -> float:
     """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
-    motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3), np.zeros((REPORTED, 4)))
+    rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORTED, vehicle.plane.wheels))
+    motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), rates, report)
     torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0
     for _ in range(round(duration / vehicle.sample)):
         vehicle.engine.advance(motion, torques, vehicle.sample, vehicle.steer, vehicle.on_road)

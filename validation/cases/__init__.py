@@ -75,6 +75,7 @@ CASES = (
     "braking_controllers",
     "braking_engines",
     "braking_suspension",
+    "braking_trailer",
     "braking_relaxation",
     "braking_reference",
     "twin_files",

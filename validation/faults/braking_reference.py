@@ -64,8 +64,8 @@ def _table(change: Callable[[Handling], None]) -> Patch:
     """The car's table of numbers changed after it was packed."""
 
     def packed(real: Any) -> Any:
-        def make(*given: Any) -> Handling:
-            handling: Handling = real(*given)
+        def make(*given: Any, **more: Any) -> Handling:
+            handling: Handling = real(*given, **more)
             change(handling)
             return handling
 

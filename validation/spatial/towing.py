@@ -28,11 +28,19 @@ class TurnErrors:
 
 
 def levers_error() -> float:
-    """Largest error of the shipped caravan's load on the ball and of all axle loads, over those of its levers.
+    """Largest error of the shipped caravan's load on the ball and of all axle loads, over those of its levers."""
+    car = Handling(caravan())
+    free, (towed,) = car.vehicle, car.vehicle.towed
+    loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
+    loads.append(hitch_load(free, car.held, towed))
+    return max(abs(load / lever - 1.0) for load, lever in zip(loads, levers(car), strict=True))
+
+
+def levers(car: Handling) -> list[float]:
+    """Loads (N) of a car's front and rear axle, of its caravan's axle and of the ball, by levers.
 
     About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
     """
-    car = Handling(caravan())
     free, (towed,) = car.vehicle, car.vehicle.towed
     front, rear, axle = car.given.axles
     weights = np.array(
@@ -43,10 +51,7 @@ def levers_error() -> float:
     ball = float(w.sum()) - borne
     w, x, _ = weights[weights[:, 2] == 0.0].T
     behind = (float(w @ (front - x)) + ball * (front - hitch)) / (front - rear)
-    wanted = [float(w.sum()) + ball - behind, behind, borne, ball]
-    loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
-    loads.append(hitch_load(free, car.held, towed))
-    return max(abs(load / lever - 1.0) for load, lever in zip(loads, wanted, strict=True))
+    return [float(w.sum()) + ball - behind, behind, borne, ball]
 
 
 def towed_turn(

@@ -41,3 +41,16 @@ def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) 
     begin = place[0] + 1j * place[1] + complex_points
     end = begin + step * (rates[0] + 1j * rates[1] + 1j * rates[2] * complex_points)
     return np.stack([np.column_stack((ends.real, ends.imag)) for ends in (begin, end)], axis=1)
+
+
+def in_row(place: np.ndarray, rates: np.ndarray, reach: np.ndarray, unit: int) -> tuple[np.ndarray, np.ndarray]:
+    """x, y and heading (3,) of a unit's centre, and their rates, from those (2 + U,) of a row of units.
+
+    reach (U,) : m, from the first centre to this one along each unit.
+    """
+    arms = reach * np.exp(1j * place[2:])
+    centre, speed = arms.sum(), (1j * rates[2:] * arms).sum()
+    return (
+        np.array([place[0] + centre.real, place[1] + centre.imag, place[2 + unit]]),
+        np.array([rates[0] + speed.real, rates[1] + speed.imag, rates[2 + unit]]),
+    )

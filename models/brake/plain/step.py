@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE
-from models.brake.plain.road import under_wheels, ways
+from models.brake.advance import AT_REST, FINE, FOLDED
+from models.brake.plain.road import in_row, under_wheels, ways
 from models.brake.plain.suspension import Suspension, TyreContact, WheelForces
 from models.brake.plain.tyre import Braked, Surface, WheelMotion, tyre
 from models.brake.surfaces import OnRoad
@@ -19,9 +19,9 @@ from models.multibody.plain.march import march
 if TYPE_CHECKING:
     from models.brake.plain.relaxation import Lagging
 
-SPINS, LEANS, UPRIGHT, OVER = 6, slice(4, 6), 0.5, 6
-"""Column of a wheel's report with its turning; places of roll and pitch; where they turn the vehicle over (rad), and
-the status of that."""
+SPINS, UPRIGHT, OVER = 6, 0.5, 6
+"""Column of a wheel's report with its turning; roll and pitch that turn the vehicle over (rad), and the status of
+that."""
 BLINK = 1e-5
 """s: time over which wheels that only roll are looked at."""
 
@@ -39,7 +39,7 @@ class Course:
 @dataclass(eq=False)
 class Moving:
     """A vehicle on its way, all moved in place: state (2, n), turning (W,) in rad/s, changes (W,) of the speeds along
-    the wheels (m/s^2), reports (W, 7), accelerations (3,) of the first coordinates, and what lags of its tyres."""
+    the wheels (m/s^2), reports (W, 7), accelerations (2 + U,) of its units, and what lags of its tyres."""
 
     state: np.ndarray
     turning: np.ndarray
@@ -65,36 +65,48 @@ class Steps:
             moving.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
         held = self._hold(moving, contacts, starts, under, middle, half)
         rates = self.vehicle.acceleration(q, v, held)
-        moving.accelerations[:] = rates[: moving.accelerations.size]
+        moving.accelerations[:] = self._of_units(rates)
         rest = self.rests(moving)
         if rest is not None:
             moving.state[0] += rest * v + 0.5 * rest**2 * rates
-            moving.state[1, : moving.accelerations.size], moving.turning[:] = 0.0, 0.0
-            return (AT_REST, rest) if rest < self.step else (self._upright(moving), self.step)
+            moving.state[1, [0, 1, 2, *self.vehicle.turns]], moving.turning[:] = 0.0, 0.0
+            return (AT_REST, rest) if rest < self.step else (self._status(moving), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
         moving.changes[:] = (speeds(contacts) - starts) / half
         held = self._hold(moving, contacts, starts, under, torques, self.step)
         after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
         moving.state[:], moving.turning[:] = after.reshape(2, -1), moving.report[:, SPINS]
-        return self._upright(moving), self.step
+        return self._status(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
-        moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(3))
+        moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
         under = self._under(state, 0.0)
         held = self._hold(moving, contacts, starts, under, none, self.step)
         return self.vehicle.acceleration(state[0], state[1], held), moving.turning
 
-    def _upright(self, moving: Moving) -> int:
-        return FINE if np.abs(moving.state[0, LEANS]).max() <= UPRIGHT else OVER
+    def _status(self, moving: Moving) -> int:
+        """How a step ends: the vehicle leans too far, a train folds, or neither."""
+        q, fold = moving.state[0], self.course.on.plane.fold
+        if not np.abs(q[self.vehicle.leans]).max() <= UPRIGHT:
+            return OVER
+        return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
+
+    def _of_units(self, whole: np.ndarray) -> np.ndarray:
+        """(2 + U,) of all coordinates' values: x and y, and headings, of what is towed with all yaws before it."""
+        return np.concatenate((whole[:2], np.cumsum([whole[2], *whole[self.vehicle.turns]])))
 
     def _under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels, which go straight on for a time (s)."""
-        places = self.course.on.plane.place
-        return under_wheels(self.course.on.road, ways(state[0, :3], state[1, :3], places, time), self.course.on.kind)
+        plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
+        paths = np.empty((plane.wheels, 2, 2))
+        for k in range(plane.masses.size):
+            mine = plane.unit == k
+            paths[mine] = ways(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
+        return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
         return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
@@ -122,8 +134,8 @@ class Steps:
 
     def rests(self, moving: Moving) -> float | None:
         """Time (s) within the step at which the plane motion has least energy, where it was about to end in it."""
-        plane, v, a = self.course.on.plane, moving.state[1, :3], moving.accelerations
-        weights = np.array([plane.masses.sum(), plane.masses.sum(), plane.inertias[0]])
+        plane, v, a = self.course.on.plane, self._of_units(moving.state[1]), moving.accelerations
+        weights = np.array([plane.masses.sum(), plane.masses.sum(), *plane.inertias])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
         if speed == 0.0 and not moving.turning.any():
             return 0.0

@@ -1,8 +1,9 @@
 """Bodies, springs and contacts of a braked vehicle on its suspension, in plain code.
 
 Bodies and springs are those of the independent reference, ``models.multibody.plain``. Here its tyres stand on a flat
-road: discs about axles that keep to the carrier's heading, turned by the steering, with loads along the vertical at the
-wheels' centres and held forces at the contacts. See ``models.brake.sprung_step`` for what is held.
+road: discs about axles that keep to the heading of the carrier, or of the towed body that they are on, turned by the
+steering, with loads along the vertical at the wheels' centres and held forces at the contacts. See
+``models.brake.sprung_step`` for what is held.
 """
 
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ class WheelForces:
 
 
 class Suspension:
-    """A vehicle on its springs and tyres."""
+    """A vehicle on its springs and tyres; turns, leans : numbers of its coordinates, see ``Sprung``."""
 
     def __init__(self, vehicle: Sprung) -> None:
         free = vehicle.handling.vehicle
@@ -58,15 +59,15 @@ class Suspension:
         self.held, self._joint_held = np.split(held, [len(self.parts.names)])
         self._joints = joint_rows(self.bodies, free)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(free)
+        self.turns, self.leans = vehicle.turns, vehicle.leans
         self._gravity = -free.gravity * UP
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
-        self._carrier = self.bodies.row[CARRIER]
         given = vehicle.handling.given
         chassis = chassis_of(given)
-        self._chassis, self._centre = (
-            self.bodies.row[chassis.name],
-            self.bodies.points([(chassis.name, chassis.position)]),
-        )
+        towed = [free.towed_under(tyre.body) for tyre in free.tyres]
+        self._carrier, self._towed = self.bodies.row[CARRIER], [self.bodies.row[name] if name else 0 for name in towed]
+        self._carrying = [self.bodies.row[name or chassis.name] for name in towed]
+        self._centre = self.bodies.points([(chassis.name, chassis.position)])
         self._drag = 0.5 * given.drags[0].coefficient if given.drags else 0.0
 
     @property
@@ -76,17 +77,27 @@ class Suspension:
 
     def contacts(self, motion: PlainMotion, steer: np.ndarray) -> list[TyreContact]:
         """Contact of every tyre, whose wheels are steered (W,) in rad."""
-        hubs, heading = motion.at(self._hubs), motion.axes(self._carrier)[PLACE]
-        return [self._contact(i, hub, motion, heading, float(steer[i])) for i, hub in enumerate(hubs)]
+        hubs = motion.at(self._hubs)
+        return [self._contact(i, hub, motion, float(steer[i])) for i, hub in enumerate(hubs)]
 
-    def _contact(self, i: int, hub: np.ndarray, motion: PlainMotion, heading: np.ndarray, steer: float) -> TyreContact:
+    def _heading(self, i: int, motion: PlainMotion) -> np.ndarray:
+        """Axes (3, 3) of the body to whose heading a wheel keeps: the carrier, or a towed body, about the vertical."""
+        if not self._towed[i]:
+            carrier: np.ndarray = motion.axes(self._carrier)[PLACE]
+            return carrier
+        ahead = motion.axes(self._towed[i])[PLACE][:2, 0]
+        cosine, sine = ahead / np.hypot(*ahead)
+        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+    def _contact(self, i: int, hub: np.ndarray, motion: PlainMotion, steer: float) -> TyreContact:
+        heading = self._heading(i, motion)
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         along = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
-        hub_turning, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._chassis)
+        hub_turning, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._carrying[i])
         turning = hub_turning + axle * (
             axle @ (carrying - hub_turning)
-        )  # the rim does not turn beside the chassis about its axle
+        )  # the rim does not turn beside what carries the wheel about its axle
         sliding = hub[RATE] + height * round_the_vertical(turning)
         return TyreContact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
 
@@ -116,7 +127,7 @@ class Suspension:
         return forces
 
     def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:
-        """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to the chassis."""
+        """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to what carries them."""
         hubs, total = motion.at(self._hubs), np.zeros(self.size)
         for i, contact in enumerate(self.contacts(motion, constant.steer)):
             creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
@@ -124,7 +135,7 @@ class Suspension:
             rolling = contact.axle * (contact.axle @ moment)
             total += hubs[i, FIRST:] @ (creep + contact.load * UP)
             total += motion.by_moment(int(self._hubs.rows[i]), moment - rolling)
-            total += motion.by_moment(self._chassis, rolling - contact.axle * constant.spun[i])
+            total += motion.by_moment(self._carrying[i], rolling - contact.axle * constant.spun[i])
         return total
 
     def liveliness(self) -> float:

@@ -97,6 +97,8 @@ def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
     vehicle, lengths = on_one(scene, surface, trailer=None), axles(scene)
+    if vehicle.sprung is not None and vehicle.sprung.turns.size:
+        raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
     front, rear = adhesion_front(_rate(scene, vehicle, 0), lengths), adhesion_rear(_rate(scene, vehicle, 1), lengths)
     if scene.trailer is None:
         return Adhesion(front, rear)

@@ -16,7 +16,7 @@ from models.core.result import Result
 from models.systems.braking.march import Braked
 from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
+from models.systems.braking.stop_report import HITCH, SLOWEST, Stop, wheel_names
 
 WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves to and fro."""
@@ -48,7 +48,12 @@ CORNERING = 1e-3
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
     """Assumptions of a braking procedure, with the vehicle that drives it."""
-    parts = (_of_loads(scene), _of_bodies(scene, vehicle), _of_tyres(scene, vehicle), _of_brakes(scene, procedure))
+    parts = (
+        _of_loads(scene),
+        _of_bodies(scene, vehicle),
+        _of_tyres(scene, vehicle),
+        _of_brakes(scene, procedure, vehicle),
+    )
     return [*chain.from_iterable(parts), *_of_drive(scene, vehicle)]
 
 
@@ -132,6 +137,16 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
             "of an axle's load",
             most=LIFTED,
         )
+    if vehicle.sprung is not None and vehicle.sprung.turns.size:
+        yield Assumption(
+            "hitch",
+            "the vehicle and what it tows do not touch",
+            "brake the vehicle less than what it tows, or steer less",
+            _hitches,
+            "rad",
+            -BENT,
+            BENT,
+        )
     if vehicle.sprung is not None and _stopless(vehicle):
         yield Assumption(
             "travel",
@@ -153,6 +168,11 @@ def _stopless(vehicle: Braked) -> bool:
 def _hinges(run: Result) -> Watched:
     bends = np.diff(run.detail.states[:, 0, 2:], axis=1)
     return dict(zip(("drawbar against the truck", "trailer against the drawbar"), bends.T, strict=True))
+
+
+def _hitches(run: Result) -> Watched:
+    columns = {name: i for i, name in enumerate(run.detail.coordinates) if name.endswith(HITCH)}
+    return {name.removesuffix(HITCH): run.detail.states[:, 0, i] for name, i in columns.items()}
 
 
 def _by_hook(scene: BrakingScene, run: Result) -> Watched:
@@ -215,7 +235,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
     return {"vehicle": np.where((angles > CORNERING) & (Stop(run.detail).speed < least), least, np.nan)}
 
 
-def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
+def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator[Assumption]:
     """Assumptions on pressures, torques and the valves behind them."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
@@ -241,11 +261,11 @@ def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
             "range of the signals",
             "wheel speeds are within the range of their converter",
             "raise port.signals.range",
-            lambda run: _of_wheels(np.abs(run["turning"]) * radii(scene, run)),
+            lambda run: _of_wheels(np.abs(run["turning"]) * vehicle.plane.radius),
             "m/s",
             most=port.signals.range,
         )
-    measured = measured_of(scene, procedure, 4 if scene.trailer is None else 8)
+    measured = measured_of(scene, procedure, vehicle.plane.wheels)
     if measured is not None:
         yield Assumption(
             "measured pressures",
@@ -263,12 +283,6 @@ def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
         "J",
         most=HOT,
     )
-
-
-def radii(scene: BrakingScene, run: Result) -> np.ndarray:
-    """Radius (W,) of each wheel in m."""
-    bodies = [body for body in (vehicle_of(scene), scene.trailer) if body is not None]
-    return np.array([axle.radius for body in bodies for axle in (body.front, body.rear) for _ in range(2)])
 
 
 def _heat(run: Result) -> Watched:
@@ -293,7 +307,7 @@ def _of_drive(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
         "still air",
         "the air takes little of the vehicle's energy",
         "brake from less speed: no effect adds the air's drag",
-        partial(_air, scene),
+        partial(_air, scene, float(vehicle.plane.masses.sum())),
         "of the kinetic energy",
         most=LOST,
     )
@@ -313,10 +327,10 @@ def _steer(vehicle: Braked, run: Result) -> Watched:
     return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run.times])}
 
 
-def _air(scene: BrakingScene, run: Result) -> Watched:
-    """Work of the drag on a box as wide as the track and twice as high as the centre of mass, by the first energy."""
+def _air(scene: BrakingScene, mass: float, run: Result) -> Watched:
+    """Work of the drag on a box as wide as the track and twice as high as the centre of mass, by the first energy of
+    the whole mass (kg)."""
     truck, stop = vehicle_of(scene), Stop(run.detail)
-    mass = truck.mass + (0.0 if scene.trailer is None else scene.trailer.mass + scene.trailer.drawbar_mass)
     drag = 0.5 * AIR * DRAG * truck.front.track * 2.0 * truck.height
     work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
     return {"vehicle": np.full(1, work / (0.5 * mass * stop.speed[0] ** 2))}
@@ -324,7 +338,7 @@ def _air(scene: BrakingScene, run: Result) -> Watched:
 
 def _of_wheels(values: np.ndarray) -> Watched:
     """Columns (n, W) by the wheels' names."""
-    return dict(zip(WHEELS, values.T, strict=False))
+    return dict(zip(wheel_names(values.shape[1]), values.T, strict=True))
 
 
 def _fast(run: Result, values: np.ndarray) -> np.ndarray:

@@ -74,23 +74,31 @@ def _check_lags(scene: BrakingScene, vehicle: Braked, shortest: float) -> None:
 
 
 def plane_of(scene: BrakingScene) -> Plane:
-    """Numbers of the truck, or of the truck and its trailer."""
-    vehicle, transfer = vehicle_of(scene), scene.load_transfer is not None
+    """Numbers of the truck, or of the truck and its trailer, or of a vehicle on its suspension with what it tows."""
+    transfer = scene.load_transfer is not None
+    if scene.vehicle.file is not None:
+        plane: Plane = sprung_of(scene).in_plane(transfer)
+        return plane
+    vehicle = vehicle_of(scene)
     try:
         return truck(vehicle, transfer) if scene.trailer is None else train(vehicle, scene.trailer, transfer)
     except InputError as error:
         raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
 
+def given_of(scene: BrakingScene) -> Any:
+    """The vehicle of the scene's file with what it tows, a ``SpatialVehicle``; None where the scene names no file."""
+    from models.own_model.scene_vehicle import scene_vehicle
+
+    name = scene.vehicle.file
+    return None if name is None else scene_vehicle(name, scene.folder, scene.file, "vehicle.file", towing=True)
+
+
 def sprung_of(scene: BrakingScene) -> Any:
     """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
     from models.brake.sprung import sprung
-    from models.own_model.scene_vehicle import scene_vehicle
 
-    vehicle = scene.vehicle
-    return sprung(
-        scene_vehicle(str(vehicle.file), scene.folder, scene.file, "vehicle.file"), float(vehicle.spin_inertia or 0.0)
-    )
+    return sprung(given_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
 
 
 def on_springs(engine: str, vehicle: Any) -> Any:

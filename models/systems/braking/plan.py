@@ -118,7 +118,7 @@ def describe(scene: BrakingScene) -> str:
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
     if file is not None:
-        lines += [_line(*line) for line in _shares(scene)]
+        lines += [_line(*line) for line in (*_towed(scene), *_shares(scene))]
     assumed = {assumption.says: assumption for name in scene.procedures for assumption in _assumed(scene, name)}
     return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
 
@@ -126,15 +126,27 @@ def describe(scene: BrakingScene) -> str:
 def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
     """Which forces of a suspended vehicle engines compute by native elements, which all engines share, and which are
     independent."""
-    from models.engines.free_vehicle import native_share
+    from models.engines.free_vehicle import ENGINES, native_share
+    from models.engines.towed_springs import divided
 
-    whole = sprung_of(scene).handling.vehicle
+    handling = sprung_of(scene).handling
+    divisions = {engine: divided(handling, engine) for engine in ENGINES}
+    beside = [(engine, *each) for engine, division in divisions.items() for each in division.reasons.items()]
     return [
-        *(("read", note) for note in whole.notes),
-        *native_share(whole),
+        *(("read", note) for note in handling.vehicle.notes),
+        *native_share(handling.vehicle, {engine: division.native for engine, division in divisions.items()}),
+        *(("shared", f"{engine}: {name}: {why}") for engine, name, why in beside),
         ("shared", "tyres, wheels that turn, brakes and the road: no engine has them"),
         ("reference", "plain code that shares no force with them, where --engine reference asks for it"),
     ]
+
+
+def _towed(scene: BrakingScene) -> list[tuple[str, str]]:
+    """Lines on what a suspended vehicle tows; places are ahead of the vehicle's centre of mass."""
+    from models.vehicles.towing import hitch_line
+
+    handling = sprung_of(scene).handling
+    return [("trailer", hitch_line(handling.vehicle, handling.held, name)) for name in handling.vehicle.towed]
 
 
 def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:

@@ -202,6 +202,7 @@ def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | No
     if vehicle.sprung is not None:
         guess = np.zeros(vehicle.engine.size - 1)
         guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
+        guess[vehicle.sprung.turns - 1] = np.diff(state[0, 2:])
         circle = Circle(vehicle, speed, radius, sprung=True)
         unknown, steady = circle.settled(guess)
     return circle.turn(unknown) if steady else None

@@ -14,7 +14,7 @@ from models.systems.braking.march import Braked, BrakingPath, Start
 from models.systems.braking.of_scene import on_springs
 from models.systems.braking.procedures import answers, engines_of, looped, ready
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import WHEELS
+from models.systems.braking.stop_report import wheel_names
 
 REPORTS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle": "rad"}
 """Channels of what wheels report of the last step of every sample, with their units."""
@@ -94,7 +94,7 @@ def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, se
         {
             "time": Channel("time", path.times, "s"),
             "coordinate": Channel("coordinate", list(path.coordinates)),
-            "wheel": Channel("wheel", list(WHEELS[: path.turning.shape[1]])),
+            "wheel": Channel("wheel", list(wheel_names(path.turning.shape[1]))),
         },
         engine=engine,
         counts={"samples": samples, "steps": samples * scene.run.substeps},

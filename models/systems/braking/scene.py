@@ -85,7 +85,7 @@ class BrakeTable(Strict):
 
 
 class BrakesTable(Strict):
-    """[brakes]: of each axle, of all wheels of a trailer, and the pressure that the pedal lets through."""
+    """[brakes]: of each axle, of all wheels of what is towed, and the pressure that the pedal lets through."""
 
     front: BrakeTable = BrakeTable(gradient=1500.0)
     rear: BrakeTable = BrakeTable(gradient=1200.0)
@@ -149,6 +149,10 @@ class RunTable(Strict):
 
     sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
     substeps: int = Field(default=4, ge=1, le=1000, description="steps of the vehicle within a sample")
+    forces: Literal["native", "compiled"] = Field(
+        default="native",
+        description="springs of what vehicle.file tows: the engine's own as far as it has them, or compiled forces",
+    )
     duration: float = quantity("s", "after which a run ends that does not stop", default=60.0)
 
 
@@ -226,6 +230,8 @@ def _of_vehicle(scene: BrakingScene) -> Refusals:
     if vehicle.file is None:
         if vehicle.spin_inertia is not None:
             yield "vehicle.spin_inertia", vehicle.spin_inertia, "has no meaning without vehicle.file"
+        if "forces" in scene.run.model_fields_set:
+            yield "run.forces", scene.run.forces, "has no meaning without vehicle.file: nothing has springs"
         return
     if vehicle.spin_inertia is None and not str(vehicle.file).endswith(MJCF):
         yield "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it"

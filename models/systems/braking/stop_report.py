@@ -11,20 +11,24 @@ import numpy as np
 from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
 from models.systems.braking.march import BrakingPath
 
-WHEELS = (
-    "front left",
-    "front right",
-    "rear left",
-    "rear right",
-    "trailer front left",
-    "trailer front right",
-    "trailer rear left",
-    "trailer rear right",
-)
+WHEELS = "front left", "front right", "rear left", "rear right"
+TOWED_WHEELS = {
+    0: (),
+    2: ("trailer left", "trailer right"),
+    4: ("trailer front left", "trailer front right", "trailer rear left", "trailer rear right"),
+}
+"""Names of the wheels of what is towed, by their number."""
+HITCH = " hitch rz"
+"""End of the names of coordinates by which a towed body yaws beside what tows it."""
 SLOWEST = 1.0
 """m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
 LIMITS = (0.2, 0.5)
 """Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
+
+
+def wheel_names(count: int) -> tuple[str, ...]:
+    """Names of the wheels of a vehicle that has so many with those of what it tows."""
+    return (*WHEELS, *TOWED_WHEELS[count - len(WHEELS)])
 
 
 @dataclass(frozen=True)
@@ -111,17 +115,30 @@ class Stop:
         }
 
     @property
-    def hitch(self) -> np.ndarray:
-        """Angle (n,) of the drawbar of a train against its truck in rad, positive to the left."""
-        return self.path.states[:, 0, 3] - self.path.states[:, 0, 2]
+    def units(self) -> np.ndarray:
+        """Positions (n, 2 + U): of the first unit's centre (m), and the headings (rad) of all, on a suspension too."""
+        places = self.path.states[:, 0]
+        if self.lean is None:
+            return places
+        yaws = [2, *(i for i, name in enumerate(self.path.coordinates) if name.endswith(HITCH))]
+        return np.column_stack((places[:, :2], np.cumsum(places[:, yaws], axis=1)))
+
+    @property
+    def hitch(self) -> np.ndarray | None:
+        """Angle (n,) in rad, positive to the left, of what is towed first against the vehicle; None without a train."""
+        units = self.units
+        return units[:, 3] - units[:, 2] if units.shape[1] > 3 else None
 
     def of_hitch(self) -> dict[str, float]:
-        """Results of a train's hitch over a stop, by name and unit."""
-        largest = _peak(self.hitch)
+        """Results of a train's hitch over a stop, by name and unit; none of a vehicle that tows nothing."""
+        hitch = self.hitch
+        if hitch is None:
+            return {}
+        largest = _peak(hitch)
         return {
-            "largest hitch angle [deg]": float(np.degrees(self.hitch[largest])),
+            "largest hitch angle [deg]": float(np.degrees(hitch[largest])),
             "largest hitch angle at [s]": float(self.times[largest]),
-            "final hitch angle [deg]": float(np.degrees(self.hitch[-1])),
+            "final hitch angle [deg]": float(np.degrees(hitch[-1])),
         }
 
     def of_wheels(self) -> dict[str, np.ndarray]:

@@ -5,13 +5,12 @@ from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES, native_share
+from models.engines.towed_springs import divided
 from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
-from models.systems.handling.towed_springs import divided
 from models.vehicles.plausible import plausible
-from models.vehicles.spatial import hitch_of
-from models.vehicles.towing import hitch_load
+from models.vehicles.towing import hitch_line
 
 
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
@@ -38,7 +37,7 @@ def describe(scene: HandlingScene) -> str:
             "vehicle",
             f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
         ),
-        *(_line("trailer", _trailer(first, name)) for name in free.towed),
+        *(_line("trailer", hitch_line(free, first.held, name)) for name in free.towed),
         _line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
         _line(
             "road",
@@ -68,13 +67,6 @@ def _native_shares(handling: Handling) -> list[tuple[str, str]]:
         for name, why in division.reasons.items()
     ]
     return [*native_share(handling.vehicle, native), *reasons]
-
-
-def _trailer(handling: Handling, name: str) -> str:
-    hitch, load = handling.vehicle.body(hitch_of(name)), hitch_load(handling.vehicle, handling.held, name)
-    x, y, z = hitch.position
-    towing = handling.vehicle.chain(name)[2]
-    return f"{name}, towed by {towing} at ({x:g}, {y:g}, {z:g}) m, turns {' '.join(hitch.freedoms)}; {load:.0f} N on it"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

@@ -19,12 +19,12 @@ from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.native_parts import joint_parts
+from models.engines.towed_springs import divided, numbers_beside
 from models.multibody import forces as at
 from models.multibody.numbers import Control, Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.limits import check_step, check_upright
 from models.systems.handling.scene import HandlingScene
-from models.systems.handling.towed_springs import divided, numbers_beside
 from models.vehicles.free_vehicle import chassis_of
 from models.vehicles.spatial import JointElement
 from models.vehicles.spatial_linear import mass

@@ -7,6 +7,7 @@ many hold the controller in the loop.
 from typing import Any
 
 from models.core.scene_effects import Entry, Table
+from models.systems.handling.effects import without_trailer
 
 AXLES = ("front", "rear", "trailer")
 NOISE, BITS, SCALE = ("noise",), ("bits", "range"), ("gain", "offset")
@@ -118,6 +119,14 @@ def _with_trailer(table: Table, scene: Any) -> None:
     from models.brake.trailer import CHOSEN
 
     table["trailer"] = CHOSEN.model_dump(exclude_unset=True)
+
+
+def _tows(scene: Any) -> bool:
+    """Whether the vehicle of a file has bodies with a hitch."""
+    from models.systems.braking.of_scene import given_of
+
+    given = given_of(scene)
+    return given is not None and bool(given.towed)
 
 
 MEASURED, SUSPENSION = ("measured_pressures",), ("suspension",)
@@ -297,13 +306,21 @@ TABLE = {
         ("port",),
         usual={},
     ),
+    "towed": Entry(
+        "Bodies that the vehicle of a file tows by a hitch, on springs and wheels of their own",
+        "vehicle.file",
+        "the coordinates of its hitch and wheels, and a tyre, a brake and a chamber per wheel",
+        needs=SUSPENSION,
+        there=_tows,
+        leave_out=without_trailer,
+    ),
     "trailer": Entry(
         "A drawbar trailer of two axles behind the truck",
         "trailer",
         "two coordinates and four wheels more",
         {"coordinates": 2, "wheels": 4},
         excludes=SUSPENSION,
-        why="whose springs carry that vehicle, alone",
+        why="whose file says what it tows",
         put_in=_with_trailer,
     ),
     "valve_delay": Entry(

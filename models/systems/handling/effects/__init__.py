@@ -36,7 +36,7 @@ ALONE, TOWING = "r19_free", "r19_caravan"
 """Shipped vehicles, the second of which is the first with a caravan."""
 
 
-def _without_trailer(table: Table, scene: Any) -> None:
+def without_trailer(table: Table, scene: Any) -> None:
     """The shipped car without its caravan; what is left of a file of the user's is for the user to say."""
     if scene.vehicle.file != TOWING:
         allowed = "has bodies with a hitch: name a vehicle file without them"
@@ -44,7 +44,7 @@ def _without_trailer(table: Table, scene: Any) -> None:
     table["vehicle"]["file"] = ALONE
 
 
-def _with_trailer(table: Table, scene: Any) -> None:
+def with_trailer(table: Table, scene: Any) -> None:
     """The shipped caravan behind the shipped car."""
     if scene.vehicle.file != ALONE:
         allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
@@ -101,7 +101,7 @@ TABLE = {
         "the coordinates of its hitch, wheels and spins, and a tyre per wheel",
         {"coordinates": 7, "towed bodies": 1, "wheels": 2},
         there=lambda scene: bool(scene.given().towed),
-        leave_out=_without_trailer,
-        put_in=_with_trailer,
+        leave_out=without_trailer,
+        put_in=with_trailer,
     ),
 }

@@ -1,0 +1,108 @@
+"""A car that brakes with its caravan on their suspensions: what closed forms say of both, and runs of them.
+
+The closed forms are statics of two bodies on a ball, with the forces of inertia of a steady deceleration. They take
+masses, places and nothing else from the vehicle's description, and share no code with what computes the runs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.sprung import Sprung
+from models.multibody import forces as at
+from models.multibody.numbers import Handling
+from models.systems.braking.march import BrakingPath
+from models.vehicles.spatial import SpatialVehicle, hitch_of
+from validation.braking.plain_sprung import towing
+from validation.braking.sprung_box import LOCKS, SPIN, braked, constant, steady
+
+SLIPPERY, GRIP = 0.05, 0.1
+"""Friction under wheels that all lock, and under those of a caravan that brakes alone."""
+SETTLED = 0.4
+"""Share of a stop over whose end a deceleration and loads are taken: springs and hitch are at rest before."""
+
+
+@dataclass(frozen=True)
+class Pulled:
+    """A caravan that brakes alone: deceleration (m/s^2) of the train, load (N) of the caravan's axle, and force (N) by
+    which the caravan pulls at the ball."""
+
+    deceleration: float
+    load: float
+    pull: float
+
+
+def locked_stop(speed: float = 1.5) -> tuple[float, float]:
+    """Way (m) of a stop from a speed (m/s) with all wheels locked, and that by friction alone, v^2 / (2 mu g)."""
+    path = braked(towing(), constant(SLIPPERY)).run(steady(*6 * (LOCKS,)), speed)
+    return float(path.states[-1, 0, 0]), speed**2 / (2.0 * SLIPPERY * GRAVITY)
+
+
+def pulled_by_levers() -> Pulled:
+    """A caravan that brakes alone by its levers: moments about the ball, and momentum of the train.
+
+    With N under its axle l behind the ball, its mass m2 c behind and d above that, the ball h above the road, and a
+    deceleration a = mu N / M, M all masses and what the car's rolling wheels count for,
+
+        l N + h mu N + d m2 a = c m2 g.
+    """
+    vehicle = towing().handling.given
+    (name,) = vehicle.towed
+    car, behind = _mass(vehicle, None), _mass(vehicle, name)
+    hitch, axle = np.array(vehicle.body(hitch_of(name)).position), vehicle.axles[2]
+    rolling = sum(SPIN / tyre.point[2] ** 2 for tyre in vehicle.tyres if tyre.axle < 2)
+    whole = car[0] + behind[0] + rolling
+    back, above = hitch[0] - behind[1], behind[2] - hitch[2]
+    arm = hitch[0] - axle + GRIP * (hitch[2] + above * behind[0] / whole)
+    load = back * behind[0] * GRAVITY / arm
+    slowing = GRIP * load / whole
+    return Pulled(slowing, load, (car[0] + rolling) * slowing)
+
+
+def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
+    """Mass (kg) of the car or of what it tows, and place of its centre ahead and above the road (m)."""
+    bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
+    masses = np.array([body.mass for body in bodies])
+    x, _, z = masses @ np.array([body.position for body in bodies]) / masses.sum()
+    return float(masses.sum()), float(x), float(z)
+
+
+def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> Pulled:
+    """A run in MuJoCo of a caravan that brakes alone, all its wheels locked; change : plants a fault in the table."""
+    vehicle = towing() if change is None else towing.__wrapped__()
+    if change is not None:
+        change(vehicle.handling)
+    path = braked(vehicle, constant(GRIP)).run(steady(0.0, 0.0, 0.0, 0.0, LOCKS, LOCKS), 8.0, duration)
+    late = slice(-int(SETTLED * len(path.times)), None)
+    times, speeds = path.times[late], path.states[late, 1, 0]
+    slowing = float(speeds[0] - speeds[-1]) / float(times[-1] - times[0])
+    load = float(path.reports.load[late, 4:].sum(axis=1).mean())
+    return Pulled(slowing, load, _pull(vehicle, path, late, slowing))
+
+
+def _pull(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
+    """Force (N) at the ball by the balance of the caravan alone: its tyres' drag less what its own mass takes."""
+    mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
+    return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing
+
+
+def hold_on_to_the_car(car: Handling) -> None:
+    """Plant a fault: brakes of the caravan hold on to the car."""
+    for i in range(4, len(car.vehicle.tyres)):
+        car.tyre_numbers(i)[at.CARRYING] = car.tyre_numbers(0)[at.CARRYING]
+
+
+@cache
+def errors() -> Pulled:
+    """A caravan that brakes alone, over its levers, less 1."""
+    return beside(pulled(), pulled_by_levers())
+
+
+def beside(run: Pulled, wanted: Pulled) -> Pulled:
+    """Each of a run over what is wanted, less 1."""
+    return Pulled(
+        run.deceleration / wanted.deceleration - 1.0, run.load / wanted.load - 1.0, run.pull / wanted.pull - 1.0
+    )

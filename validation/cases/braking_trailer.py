@@ -1,0 +1,152 @@
+"""A car that brakes with a caravan, on suspensions: levers, locked wheels, plain equations, control, and faults."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.brake.controllers.slip import SlipBangBang
+from models.systems.braking.stop_report import Stop
+from models.tyre.magic_formula import surface
+from validation.braking import plain_sprung as whole
+from validation.braking import sprung_train as train
+from validation.braking.sprung_box import braked, constant, steady
+from validation.common.rows import Observed, Row, System, behaves
+from validation.spatial.towing import keep_to_the_car, levers
+
+TITLE = "Braking with a trailer on the suspension"
+SYSTEM: System = "anti-lock"
+ENGINES = ("mujoco", "exudyn")
+SHORT, LONG = 0.05, 1.0
+"""s of a stop, in the quick share and in the full one."""
+STATICS = 1e-3
+"""Of the closed form of a caravan that brakes alone, which knows no lean: pitched by 2.7 mrad its centre of mass, half
+a metre above the ball, comes ahead by 5e-4 of its arm."""
+WHY = "another algorithm in plain code; they differ by rounding"
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Loads, and accelerations and a piece of a stop in one engine; in the full run locked wheels, control, faults, the
+    train, both routes of its springs, and longer stops in both engines."""
+    vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
+    rows = [_levers_row()]
+    rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
+    rows += [_stop_row(vehicle, engine, SHORT if quick else LONG) for vehicle in vehicles[:2] for engine in engines]
+    if not quick:
+        rows += [_locked_row(), *_alone_rows(), *_control_rows(), *_fault_rows()]
+    return rows, {}
+
+
+def _levers_row() -> Row:
+    car = whole.towing()
+    path = braked(car, constant(0.1)).run(steady(*6 * (0.0,)), 2.0, 0.05)
+    front, rear, axle, _ = levers(car.handling)
+    loads = path.reports.load[-1].reshape(3, 2).sum(axis=1)
+    return Observed(
+        "braking_trailer.loads",
+        SYSTEM,
+        "loads of the three axles of car and caravan that roll, over those by their levers, less 1",
+        float(np.abs(loads / np.array([front, rear, axle]) - 1.0).max()),
+        "",
+    ).at_most(1e-9, "statics of two bodies on a ball and three axles; rounding of a linear system", "closed form")
+
+
+def _acceleration_row(vehicle: str, engine: str) -> Row:
+    accelerations = whole.accelerations(whole.TRAINS[vehicle](), engine)
+    return Observed(
+        f"braking_trailer.accelerations.{vehicle.replace(' ', '_')}.{engine}",
+        SYSTEM,
+        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at {whole.STATES} states of "
+        "any heading",
+        whole.apart(accelerations, whole.plain_accelerations(vehicle)),
+        "by the largest",
+    ).at_most(1e-12, WHY, "native")
+
+
+def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
+    path = whole.run(whole.TRAINS[vehicle](), engine, duration)
+    return Observed(
+        f"braking_trailer.stop.{vehicle}.{engine}",
+        SYSTEM,
+        f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain code, slip controller "
+        "of all wheels on split and changing friction",
+        whole.paths_apart(path, whole.plain_run(vehicle, duration)),
+        "m, rad, per s",
+    ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")
+
+
+def _locked_row() -> Row:
+    way, wanted = train.locked_stop()
+    return Observed(
+        "braking_trailer.locked",
+        SYSTEM,
+        "way of a stop of car and caravan with all wheels locked, over v^2 / (2 mu g), less 1",
+        abs(way / wanted - 1.0),
+        "",
+    ).at_most(1e-3, "wheels lock within a millisecond, and the car leans ahead by less than one", "closed form")
+
+
+def _alone_rows() -> list[Row]:
+    errors = train.errors()
+    told = {
+        "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
+        "load": "load of the axle of a caravan that brakes alone",
+        "pull": "force at the ball of a caravan that brakes alone",
+    }
+    return [
+        Observed(
+            f"braking_trailer.alone.{key}",
+            SYSTEM,
+            f"{what}, over the closed form's, less 1",
+            abs(float(getattr(errors, key))),
+            "",
+        ).at_most(STATICS, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form")
+        for key, what in told.items()
+    ]
+
+
+def _control_rows() -> list[Row]:
+    """The slip controller of all six wheels on ice, beside wheels that lock."""
+    ice, speed = surface("ice"), 11.11
+    vehicle = braked(whole.towing(), ice, substeps=4, gradient=150.0)
+    controlled, locked = (Stop(vehicle.run(way, speed)) for way in (SlipBangBang(wheels=6), steady(*6 * (1e5,))))
+    ways = [stop.of_vehicle()["stopping distance [m]"] for stop in (controlled, locked)]
+    return [
+        Observed(
+            "braking_trailer.ice.locks",
+            SYSTEM,
+            "longest time for which a wheel of car or caravan locks above 15 km/h on ice, bang-bang slip controller",
+            float(controlled.locks().longest.max()),
+            "s",
+        ).at_most(0.1, "the controller holds the wheels", "none"),
+        Observed(
+            "braking_trailer.ice.distance",
+            SYSTEM,
+            "stopping distance of car and caravan on ice with the slip controller, over that with locked wheels",
+            ways[0] / ways[1],
+            "",
+        ).at_most(1.0, "ice has its largest friction at a slip of some per cent", "none"),
+    ]
+
+
+def _fault_rows() -> list[Row]:
+    """Faults that both engines share, planted in the table of their forces."""
+    held = train.beside(train.pulled(train.hold_on_to_the_car), train.pulled_by_levers())
+    turned = whole.towing.__wrapped__()
+    keep_to_the_car(turned.handling)
+    apart = whole.apart(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
+    seen = {
+        "brakes": ("brakes of the caravan hold on to the car, by the load of its axle", abs(held.load) > STATICS),
+        "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),
+    }
+    return [
+        behaves(
+            f"braking_trailer.fault.{name}",
+            SYSTEM,
+            f"planted: {what}",
+            "caught" if caught else "missed",
+            "caught",
+            "both engines share the force: they agree on it",
+        )
+        for name, (what, caught) in seen.items()
+    ]
