@@ -26,7 +26,7 @@ from models.bicycle.four_bodies import (
 )
 from models.bicycle.whipple import FREE, Control, Whipple
 from models.core.errors import RunFailed
-from models.multibody.plain.motion import FIRST, PLACE, RATE, REST, Bodies, Motion
+from models.multibody.plain.motion import FIRST, PLACE, RATE, REST, Bodies, PlainMotion
 
 FREE_RATES, OTHERS = [LEAN, STEER, REAR], [X, Y, YAW, HEIGHT, PITCH, FRONT]
 UP = np.array([0.0, 0.0, 1.0])
@@ -43,7 +43,7 @@ class IdealBicycle:
         wheels = {"rear wheel": bicycle.rear_wheel.radius, "front wheel": bicycle.front_wheel.radius}
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
 
-    def contacts(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Heights (2,) m of both contacts, the Jacobian (6, 9) of the velocities of the material points there, and
         the rates (6,) of these velocities without dv/dt."""
         each = [_contact(motion.matrices[row], radius) for row, radius in self._wheels]

@@ -226,8 +226,9 @@ def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
 
 
-import math
-from collections.abc import Sequence
+def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
+    """The plane vehicle of a centred one, without what it tows; spin_inertias (kg m^2): of its wheels."""
+    bodies = alone(vehicle)
     front_axle, rear_axle = (
         Axle(
             x=left.point[0],

@@ -98,7 +98,7 @@ class Variants:
         """The run without these effects, with steps so many times as long."""
         key = (frozenset(left_out), times)
         if key not in self._kept:
-            answer, self._broken[key] = self._ready.pop(key, None) or self.run(key)
+            answer, self._broken[key] = self._ready.pop(key) if key in self._ready else self.run(key)
             self._kept[key] = answer
             self.calls += answer.counts["calls"] if answer else 0
         return self._kept[key]
