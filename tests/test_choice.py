@@ -146,7 +146,7 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     part = Made(own.function, ("a",))
     monkeypatch.setattr(own, "window", lambda steps: part)
     own.system.WINDOWED = True
-    monkeypatch.setattr(choose, "Variants", lambda scene, engine: own)
+    monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: own)
     found = Chooser(None, "", ["q"], 0.05)
     assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.step_factor == 2
 

@@ -46,7 +46,7 @@ class New:
     counts: str
     extend: str
     apart: float = 1e-12
-    with_effects: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def text(self):

@@ -107,7 +107,6 @@ def test_a_vehicle_that_does_not_stop_has_no_price():
     [
         ("ride", "covariances, which have no step"),
         ("hub_forces", r"study = .choice."),
-        ("contact_ellipse", "contact_price"),
         ("recording", "samples of its files"),
     ],
 )

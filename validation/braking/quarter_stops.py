@@ -48,7 +48,7 @@ class Change(NamedTuple):
 
     before: Curve
     behind: Curve
-    cell_and_share: float = math.inf
+    place: float = math.inf
 
 
 @njit(cache=True, error_model="numpy")

@@ -124,7 +124,7 @@ class Altered:
     """A signal read ``late`` (s) and passed through ``change``, values (n, channels) -> values."""
 
     signal: Any
-    with_late_input: float = 0.0
+    late: float = 0.0
     change: Values = field(default=lambda values: values)
 
     def __getattr__(self, name: str) -> Any:

@@ -127,7 +127,7 @@ FAULTS = (
     Fault("a stiffness 1 % off", "Exudyn", _law(stiffness=1.01)),
     Fault("a damping 1 % off", "Exudyn", _law(damping=1.01)),
     Fault("a preload 1 % off", "Exudyn", _law(held=1.01)),
-    Fault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:_Coordinates.add", _bar_factor)),
+    Fault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:Coordinates.add", _bar_factor)),
     Fault("mounts' axes fixed in the space", "Exudyn", attribute(f"{EXUDYN}:_Trees._tree", _in_space)),
 )
 

@@ -230,7 +230,7 @@ def _of_vehicle(scene: BrakingScene) -> Refusals:
     if vehicle.file is None:
         if vehicle.spin_inertia is not None:
             yield "vehicle.spin_inertia", vehicle.spin_inertia, "has no meaning without vehicle.file"
-        if "forces" in scene.run.model_fields_set:
+        if scene.run.forces == "compiled":
             yield "run.forces", scene.run.forces, "has no meaning without vehicle.file: nothing has springs"
         return
     if vehicle.spin_inertia is None and not str(vehicle.file).endswith(MJCF):
