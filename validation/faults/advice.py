@@ -211,7 +211,7 @@ def _numbers_alone(self: Truth, other: Answer) -> float:
     return float(np.nanmax(np.abs(other.values - exact)))
 
 
-def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, rung: int) -> Any:
+def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, rung: int, executor: object) -> Any:
     return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 
 
@@ -236,7 +236,7 @@ FAULTS = (
     Fault(
         "judged over the part that is searched alone",
         "recommendation",
-        _in_module("_confirmed", lambda _: lambda search, timed, winners: (search.truth, timed, winners)),
+        _in_module("_confirmed", lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners)),
     ),
     Fault("mean difference for the largest", "truth", _in_module("Truth.error", lambda _: _mean, "truth")),
     Fault(
