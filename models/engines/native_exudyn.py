@@ -76,7 +76,7 @@ def add_ground_spring(built: Build, spring: GroundSpring) -> None:
 
 def add_line_spring(built: Build, spring: LineSpring) -> None:
     """A connector along the line between two points; Exudyn wants a length above 0, and has a constant force beside."""
-    length = spring.length or 1.0
+    length = spring.length if spring.length > 0.0 else 1.0
     built.mbs.AddObject(
         items.SpringDamper(
             markerNumbers=[built.marker(*end) for end in spring.ends],
