@@ -200,6 +200,11 @@ def test_a_price_by_workers_names_the_settings_of_one_process():
         alone, shared = (recommend(Planted(), 1e-2, executor) for executor in (None, pool))
     assert same(alone.truth, shared.truth) and same(alone.searched, shared.searched)
     for engine in ("", "exudyn"):
-        one, other = (each.winners[engine, "calls"] for each in (alone, shared))
-        assert (one.tried.setting, one.error, one.calls) == (other.tried.setting, other.error, other.calls)
-        assert one.confirmed and one.error <= 1e-2 and isinstance(one.tried.setting, Setting)
+        by_itself, by_workers = (each.winners[engine, "calls"] for each in (alone, shared))
+        assert _facts(by_itself) == _facts(by_workers)
+        assert by_itself.confirmed and by_itself.error <= 1e-2 and isinstance(by_itself.tried.setting, Setting)
+
+
+def _facts(choice):
+    """What must be the same bits of a choice of settings."""
+    return choice.tried.setting, choice.error, choice.calls

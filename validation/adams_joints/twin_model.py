@@ -80,8 +80,8 @@ def examined(mechanism: Mechanism, folder: Path, steps: int, step: float) -> tup
     start = np.zeros(twin.size), _start_rates(mechanism, twin)
     n, built = twin.size, free_model("exudyn", twin.driven).march(*start, steps, step)
     in_engine = [twin.coordinates.to_mujoco(row[:n], row[n:]).qpos for row in built]
-    own = file_path(twin, start, (steps, step))[:, : twin.model.nq]
-    return worst, {"mujoco": _centres(twin, own), "exudyn": _centres(twin, np.array(in_engine))}
+    in_file = file_path(twin, start, (steps, step))[:, : twin.model.nq]
+    return worst, {"mujoco": _centres(twin, in_file), "exudyn": _centres(twin, np.array(in_engine))}
 
 
 def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
