@@ -12,7 +12,7 @@ from models.systems.single_track.scene import SingleTrackScene
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
-SHOWN = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
+SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
 
 
 def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -21,7 +21,9 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     driven = run_scene(scene, error=scene.error)
     driven.save(folder / "drive.nc")
     figure(driven, scene.title, folder / "drive.png")
-    answer = {f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN.items()}
+    answer = {
+        f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
+    }
     answer |= {f"largest slip angle {axle} [rad]": float(np.abs(driven[f"slip angle {axle}"]).max()) for axle in AXLES}
     return {
         "scene": scene.title,
@@ -41,7 +43,7 @@ def figure(driven: Result, title: str, path: Path) -> Path:
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, legend_below, panels, save
 
     drawing, axes = panels(5, 2, 2.15)
-    curves = {"wheels steer": "rad", **SHOWN}
+    curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
         axis.plot(driven.times, driven[name], color=DARK, linewidth=0.8)
         axis.set(ylabel=f"{name} [{unit}]", title=name, xlabel="time [s]")

@@ -19,7 +19,7 @@ from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.native_parts import Coupling, DryFriction, GroundSpring, LineSpring, NativePart, joint_parts
-from models.engines.protocol import guard, timed
+from models.engines.protocol import guard, settings_of
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class FreeModel(ABC):
 
         RunFailed unless all of it is finite and sane.
         """
-        settings, rest = timed(self.ENGINE, self.settings), np.zeros(self.size)
+        settings, rest = settings_of(self.ENGINE, self.settings), np.zeros(self.size)
         steps, step = settings.steps, settings.step
         states = self.march(rest if q is None else q, rest if v is None else v, steps, step)
         times = step * np.arange(steps + 1)

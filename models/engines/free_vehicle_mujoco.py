@@ -22,7 +22,7 @@ from models.engines.native_mujoco import (
     add_parts,
     add_rotors,
     built_elements,
-    ends,
+    end_bodies,
     set_laws,
     set_line_springs,
     set_rotors,
@@ -66,7 +66,9 @@ def specified(driven: Driven) -> mujoco.MjSpec:
 
 def _merged(driven: Driven) -> dict[str, str]:
     """Bodies that are one with the only one that rides on each, and bear no end of a spring."""
-    bearing = ends(driven.parts) | {body for line in driven.line_springs for body, _ in line.ends if body is not None}
+    bearing = end_bodies(driven.parts) | {
+        body for line in driven.line_springs for body, _ in line.ends if body is not None
+    }
     return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 
 
