@@ -34,7 +34,7 @@ class PathReport:
     """step (s); horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other build from
     the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
-    whether MuJoCo has soft couplings, so that its path is another one: from it the file's is counted then; rubbing :
+    whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
     whether there is dry friction: paths are compared as long as it slides."""
 
     step: float
@@ -64,7 +64,7 @@ class PathReport:
             )
         for name, size in self.distances.items():
             turned = " (quaternions: distance of the step's error)" if name == FILE and self.quaternions else ""
-            given = " (soft couplings give way)" if name == SOFT and self.soft else ""
+            given = " (soft constraints give way)" if name == SOFT and self.soft else ""
             first = SOFT if name == FILE and self.soft else ENGINES[0]
             rows.append(f"  {name} from {first}: {size:.1e}{turned}{given}")
         if self.energy is not None:
@@ -75,7 +75,7 @@ class PathReport:
 def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     """Paths over 1 s; step (s): the file's unless given."""
     step = DURATION / np.ceil(DURATION / (step or float(twin.model.opt.timestep)) - 1e-9)
-    steps, (q,), (v,) = round(DURATION / step), *random_states(twin.model, 1)
+    steps, (q,), (v,) = round(DURATION / step), *random_states(twin, 1)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
         _march(build, partial(_by_build, twin, build, (q, v), (steps, step)), built, failed)
@@ -83,9 +83,10 @@ def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     first = built.pop(ENGINES[0], None)
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None)
-    soft = bool(twin.driven.couplings)
-    disturbed = _model(twin, PLAIN if soft else ENGINES[1]).march(q + DISTURBED, v, steps, step)
-    rows = _sliding_rows(twin, first[: _rows(first, disturbed, steps)])
+    soft = twin.driven.tied
+    calm = PLAIN if soft and PLAIN in built else ENGINES[0]
+    disturbed = _model(twin, calm).march(q + DISTURBED, v, steps, step)
+    rows = _sliding_rows(twin, first[: _rows(built.get(calm, first), disturbed, steps)])
     base = {FILE: built.get(SOFT, first)} if soft else {}
     distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
     energy = _ledger(twin, first[:rows], step)
@@ -112,7 +113,7 @@ def _by_build(twin: TwinModel, build: str, start: tuple[np.ndarray, np.ndarray],
 
 
 def _model(twin: TwinModel, build: str) -> FreeModel:
-    if twin.driven.couplings and build != SOFT:
+    if twin.driven.tied and build != SOFT:
         move = equations(twin, build)
         return Plain(build, lambda time, q, v: move(q, v).acceleration, twin.size)
     if build != PLAIN:

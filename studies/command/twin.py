@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.own_model.certificate import ALIKE, Agreement, certificate, softness, states_of
+from models.own_model.certificate import ALIKE, MET, Agreement, certificate, softness, states_of
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
@@ -37,7 +37,7 @@ class Wanted:
 class Examined:
     """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
     MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
-    lines on what accuracy costs; constraints : lines on dry friction and couplings."""
+    lines on what accuracy costs; constraints : lines on dry friction and constraints."""
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
@@ -144,10 +144,12 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
             f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
             "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
         )
-    if ties := twin.driven.couplings:
+    if twin.driven.tied:
+        kinds = {"couplings of joints": twin.driven.couplings, "joints between bodies": twin.driven.connections}
+        told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
         yield (
-            f"{len(ties)} couplings of joints: rigid in Exudyn and the plain equations, which are held to the file with"
-            f" rigid ones; soft in MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
+            f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
+            f"MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
         )
 
 
@@ -180,9 +182,11 @@ def _file_lines(each: Examined) -> list[str]:
         f"  {verdict(each)}",
     ]
     for row in each.agreements:
+        off = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
+        apart = f"  its constraints are {row.gap:.1e} (m, rad) apart where those of the file meet"
         rows.append(
             f"    {row.build:7s} mass {row.mass:.1e}  forces {row.force:.1e}  accelerations {row.acceleration:.1e}"
-            f"{'' if row.alike else f'  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}'}"
+            f"{apart if row.gap > MET else ''}{off if max(row.acceleration, row.mass) > row.bound else ''}"
         )
     for build, elements in each.explained.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
