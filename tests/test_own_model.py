@@ -1,5 +1,6 @@
 """A user's own model: read, built, certified, compared and refused as it should be."""
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
+from models.own_model.limits import limits_struck
 from models.own_model.path import _model as march_of
 from models.own_model.path import paths
 from models.own_model.states import random_states
@@ -317,6 +319,49 @@ def test_a_build_with_another_path_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("models.own_model.path._model", heavier)
     report = paths(_read(tmp_path, CART).twin)
     assert not report.alike and report.horizon > 0.9 and report.distances["mujoco"] > 1e-7
+
+
+LIMITED = changed(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
+    "<worldbody>", '<compiler autolimits="true"/><worldbody>'
+)
+
+
+def test_inside_their_ranges_limits_do_nothing(tmp_path):
+    """The file's own model with its limits accelerates as without; the fault: states that reach beyond."""
+    twin = _read(tmp_path, LIMITED).twin
+    states, struck = states_of(twin, 30), limits_struck(twin)
+    with_limits = copy(twin.model)
+    with_limits.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+
+    def apart(states):
+        moved = [moved_at(as_parsed(replace(twin, model=model)), states) for model in (twin.model, with_limits)]
+        return agreement("", *moved, twin).acceleration
+
+    assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
+    beyond = [(1.2 * q, v) for q, v in states]
+    assert apart(beyond) > 1e-3 and {name for q, _ in beyond for name in struck(q)} == {"joint 'tilt'"}
+
+
+def test_a_path_that_strikes_a_limit_is_compared_up_to_there(tmp_path):
+    report = paths(_read(tmp_path, LIMITED).twin)
+    assert report.alike and report.struck == "joint 'tilt'" and 0.0 < report.horizon < 1.0
+    assert any("joint 'tilt' strikes its limit, which is not built" in line for line in report.lines())
+
+
+def test_what_a_limit_adds_is_no_stop_of_springs(tmp_path):
+    """1 / (1 - d) of the inertia, and d of MuJoCo's spring and damper: what ``limits`` says of a joint that presses."""
+    twin = _read(tmp_path, LIMITED).twin
+    impedance, (time, ratio) = 0.93, (0.05, 0.7)
+    model = copy(twin.model)
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_DIAGEXACT)
+    model.jnt_solimp[:], model.jnt_solref[:] = (impedance, impedance, 1e-3, 0.5, 2.0), (time, ratio)
+    q, v = np.array((0.1, 0.4)), np.array((0.2, 0.3))
+    (free,), (seen,) = (moved_at(as_parsed(replace(twin, model=each)), [(q, v)]) for each in (twin.model, model))
+    depth = q[1] - (twin.model.jnt_range[1, 1] - twin.model.jnt_margin[1])
+    stiffness, damping = 1.0 / (impedance * time**2 * ratio**2), 2.0 / (impedance * time)
+    law = (1.0 - impedance) * free.acceleration[1] - impedance * (stiffness * depth + damping * v[1])
+    assert abs(seen.acceleration[1] - law) < 1e-8 * abs(law)
 
 
 def test_path_with_quaternions_differs_by_the_error_of_the_step(tmp_path):

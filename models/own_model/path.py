@@ -17,6 +17,8 @@ from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
+from models.own_model.content import ranges
+from models.own_model.limits import limits_struck
 from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
 
@@ -35,7 +37,8 @@ class PathReport:
     the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
     whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
-    whether there is dry friction: paths are compared as long as it slides."""
+    whether there is dry friction: paths are compared as long as it slides; struck : whose limit ends the comparison, empty
+    if none's: limits are not built."""
 
     step: float
     horizon: float
@@ -45,6 +48,7 @@ class PathReport:
     energy: float | None
     soft: bool = False
     rubbing: bool = False
+    struck: str = ""
 
     @property
     def alike(self) -> bool:
@@ -57,7 +61,11 @@ class PathReport:
         """For the terminal."""
         rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state:"]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
-        if self.horizon < DURATION:
+        if self.struck:
+            rows.append(
+                f"  compared up to {self.horizon:.3g} s, where {self.struck} strikes its limit, which is not built"
+            )
+        elif self.horizon < DURATION:
             rows.append(
                 f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBED:g} reaches {ALIKE:g}"
                 f"{', or dry friction sticks' if self.rubbing else ''}"
@@ -87,10 +95,11 @@ def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     calm = PLAIN if soft and PLAIN in built else ENGINES[0]
     disturbed = _model(twin, calm).march(q + DISTURBED, v, steps, step)
     rows = _sliding_rows(twin, first[: _rows(built.get(calm, first), disturbed, steps)])
+    rows, struck = _unlimited_rows(twin, first[:rows])
     base = {FILE: built.get(SOFT, first)} if soft else {}
     distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
     energy = _ledger(twin, first[:rows], step)
-    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions)
+    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
 
 
@@ -151,6 +160,15 @@ def _sliding_rows(twin: TwinModel, path: np.ndarray) -> int:
         if not sliding(twin, [(row[:n], row[n:])]):
             return max(2, i - 1)
     return len(path)
+
+
+def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
+    """How many states of a path lie before it strikes a limit, and whose; less one whose step may have met it."""
+    struck = limits_struck(twin) if ranges(twin.model) else lambda q: ()
+    for i, row in enumerate(path):
+        if names := struck(row[: twin.size]):
+            return max(2, i - 1), names[0]
+    return len(path), ""
 
 
 def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:

@@ -63,11 +63,12 @@ def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
         if model.jnt_type[j] in (FREE, BALL):
             turn = first + (3 if model.jnt_type[j] == FREE else 0)
-            reach = model.jnt_range[j, 1] if model.jnt_limited[j] else np.inf
+            reach = model.jnt_range[j, 1] - model.jnt_margin[j] if model.jnt_limited[j] else np.inf
             high[first:turn], high[turn : turn + 3] = SHIFT, min(TILT, reach / np.sqrt(3.0))
             low[first : turn + 3] = -high[first : turn + 3]
         elif model.jnt_limited[j]:
-            low[first], high[first] = model.jnt_range[j] - model.qpos0[place]
+            margin = min(float(model.jnt_margin[j]), 0.5 * float(np.ptp(model.jnt_range[j])))
+            low[first], high[first] = model.jnt_range[j] - model.qpos0[place] + (margin, -margin)
         elif model.jnt_type[j] == SLIDE:
             low[first], high[first] = -SHIFT, SHIFT
     return low, high

@@ -10,6 +10,7 @@ from models.own_model.certificate import ALIKE, MET, Agreement, certificate, sof
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
+from models.own_model.limits import limits_struck
 from models.own_model.path import PathReport, paths
 from models.own_model.states import COUNT
 from models.own_model.urdf import Misread, misread
@@ -137,8 +138,12 @@ def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
 
 
 def _constraints(file: ModelFile, count: int) -> Iterator[str]:
-    """What is soft in MuJoCo, and how far that is from the law that the other builds have."""
+    """Limits that states strike, what is soft in MuJoCo, and how far that is from the law of the other builds."""
     twin = file.twin
+    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.limited else []
+    if any(beyond):
+        names = dict.fromkeys(name for struck in beyond for name in struck)
+        yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
     if frictions := twin.driven.frictions:
         yield (
             f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
@@ -194,7 +199,7 @@ def _file_lines(each: Examined) -> list[str]:
     rows += [f"  {lost.sentence()}" for lost in each.misread]
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
     if each.file.limited:
-        rows.append(f"  limits off, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
+        rows.append(f"  limits not built, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
     rows += [f"  {note}" for note in (*each.constraints, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
     return rows + [f"  {line}".rstrip() for line in each.price]
