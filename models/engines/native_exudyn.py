@@ -19,6 +19,7 @@ from models.engines.exudyn_tree import JOINTS, Build
 from models.engines.native_parts import (
     SLIDES,
     AxialTravel,
+    Connection,
     CoordinateTravel,
     Coupling,
     DryFriction,
@@ -86,6 +87,17 @@ def add_line_spring(built: Build, spring: LineSpring) -> None:
             force=spring.stiffness * (length - spring.length),
         )
     )
+
+
+def add_connection(built: Build, connection: Connection) -> None:
+    """A spherical joint, or one that leaves no freedom between frames of both bodies."""
+    if connection.axes is None:
+        markers = [built.marker(*end) for end in connection.ends]
+        built.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
+        return
+    ends = zip(connection.ends, connection.axes, strict=True)
+    markers = [built.frame_marker(*end, axes) for end, axes in ends]
+    built.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import is_fixed, is_line, is_tie, label, rubs
+from models.own_model.reading import is_fixed, is_line, is_tie, joins, label, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -67,10 +67,11 @@ def _rows(model: mujoco.MjModel, document: Document, wanted: Callable[[str, str,
 
 
 def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
-    """Whether dry friction is that of a hinge or slide, and an equality constraint a coupling of two of them."""
+    """Whether dry friction is that of a hinge or slide, and an equality constraint a coupling of two of them or
+    between points of bodies."""
     if kind == "friction_loss":
         return what == "joint" and rubs(model, number)
-    return kind == "equality" and is_tie(model, number)
+    return kind == "equality" and (is_tie(model, number) or joins(model, number))
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
@@ -261,7 +262,8 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
     ),
     "equality": (
         _equalities,
-        "a soft constraint in MuJoCo, which is built for joints that follow another in proportion alone",
+        "a soft constraint in MuJoCo, which is built between points of bodies, and for joints that follow another in "
+        "proportion",
         _forget_equalities,
     ),
     "actuator": (
