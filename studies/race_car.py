@@ -39,8 +39,8 @@ class Options(Strict):
     blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
     parameters: list[str] = Field(
         [],
-        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: fifteen of a measured race car, five of "
-        "the scene's own short drive, which determines no more",
+        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: fifteen of a measured race car, five "
+        "of the scene's own short drive, which determines no more",
     )
 
     def asked(self) -> list[str]:
