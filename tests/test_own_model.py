@@ -22,6 +22,7 @@ from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
 from models.own_model.path import _model as march_of
 from models.own_model.path import paths
+from models.own_model.reading import described
 from models.own_model.states import random_states
 from models.own_model.urdf import misread
 from validation.own_model.files import (
@@ -98,6 +99,30 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
     assert agreement("", moved_at(softly_coupled(other), states), soft, geared).acceleration > 1e-4
+
+
+SPRUNG = changed(
+    changed(JOINTED, "ball", 'pos=".1 .2 .3"', 'pos=".1 .2 .3" stiffness="4" damping=".3"'),
+    "free",
+    '<freejoint name="root"/>',
+    '<joint name="root" type="free" stiffness="6" damping=".7"/>',
+)
+"""A spring and a damper of a ball joint, and of a free one."""
+
+
+def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
+    """To rounding, with a rest that is not the design position; the fault: 1 % of a stiffness, of a damping."""
+    as_read, model = _read(tmp_path, SPRUNG).twin, _read(tmp_path, SPRUNG, "turned.xml").twin.model
+    at = int(model.joint("ball").qposadr[0])
+    model.qpos_spring[at : at + 4] = np.array((0.9, 0.1, -0.3, 0.2)) / np.linalg.norm((0.9, 0.1, -0.3, 0.2))
+    for twin in (as_read, described(model, "turned")):
+        assert all(max(row.force, row.acceleration) < 1e-11 for row in certificate(twin, 20))
+        for i, change in ((0, "stiffness"), (1, "damping")):
+            springs = list(twin.driven.turning_springs)
+            springs[i] = replace(springs[i], **{change: 1.01 * getattr(springs[i], change)})
+            wrong = replace(twin.driven, turning_springs=tuple(springs))
+            assert all(row.acceleration > 1e-6 for row in certificate(replace(twin, driven=wrong), 20))
+    assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
 
 
 @pytest.mark.parametrize("text", [LINKED, HELD, HUNG], ids=["linked", "held", "hung"])
@@ -377,7 +402,7 @@ def test_thirty_joints_are_certified(tmp_path):
 REFUSED = [
     ("contact", '<geom name="box" type="box" size=".1 .1 .1"/>', "geom 'box' (a.xml:2)"),
     ("friction_loss", '<joint name="rub" type="ball" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
-    ("turning_law", '<joint name="soft" type="ball" damping="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
+    ("turning_law", '<joint name="soft" type="ball" armature="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
 ]
 
 

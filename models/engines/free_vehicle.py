@@ -25,6 +25,7 @@ from models.engines.native_parts import (
     GroundSpring,
     LineSpring,
     NativePart,
+    TurningSpring,
     joint_parts,
 )
 from models.engines.protocol import guard, timed
@@ -43,8 +44,8 @@ class Driven:
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
     engine has all of them as its own, and calls nothing back; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
-    parts, ground_springs, line_springs : springs, dampers, mounts and bars that the engine has as its own beside the
-    kernel's forces; frictions, couplings, connections : along its coordinates, between them, and between
+    parts, ground_springs, line_springs, turning_springs : springs, dampers, mounts and bars that the engine has as its
+    own beside the kernel's forces; frictions, couplings, connections : along its coordinates, between them, and between
     points of bodies, as the engine has them: explicit integrators of Exudyn ignore the latter two.
     """
 
@@ -59,6 +60,7 @@ class Driven:
     frictions: tuple[DryFriction, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     connections: tuple[Connection, ...] = ()
+    turning_springs: tuple[TurningSpring, ...] = ()
 
     @property
     def size(self) -> int:

@@ -18,6 +18,7 @@ from models.engines.native_exudyn import (
     add_line_spring,
     add_parts,
     add_rotors,
+    add_turning_spring,
     built_elements,
 )
 from models.engines.native_parts import rotors
@@ -55,6 +56,8 @@ class FreeExudyn(FreeModel):
             add_ground_spring(built, spring)
         for line in driven.line_springs:
             add_line_spring(built, line)
+        for turning in driven.turning_springs:
+            add_turning_spring(built, turning)
         coordinates = Coordinates(built, node)
         for friction in driven.frictions:
             coordinates.rub(friction)

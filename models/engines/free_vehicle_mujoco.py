@@ -22,6 +22,7 @@ from models.engines.native_mujoco import (
     add_line_spring,
     add_parts,
     add_rotors,
+    add_turning_spring,
     built_elements,
     ends,
     set_laws,
@@ -59,6 +60,8 @@ def specified(driven: Driven) -> mujoco.MjSpec:
         add_ground_spring(spec, driven.vehicle, spring)
     for line in driven.line_springs:
         add_line_spring(spec, driven.vehicle, line)
+    for turning in driven.turning_springs:
+        add_turning_spring(spec, driven.vehicle, turning)
     add_constraints(spec, driven.vehicle, driven.frictions, driven.couplings)
     for connection in driven.connections:
         add_connection(spec, driven.vehicle, connection)
@@ -69,8 +72,10 @@ def specified(driven: Driven) -> mujoco.MjSpec:
 
 def _merged(driven: Driven) -> dict[str, str]:
     """Bodies that are one with the only one that rides on each, and bear no end of a spring or a constraint."""
-    held = (*driven.line_springs, *driven.connections)
-    bearing = ends(driven.parts) | {body for each in held for body, _ in each.ends if body is not None}
+    held = [body for line in driven.line_springs for body, _ in line.ends]
+    held += [body for connection in driven.connections for body, _ in connection.ends]
+    held += [body for each in driven.turning_springs for body in each.bodies]
+    bearing = ends(driven.parts) | {body for body in held if body is not None}
     return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 
 

@@ -26,6 +26,7 @@ from models.engines.native_parts import (
     GroundSpring,
     LineSpring,
     NativePart,
+    TurningSpring,
 )
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
@@ -85,6 +86,21 @@ def add_line_spring(built: Build, spring: LineSpring) -> None:
             stiffness=spring.stiffness,
             damping=spring.damping,
             force=spring.stiffness * (length - spring.length),
+        )
+    )
+
+
+def add_turning_spring(built: Build, spring: TurningSpring) -> None:
+    """A connector between frames of both bodies, of rotations alone, whose rotation is a vector and no angles."""
+    ends = zip(spring.bodies, spring.axes, strict=True)
+    places = {body: (0.0, 0.0, 0.0) if body is None else built.vehicle.body(body).position for body in spring.bodies}
+    turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
+    built.mbs.AddObject(
+        items.RigidBodySpringDamper(
+            markerNumbers=[built.frame_marker(body, places[body], axes) for body, axes in ends],
+            stiffness=spring.stiffness * turning,
+            damping=spring.damping * turning,
+            useIntrinsicFormulation=True,
         )
     )
 

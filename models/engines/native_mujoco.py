@@ -24,6 +24,7 @@ from models.engines.native_parts import (
     GroundSpring,
     LineSpring,
     NativePart,
+    TurningSpring,
 )
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
@@ -153,6 +154,19 @@ def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Con
     equality.data[10] = connection.torque_scale
     equality.solref[:], equality.solimp[:] = connection.solref, connection.solimp
     _allow_constraints(spec)
+
+
+def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:
+    """An actuator about each axis of a site on the first body, whose length is that of the rotation vector along it."""
+    number = len(spec.sites)
+    foot, tip = f"turn {number}", f"turn {number + 1}"
+    for name, body, axes in zip((foot, tip), spring.bodies, spring.axes, strict=True):
+        place = (0.0, 0.0, 0.0) if body is None else vehicle.body(body).position
+        _add_site(spec, vehicle, name, body, place).quat = _quaternion(axes)
+    for gear in np.eye(6)[3:]:
+        twist = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
+        twist.gear[:], twist.gainprm[0], twist.biastype = gear, 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+        twist.biasprm[1:3] = -spring.stiffness, -spring.damping
 
 
 def _quaternion(axes: np.ndarray) -> np.ndarray:

@@ -82,7 +82,8 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions)
+    turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions, turns)
 
 
 def expected(twin: TwinModel, build: str) -> Equations:

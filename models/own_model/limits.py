@@ -2,8 +2,7 @@
 
 MuJoCo's limit is soft: with d the impedance of its documentation, and a the acceleration without it, it leaves
 (1 - d) a and adds d times a spring and a damper. So a joint that presses on a limit has 1 / (1 - d) of its inertia
-there, which no stop of Exudyn has: that is a spring and a damper beside the inertia. Inside its range a limit does
-nothing.
+there. A stop of Exudyn is a spring and a damper beside the inertia. Inside its range a limit does nothing.
 """
 
 from collections.abc import Callable

@@ -37,8 +37,8 @@ class PathReport:
     the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
     whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
-    whether there is dry friction: paths are compared as long as it slides; struck : whose limit ends the comparison,
-    empty if none's: limits are not built."""
+    whether there is dry friction: paths are compared as long as it slides; struck : whose limit, which is not
+    built, ends the comparison, empty if none's."""
 
     step: float
     horizon: float

@@ -11,7 +11,15 @@ import mujoco
 import numpy as np
 
 from models.engines.free_vehicle import Driven
-from models.engines.native_parts import Connection, Coupling, DryFriction, GroundSpring, LineSpring, joint_parts
+from models.engines.native_parts import (
+    Connection,
+    Coupling,
+    DryFriction,
+    GroundSpring,
+    LineSpring,
+    TurningSpring,
+    joint_parts,
+)
 from models.own_model.coordinates import BALL, FREE, SLIDE, Coordinates
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -52,7 +60,8 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     lines = tuple(line_springs(model, design))
     ties = tuple(dry_frictions(model)), tuple(couplings(model)), tuple(connections(model, design))
     parts = joint_parts(vehicle)
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties)
+    turns = tuple(turning_springs(model, design))
+    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns)
     return TwinModel(name, model, driven, Coordinates(model, design))
 
 
@@ -164,7 +173,8 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             held = stiffness * float(model.qpos0[place + i] - model.qpos_spring[place + i])
             if stiffness or damping or inertia:
                 numbers = (stiffness, damping, held, inertia)
-                yield JointElement(label(model, "joint", j), ((_moved(j), freedom),), (1.0,), *numbers)
+                name = f"{label(model, 'joint', j)} {freedom if free else ''}".rstrip()
+                yield JointElement(name, ((_moved(j), freedom),), (1.0,), *numbers)
 
 
 def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[float]]:
@@ -201,6 +211,31 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
             start, end = (_vector(design.site_xpos[s]) for s in sites_of(model, t))
             length = float(model.tendon_lengthspring[t, 0])
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
+
+
+def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
+    """Springs and dampers of how ball and free joints turn; of how free ones shift is in ``joint_elements``."""
+    springs, dampers, numbers = not _disabled(model, "SPRING"), not _disabled(model, "DAMPER"), moving(model)
+    for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL, FREE)):
+        body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE
+        stiffness = float(model.jnt_stiffness[j]) * springs
+        damping = float(model.dof_damping[model.jnt_dofadr[j] + 3 * free]) * dampers
+        if not (stiffness or damping):
+            continue
+        place, axes = int(model.jnt_qposadr[j]) + 3 * free, design.xmat[body].reshape(3, 3).copy()
+        rest = _matrix(model.qpos_spring[place : place + 4])
+        above = int(model.body_parentid[body])
+        first = _massive(above) if above in numbers else None
+        yield TurningSpring(
+            label(model, "joint", j), (first, _massive(body)), (rest if free else axes @ rest, axes), stiffness, damping
+        )
+
+
+def _matrix(quaternion: np.ndarray) -> np.ndarray:
+    """(3, 3) of a quaternion."""
+    numbers = np.empty(9)
+    mujoco.mju_quat2Mat(numbers, quaternion)
+    return numbers.reshape(3, 3)
 
 
 def rubs(model: mujoco.MjModel, joint: int) -> bool:
@@ -276,9 +311,7 @@ def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list
         return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
     points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
     if model.eq_type[equality] == WELD:
-        numbers = np.empty(9)
-        mujoco.mju_quat2Mat(numbers, data[6:10])
-        points, axes = points[::-1], [numbers.reshape(3, 3), np.eye(3)]
+        points, axes = points[::-1], [_matrix(data[6:10]), np.eye(3)]
     turns = [design.xmat[b].reshape(3, 3) for b in things]
     places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
     return [(place, turn @ own) for place, turn, own in zip(places, turns, axes, strict=True)]

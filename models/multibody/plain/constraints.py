@@ -55,7 +55,7 @@ class PlainConstraints:
     def gap(self, q: np.ndarray) -> Gap:
         """At coordinates (n,); of axes the rotation vector between them, which is 0 where they lie alike alone."""
         motion = self._bodies.move(q, np.zeros_like(q))
-        apart, turned = self._apart(motion), [_rotation(*each) for each in self._turned(motion)]
+        apart, turned = self._apart(motion), [rotation(*each) for each in self._turned(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
         return Gap(size, np.vstack((self._rows, apart[FIRST:].T, *(each.rows for each in turned))))
 
@@ -82,7 +82,7 @@ def _products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return terms
 
 
-def _rotation(first: np.ndarray, second: np.ndarray) -> Gap:
+def rotation(first: np.ndarray, second: np.ndarray) -> Gap:
     """The rotation vector from the first axes to the second (3,) in the first, and what turns it (3, n)."""
     turn = first[PLACE].T @ second[PLACE]
     change = first[FIRST:].transpose(0, 2, 1) @ second[PLACE] + first[PLACE].T @ second[FIRST:]
