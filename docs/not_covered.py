@@ -17,7 +17,7 @@ HEADINGS = {
     "noticed by nothing independent": "Rows noticed these, but none with an independent second side:",
     "run by nothing": "Nothing with an independent second side runs these in the quick cases:",
     "not spoiled": "The audit's rewriting sees nothing that these give back or write:",
-    NOT_AUDITED: "At least two engines call these for numbers in one scene, and they were not put off so far:",
+    NOT_AUDITED: "These are shared, and were not put off so far:",
     WHY_HARMLESS[
         0
     ]: "A fault in these moves where a search begins, or its steps, and no value beyond the stated error, "

@@ -16,6 +16,7 @@ from models.brake.steering import Steering
 from models.multibody.numbers import Handling
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
+from models.vehicles.free_vehicle import anchor, joints
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -129,3 +130,16 @@ def test_a_car_rolls_straight_ahead_under_the_weight_of_its_slope():
     assert not places.any() and rates[0] == pytest.approx(12.5)
     assert {body: named[body, "ry"] for body in spins} == pytest.approx(spins, rel=1e-12)
     assert np.count_nonzero(rates) == 1 + len(spins)
+
+
+def test_arms_from_joint_to_joint_end_where_each_body_is():
+    """The sum of all arms below a coordinate is the design position of its body."""
+    car = Handling(load_vehicle("r19_free")).vehicle
+    rows, ends = joints(car), list[np.ndarray]()
+    for _, below, *arm in rows:
+        ends.append(np.array(arm) + (ends[int(below)] if below >= 0.0 else 0.0))
+    for (name, _), end in zip(car.coordinates(), ends, strict=True):
+        assert end == pytest.approx(car.body(name).position, abs=1e-12)
+    wheel = next(body for body in car.bodies if body.name == car.tyres[0].body)
+    coordinate, place = anchor(car, wheel.name)
+    assert car.coordinates()[coordinate][0] == wheel.name and place == pytest.approx(ends[coordinate], abs=1e-12)
