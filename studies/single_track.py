@@ -14,7 +14,7 @@ from models.systems.single_track.scene import SingleTrackScene
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
-SHOWN = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
+SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
 TITLES = {"wheels steer": "Steer angle of the wheels"}
 """Titles of panels whose channel's name is none."""
 
@@ -25,7 +25,9 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     driven = run_scene(scene, error=scene.error)
     driven.save(folder / "drive.nc")
     figure(driven, measured(scene, driven), scene.title, folder / "drive.png")
-    answer = {f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN.items()}
+    answer = {
+        f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
+    }
     answer |= {f"largest slip angle {axle} [rad]": float(np.abs(driven[f"slip angle {axle}"]).max()) for axle in AXLES}
     return {
         "scene": scene.title,
@@ -43,7 +45,7 @@ AXLES = ("front", "rear")
 def measured(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
     """Values (n,) at the times of the drive of those channels that the file of the drive has too, in their units."""
     source = open_source(scene.path(scene.drive.file, "drive.file"))
-    known = [name for name in SHOWN if name in {channel.name for channel in source.channels}]
+    known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
     curves = {name: curve(source, name, driven.data[name].attrs["units"]) for name in known}
     return {name: np.interp(driven.times, *every) for name, every in curves.items()}
 
@@ -56,7 +58,7 @@ def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: P
     from models.drawing.figures import BLUE, DARK, MEASURED, VERMILION, heading, legend_below, panels, save
 
     drawing, axes = panels(6, 2, 2.15)
-    curves = {"wheels steer": "rad", **SHOWN}
+    curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
         if name in beside:
             axis.plot(driven.times, beside[name], color=MEASURED, linewidth=2.0, label="measured")

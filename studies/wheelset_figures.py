@@ -8,7 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from models.core.result import Result
-from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, save, subplots
+from models.drawing.figures import (
+    BLUE,
+    COLOURS,
+    COLUMN_WIDTH,
+    LABELS,
+    SMALL_TEXT,
+    VERMILION,
+    heading,
+    legend_below,
+    save,
+    subplots,
+)
 from models.rail.equations import YAW, Y
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.limit_cycle import Orbit
@@ -19,7 +30,7 @@ from models.systems.wheelset.run import Linear, at_speeds
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""
-SHOWN = 1.0
+SHOWN_SECONDS = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
@@ -38,7 +49,7 @@ def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
-    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), MARKS[engine], **style)
@@ -53,13 +64,22 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         left.axvline(first.critical, color="0.6", linestyle=":")
         _note(left, f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8))
     middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL)
+    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL_TEXT)
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
             place = at.real, at.imag / (2.0 * np.pi)
             clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-            _note(right, f"{first.speeds[i]:g} m/s", place, (-8, 0), va="center", fontsize=SMALL, bbox=clear, zorder=1)
+            _note(
+                right,
+                f"{first.speeds[i]:g} m/s",
+                place,
+                (-8, 0),
+                va="center",
+                fontsize=SMALL_TEXT,
+                bbox=clear,
+                zorder=1,
+            )
     left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
     right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting")
@@ -77,7 +97,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     }
     name, first = next(iter(paths.items()))
     rows = (2, 1) if len(paths) > 1 else (2,)
-    size = WIDE, 1.1 + 1.3 * sum(rows)
+    size = COLUMN_WIDTH, 1.1 + 1.3 * sum(rows)
     figure, axes = subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
     for column, (speed, path_then) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
@@ -100,9 +120,9 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
     """Creep forces on each wheel and their power in the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
-    figure, axes = subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
+    figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
-        last = course.times >= course.times[-1] - SHOWN
+        last = course.times >= course.times[-1] - SHOWN_SECONDS
         for side, colour, sums in _wheels(course.contacts[last], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
                 axis.plot(course.times[last], values, color=colour, label=side)
@@ -120,7 +140,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
     orbits: Sequence[Orbit] = branch.detail
-    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
     )
@@ -138,7 +158,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL)
+    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL_TEXT)
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
     left.set_title("Amplitude")
@@ -151,7 +171,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
@@ -175,7 +195,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
 def conicity_figure(run: Result, title: str, path: Path) -> None:
     """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
     conicities: Conicities = run.detail
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.6))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows
     left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="right less left")
     for row in rows:

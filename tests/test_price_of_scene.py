@@ -12,7 +12,7 @@ from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import priced_scene
 from models.advice.price.text import as_dict, lines
-from models.advice.price.truth import at
+from models.advice.price.truth import values_at
 from models.core.assumptions import Assumption, with_assumptions
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
@@ -146,7 +146,9 @@ def test_values_between_rows_do_not_reach_across_a_kink():
     times = np.linspace(0.0, 1.0, 41)
     kinked = Answer(times, np.abs(times - 0.5)[:, None] ** 3, {})
     between = np.linspace(0.0, 1.0, 333)
-    off = {cell: np.abs(at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)}
+    off = {
+        cell: np.abs(values_at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)
+    }
     assert off[0.5] < 1e-12 < 1e-7 < off[0.0]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.result import Result
 
-RARE = 0.00135
+ALLOWED_TIME_SHARE = 0.00135
 """Share of the time for which a Gaussian may lie beyond a limit: that of three standard deviations."""
 
 
@@ -122,18 +122,19 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
 
 
 def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
-    """Where a Gaussian lies beyond a limit for more than RARE of the time, by the row where that is for longest."""
+    """Where a Gaussian lies beyond a limit for more than ALLOWED_TIME_SHARE of the time, by the row where that is for
+    longest."""
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = np.array([a.least - values.mean, values.mean - a.most]) / values.deviation
     known = np.isfinite(values.deviation) & (values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
-    if not (shares > RARE).any():
+    if not (shares > ALLOWED_TIME_SHARE).any():
         return None
     side, row = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
     timed = "time" in run.data.coords and len(values.mean) == len(run.times)
-    first = float(run.times[np.argmax((shares > RARE).any(axis=0))]) if timed else math.nan
+    first = float(run.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
     place = f"{where} {values.rows[row]}" if values.rows else where
     share, law = float(shares[side, row]), " by the normal law"

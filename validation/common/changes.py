@@ -18,7 +18,7 @@ KINDS = ("status", "gone", "new", "expected", "value")
 Change = Saved
 
 
-def read(path: Path) -> Saved:
+def read_results(path: Path) -> Saved:
     """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
     file = path / "results.json" if path.is_dir() else path
     try:

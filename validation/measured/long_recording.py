@@ -22,7 +22,7 @@ from validation.spatial.cars import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
-PLACES = {
+SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
     "acc fr": (1.2, -0.6, 0.6),
     "acc rear": (-1.3, 0.0, 0.6),
@@ -40,7 +40,7 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
     names = [element.name for element in car.elements]
     table = VirtualTable(
         duration=seconds,
-        accelerometers={name: list(place) for name, place in PLACES.items()},
+        accelerometers={name: list(place) for name, place in SENSOR_PLACES.items()},
         travels=names[:10],
         sections=names[:9],
     )
@@ -77,7 +77,9 @@ def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
 
 def sections() -> Sections:
     """All sections, and where the accelerometers sit."""
-    return Sections(r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in PLACES.items()))
+    return Sections(
+        r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in SENSOR_PLACES.items())
+    )
 
 
 def run_of(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from models.contact.material import Pair
 from models.ensemble.workers import processes
-from models.systems.contact.cases_table import answer
+from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from validation.common.peak_memory import peak_memory
@@ -45,7 +45,9 @@ def answered(folder: Path, rows: int) -> Taken:
     """Answer a table of so many rows into ``forces.csv``, without errors, on few cells."""
     write(folder / "cases.csv", rows)
     begun = time.perf_counter()
-    counts = answer(folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False)
+    counts = answer_table(
+        folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False
+    )
     if counts != {"rows": rows, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {rows} sound rows")
     return Taken(peak_memory(), time.perf_counter() - begun)

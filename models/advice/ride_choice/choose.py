@@ -29,12 +29,12 @@ from models.systems.ride.reduced_scene import Effect, illegal
 
 ROUNDS = 30
 """Choices that are confirmed at most."""
-WORTH, EVEN = 0.05, 1e-3
+EQUAL_COST_LOG, EVEN = 0.05, 1e-3
 """Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
 them."""
-SHORTER = 0.9
+STEP_FACTOR = 0.9
 """A step that no run confirms becomes so many times as long."""
-LEAST = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 
 Saved = Callable[[Set, Set], float]
@@ -121,7 +121,7 @@ class Chooser(Candidates):
         """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
         step, marches = self.accurate(chosen).step, self.marches(chosen)
         while step and not confirms(marches[len(marches) // 2], step):
-            step *= SHORTER
+            step *= STEP_FACTOR
         return self.at_step(chosen, step)
 
     def choose(self) -> RideChoice:
@@ -151,7 +151,7 @@ class Chooser(Candidates):
         while rounds < ROUNDS:
             chosen, tested = self._greedy()
             chosen, rounds = self._worthwhile(chosen), rounds + tested
-            saves = self.accurate(chosen).calls * (1 + WORTH) <= self.accurate(frozenset()).calls
+            saves = self.accurate(chosen).calls * (1 + EQUAL_COST_LOG) <= self.accurate(frozenset()).calls
             if not chosen or not saves:
                 break
             if self.certified(chosen):
@@ -193,10 +193,10 @@ class Chooser(Candidates):
         for each other."""
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
-            if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
+            if self.cost(less).step < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
                 continue  # it alone bounds the step
-            same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)
-            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH)
+            same = self.cost(less).step >= self.cost(chosen).step * (1 - EQUAL_COST_LOG)
+            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
             if same and self.within_tolerance(less):
                 return self._worthwhile(less)
         return chosen
@@ -225,7 +225,7 @@ class Chooser(Candidates):
         """Logarithm, of savings worth the tolerance they take."""
         then = self.cost(further).calls
         saved = log(self.cost(chosen).calls / then) if then < inf else 0.0
-        return saved if saved > WORTH else 0.0
+        return saved if saved > EQUAL_COST_LOG else 0.0
 
     def _work_saved(self, chosen: Set, further: Set) -> float:
         now, then = self.cost(chosen), self.cost(further)
@@ -246,10 +246,10 @@ class Chooser(Candidates):
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
             saves = saved(chosen, further)
-            if saves <= LEAST * most:
+            if saves <= NEGLIGIBLE_SHARE * most:
                 continue  # whatever error it adds
             share = self.share(further)
-            score = saves / max(share - now, LEAST) if share <= 1.0 else 0.0
+            score = saves / max(share - now, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best
