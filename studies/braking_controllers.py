@@ -149,6 +149,7 @@ PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "fi
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
+    from studies.braking_figures import plain_name
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
@@ -171,18 +172,18 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                     np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width,
                     heights,
                     width * 0.95,
-                    label=kind.replace("_", " "),
+                    label=" + ".join(map(plain_name, kind.split(" + "))),
                     color=f"C{k % each}",
                     alpha=1.0 if k < each else 0.5,
                 )
-            axis.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names])
+            axis.set_xticks(range(len(names)), [plain_name(name).replace(" ", "\n") for name in names])
             axis.set(
                 title=f"{surface.capitalize()}; split: {options.surfaces[surface]} right" if row == 0 else "",
                 ylabel=quantity if column == 0 else "",
             )
     if stops:
-        legend_below(figure, axes[0, 0])
-    heading(figure, f"{scene.title}, each procedure from its speed to a stop", results)
+        legend_below(figure, axes[0, 0], columns=max(len(kinds) // each, 1))
+    heading(figure, scene.title, results)
     save(figure, file)
 
 

@@ -63,14 +63,29 @@ def stop_figure(
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
-    ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
+    distance_text, time_text = f"{distance:.2f}\N{NO-BREAK SPACE}m", f"{time:.2f}\N{NO-BREAK SPACE}s"
+    ended = f"stands after {distance_text} and {time_text}" if stop.path.stands else f"still moves at {time_text}"
     heading(
         figure,
-        f"{scene.title}: {name.replace('_', ' ')} from {procedure.speed:g} m/s, "
-        f"{controller_text(scene).replace('{procedure}', name)}; {ended}",
+        f"{scene.title}: {plain_name(name)} from {procedure.speed:g} m/s, "
+        f"{SPELT.get(told := controller_text(scene).replace('{procedure}', name), told)}; {ended}",
         results,
     )
     return save(figure, file)
+
+
+SPELT = {
+    "j_turn": "J-turn",
+    "slip_bang_bang": "slip bang-bang",
+    "acceleration_phases": "acceleration phases",
+    "slip_pi": "slip PI",
+}
+"""Spellings of procedures and controllers for readers."""
+
+
+def plain_name(name: str) -> str:
+    """Name of a procedure or a controller as readers write it."""
+    return SPELT.get(name, name.replace("_", " "))
 
 
 STRAIGHT = 0.05

@@ -362,6 +362,7 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.set(
         xscale="log",
         xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        ylim=(-0.5, len(shown) - 0.5),
         yticks=y,
         yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",

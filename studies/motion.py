@@ -295,6 +295,8 @@ def _figure(source: Source, results: Results, path: Path) -> None:
         ["misfit", "misfit"],
     ]
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
+    for axis in axes.values():
+        axis.xaxis.set_tick_params(labelbottom=True)
     ways = {way: _values(motion) for way, motion in source.ways.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
         _motions(axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name)

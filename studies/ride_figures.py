@@ -118,6 +118,11 @@ def _unit_text(unit: str) -> str:
     return unit.replace("^2", "²")
 
 
+def _squared(unit: str) -> str:
+    """A unit's square: of one of several signs in brackets."""
+    return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
+
+
 def _shown_unit(unit: str) -> tuple[str, float]:
     """A unit as it is drawn, and the factor of what is drawn in it."""
     return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
@@ -195,14 +200,25 @@ def detail_figure(
         if np.isfinite(values[i, j]):
             dark = abs(values[i, j]) > 40
             axis.text(
-                j, i, f"{values[i, j]:+.0f}", ha="center", va="center", fontsize=SMALL_TEXT, color="w" if dark else "k"
+                j,
+                i,
+                _signed(float(values[i, j])),
+                ha="center",
+                va="center",
+                fontsize=SMALL_TEXT,
+                color="w" if dark else "k",
             )
     axis.set_xticks(range(len(heads)), heads, fontsize=SMALL_TEXT)
     axis.set_yticks(range(len(names)), names)
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
-    what = "largest error of each standard deviation over the speeds [%], and the time of one covariance"
+    what = "largest error of each standard deviation [%], and the time of one covariance"
     _save(figure, above, f"\n{what.capitalize()}", path)
+
+
+def _signed(percent: float) -> str:
+    """A whole number with its sign; zero has none."""
+    return f"{percent:+.0f}" if round(percent) else "0"
 
 
 def drive_figure(
@@ -288,7 +304,7 @@ def engine_spectra_figure(
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
         output, top = linear.outputs[i], expected[:, i].max()
-        unit = f"one-sided density [({_unit_text(output.unit)})²/Hz]"
+        unit = f"one-sided density [{_squared(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
     _save(figure, above, f"\nSpectra at {speed:g} m/s", path)

@@ -134,7 +134,7 @@ def _figure_measurement(measured: Result) -> Any:
             whole.plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
             part.plot(measured.times[detail], scale * measured[channel][detail], label=name)
         whole.set_title(label)
-        part.set_title("Detail, " + label[label.index("[") :])
+        part.set_title("Detail " + label[label.index("[") :])
     legend_below(figure, axes[0, 0])
     for axis in axes[1]:
         axis.set_xlabel("time [s]")

@@ -69,11 +69,21 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         at = first.hunting[i]
         if np.isfinite(at):
             place = at.real, at.imag / (2.0 * np.pi)
-            _note(right, f"{first.speeds[i]:g} m/s", place, (-6, 0), va="center", fontsize=SMALL_TEXT)
+            clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+            _note(
+                right,
+                f"{first.speeds[i]:g} m/s",
+                place,
+                (-8, 0),
+                va="center",
+                fontsize=SMALL_TEXT,
+                bbox=clear,
+                zorder=1,
+            )
     left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
     right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting")
-    right.margins(x=0.5)
+    right.margins(x=0.6)
     middle.margins(y=0.2)
     legend_below(figure, left)
     heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
@@ -178,7 +188,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
-    heading(figure, title, results)
+    heading(figure, f"{title}: one cycle, the same in every implementation", results)
     save(figure, path)
 
 
@@ -187,14 +197,14 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
     conicities: Conicities = run.detail
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows
-    left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="difference of the rolling radii")
+    left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="right less left")
     for row in rows:
         if np.isfinite(row.centre):
             swing = row.centre + np.array([-row.amplitude, 0.0, row.amplitude])
             heights = 1e3 * np.interp(swing, table.displacements, table.differences)
-            left.plot(1e3 * swing, heights, "|-", color="0.7", linewidth=0.7, zorder=1)
-            left.plot(1e3 * swing[1], heights[1], "o", color=VERMILION, markersize=4)
-    left.set(xlabel="lateral displacement [mm]", ylabel="right less left [mm]", title="Rolling radii, centres of waves")
+            left.plot(1e3 * swing, heights, "|-", color="0.7", linewidth=0.7, zorder=1, label="swing of a wave")
+            left.plot(1e3 * swing[1], heights[1], "o", color=VERMILION, markersize=4, label="its centre")
+    left.set(xlabel="lateral displacement [mm]", ylabel="right less left [mm]", title="Difference of the rolling radii")
     amplitudes = [1e3 * row.amplitude for row in rows]
     right.plot(amplitudes, [row.equivalent for row in rows], "o-", color=BLUE, label="EN 15302")
     right.plot(amplitudes, [row.harmonic for row in rows], "s--", color=VERMILION, label="first harmonic")
@@ -205,5 +215,8 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
         ylim=(0, None),
     )
     right.legend()
+    handles, labels = left.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))  # every wave by one entry
+    left.legend(list(named.values()), list(named))
     heading(figure, title, {"conicity": run})
     save(figure, path)

@@ -84,8 +84,9 @@ def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
 def test_what_is_no_report_is_refused(tmp_path, content):
     if content is not None:
         (tmp_path / "results.json").write_text(content)
-    with pytest.raises(InputError, match="--against"):
+    with pytest.raises(InputError, match="--against") as told:
         read_results(tmp_path)
+    assert "Error" not in str(told.value)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from models.drawing.figures import (
     heading,
     legend_below,
     panels,
+    save,
     subplots,
     wrapped,
 )
@@ -113,8 +114,10 @@ def _turned(fault: str) -> str:
 def test_figures_that_tests_save_are_held_to_the_rules(usual, tmp_path):
     figure, axes = usual
     small_letters(figure, axes)
-    with pytest.raises(AssertionError, match=r"6\.9 points"):
-        figure.savefig(tmp_path / "small.png")
+    for file in ("small.png", "small.svg"):
+        with pytest.raises(AssertionError, match=r"6\.9 points"):
+            save(figure, tmp_path / file)
+        assert not (tmp_path / file).exists()
 
 
 def test_pages_of_drawings_use_the_palette():

@@ -180,6 +180,14 @@ def test_what_cannot_be_asked_is_one_message(tolerance, quantity, message):
         price(build(RELEASE), tolerance, quantity, ("reference",))
 
 
+@pytest.mark.parametrize("step", [1e-3, 2.5e-4])
+def test_the_first_part_of_a_run_need_not_be_steps_of_the_scene(step):
+    """Of 5 s the first third is searched, which 1 ms and 0.25 ms do not divide."""
+    road = {"road": {"source": "iso8608", "road_class": "A", "speed": 15.0}}
+    scene = priced_scene(build(RELEASE | {"run": {"duration": 5.0, "step": step}, "effects": road}), None, ("mujoco",))
+    assert scene.unit == "N" and scene.first == pytest.approx(5.0 / 3.0)
+
+
 def test_a_tolerance_below_rounding_is_refused():
     scene = priced_scene(build(RELEASE), "z3", ("reference",))
     with pytest.raises((InputError, RunFailed), match=r"finer than|differ by"):

@@ -71,13 +71,18 @@ class Broken:
     remedy: str
     law: str = ""
 
+    @property
+    def _worst(self) -> str:
+        """The worst value in four digits, without a power of ten up to a million, and its unit."""
+        return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
+
     def brief(self) -> str:
         """A few words for a figure."""
         return f"assumption broken: {self.fact()}"
 
     def fact(self) -> str:
         """Sentence that the assumption was broken, for readers who know the assumption."""
-        return f"{self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
+        return f"{self.says}; {self.where}, {self._time}, {self._worst}"
 
     @property
     def _time(self) -> str:
@@ -87,10 +92,9 @@ class Broken:
 
     def line(self) -> str:
         """A sentence for readers."""
-        unit = f" {self.unit}" if self.unit else ""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, worst {self.worst:.4g}{unit} "
+            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 

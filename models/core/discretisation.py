@@ -356,5 +356,6 @@ def error_lines(run: Result) -> list[str]:
 
 
 def _size(name: str, estimate: Estimate) -> str:
-    size = f"{estimate.error:.2g} {estimate.unit}".rstrip()
-    return f"{100.0 * estimate.share:.2g} % ({name}: {size})"
+    share, error = (float(f"{value:.2g}") for value in (100.0 * estimate.share, estimate.error))
+    size = f"{error:g} {estimate.unit}".rstrip()
+    return f"{share:g} % ({name}: {size})"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from models.core.errors import InputError
+from models.core.errors import InputError, suggestion
 from models.core.result import Result
 from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
@@ -45,7 +45,7 @@ def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
         owner = _inside(owner, table, key)
     value = _inside(owner, last, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene", _names(owner))
+        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene")
     field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
     limits = field.metadata if field is not None else []
     low = max((float(each) for limit in limits for each in _limit_ends(limit, "gt", "ge")), default=-np.inf)
@@ -66,7 +66,10 @@ def _inside(owner: Any, name: str, key: str) -> Any:
         return owner[name]
     if isinstance(owner, BaseModel) and name in type(owner).model_fields:
         return getattr(owner, name)
-    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", _names(owner))
+    names = _names(owner)
+    if isinstance(owner, Mapping) and not suggestion(name, names):
+        raise InputError(OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from")
+    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
 
 
 def _names(owner: Any) -> tuple[str, ...]:

@@ -92,7 +92,7 @@ class Overlay:
         """Lines for the screen."""
         head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
         rows = [
-            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {each.relative:>9.2%} {each.peak:>11.4g}  "
+            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {_share(each.relative):>9} {each.peak:>11.4g}  "
             f"{each.at:.6g} s{_within_error_text(each)}"
             for each in self.matches
         ]
@@ -105,6 +105,11 @@ class Overlay:
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
         doubt = "" if alike >= DOUBTED else "; in doubt, as both are hardly alike: name it with --shift"
         return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
+
+
+def _share(relative: float) -> str:
+    """A relative error; what does not move has none."""
+    return f"{relative:.2%}" if np.isfinite(relative) else "-"
 
 
 def _within_error_text(match: Match) -> str:
@@ -243,7 +248,7 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         below.plot(match.times, match.error, color=BLUE)
         below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
-        below.set(title=f"rms error {match.rms:.3g} {unit}, {match.relative:.1%}", xlabel="time of the run [s]")
+        below.set(title=f"rms error {match.rms:.3g} {unit}, {_share(match.relative)}", xlabel="time of the run [s]")
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})

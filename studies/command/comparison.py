@@ -76,6 +76,9 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
     if earlier.is_file():
         return [("", earlier, later)], []
     first, second = _files(earlier), _files(later)
+    for folder, files in ((earlier, first), (later, second)):
+        if not files:
+            raise InputError(folder, "", None, "holds no results (.nc or .csv): name the folder of a run")
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
         return [("", next(iter(first.values())), next(iter(second.values())))], []
