@@ -39,8 +39,8 @@ class Options(Strict):
     blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
     parameters: list[str] = Field(
         [],
-        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: twelve of a measured race car, five of "
-        "the scene's own short drive, which determines no more",
+        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: fifteen of a measured race car, five "
+        "of the scene's own short drive, which determines no more",
     )
 
     def asked(self) -> list[str]:
@@ -55,7 +55,7 @@ FEW = (
     "rear.stiffness=5:50",
     "rear.friction=0.3:3",
 )
-"""What half a minute of driving determines; with all twelve the search does not settle, and predicts badly."""
+"""What half a minute of driving determines; with all fifteen the search does not settle, and predicts badly."""
 SIMPLER: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),

@@ -137,6 +137,7 @@ def exact(wheel, controller=PHASES):
     return cycle(Wheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12)
 
 
+@pytest.mark.grounds("closed form")
 def test_limit_cycle_is_that_of_the_closed_form():
     own = limit_cycle(frozen(), PHASES, 1e-4)
     period, utilisation = exact(frozen())

@@ -76,6 +76,7 @@ def test_without_load_there_is_no_force() -> None:
     assert not tyre(1.0, 1.0, 1.0, 5.0, load=0.0).any()
 
 
+@pytest.mark.grounds("closed form")
 def test_free_vehicle_has_all_of_the_mass() -> None:
     """Sideways and in yaw, too; the ride vehicle's wheels and occupants have none there."""
     free = free_vehicle(R19, spin_inertia=1.7)
@@ -84,6 +85,7 @@ def test_free_vehicle_has_all_of_the_mass() -> None:
     assert mass(free)[:2, :2] == pytest.approx(total * np.eye(2), rel=1e-9)
 
 
+@pytest.mark.grounds("closed form")
 def test_the_chassis_feels_the_inertia_of_the_whole_vehicle_in_roll_and_pitch() -> None:
     """m_total h about the ground; wheels and occupants were left out once, a sixth of it."""
     free = free_vehicle(R19, spin_inertia=1.7)

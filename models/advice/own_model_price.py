@@ -98,7 +98,7 @@ class PricedModel:
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
-        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin.model, 1)
+        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
         if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
             raise RunFailed(setting.engine, "the motion blows up at this step")
@@ -148,8 +148,8 @@ def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommend
     """The cheapest settings of a model; InputError for what cannot be asked."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
-    if twin.driven.couplings or twin.driven.frictions:
-        said = "has no price here: dry friction and couplings of joints are soft in MuJoCo and rigid elsewhere"
+    if twin.driven.tied or twin.driven.frictions:
+        said = "has no price here: dry friction and constraints are soft in MuJoCo and rigid elsewhere"
         raise InputError("--tolerance", "", tolerance, said)
     places = named_coordinates(twin)
     if not places:

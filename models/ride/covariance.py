@@ -112,6 +112,8 @@ def hits(system: DelayedSystem) -> Hits:
         return Hits([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
     at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
+    if len(delays) == len(system.B):
+        return Hits([system.B[i] for (i,) in at], [system.D[i] for (i,) in at], delays, False)
     B, D = ([np.sum([each[i] for i in together], axis=0) for together in at] for each in (system.B, system.D))
     return Hits(B, D, delays, False)
 

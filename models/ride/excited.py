@@ -167,16 +167,20 @@ def _direct(read: Rows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.n
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """matrix^-1 right; InputError where nothing holds a body without mass."""
-    if len(matrix) and np.linalg.cond(matrix) > 1 / NOTHING:
+    if not len(matrix):
+        return right
+    if np.linalg.cond(matrix) > 1 / NOTHING:
         raise InputError("", "effects", None, "nothing holds what is left without mass")
     return np.linalg.solve(matrix, right)
 
 
 def _split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Bases of what a symmetric matrix acts on and of what it does not; single coordinates where it is diagonal."""
+    if not len(matrix):
+        return matrix, matrix
     scale = np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2 / np.outer(scale, scale))
-    if len(values) == 0 or values[0] > NOTHING:
+    if values[0] > NOTHING:
         return np.eye(len(matrix)), np.zeros((len(matrix), 0))
     on = values > NOTHING
     return vectors[:, on] / scale[:, None], vectors[:, ~on] / scale[:, None]

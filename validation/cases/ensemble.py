@@ -17,6 +17,7 @@ from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
+from validation.common.peak_memory import peak_memory
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import drive, force_scene
 
@@ -172,7 +173,7 @@ def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
     kept = sum(values.nbytes for values in paths.values()) / len(paths["drift_off"])
-    most = 1024 * (parent.ru_maxrss + 2 * child.ru_maxrss)
+    most = peak_memory() + 2048 * child.ru_maxrss
     return {
         "found": paths,
         "seconds": seconds,

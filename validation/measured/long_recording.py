@@ -1,6 +1,5 @@
 """A recording of any length with 60 channels: a virtual measurement repeated with soft seams, noise never twice."""
 
-import resource
 import subprocess
 import sys
 import time
@@ -18,6 +17,7 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import Hold, SectionRun, run
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
+from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
@@ -129,7 +129,7 @@ def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") 
     """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
 
     def told(completed: float, of: float) -> None:
-        print(completed, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
+        print(completed, peak_memory(), time.process_time(), flush=True)
 
     job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
     run(job, Path(folder) / "run", told, float(block))

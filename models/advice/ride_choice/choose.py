@@ -74,13 +74,21 @@ class Chooser(Candidates):
         return {}
 
     @cached_property
+    def uncertified(self) -> set[Set]:
+        """Sets that kept the tolerance and whose certificate was not exact."""
+        return set()
+
+    @cached_property
     def singles(self) -> list[Set]:
         """Sets of an effect with all effects that it needs."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
     def within_tolerance(self, chosen: Set) -> bool:
-        """Whether the tolerance holds without these effects, wherever and whatever of them is left out."""
+        """Whether the tolerance holds without these effects, wherever and whatever of them is left out.
+
+        A certificate is asked of what is chosen at last, and once it failed, of all that it failed for.
+        """
         if not chosen:
             return True
         if not (self.holds(self.solved(chosen)) and self.holds(self.between(chosen))):
@@ -91,7 +99,7 @@ class Chooser(Candidates):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
             self.refused[chosen] = why
-        return not why and self.certified(chosen)
+        return not why and chosen not in self.uncertified
 
     def _cancels(self, chosen: Set) -> str:
         """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
@@ -118,12 +126,10 @@ class Chooser(Candidates):
 
     def choose(self) -> RideChoice:
         """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
-        chosen, rounds = self._greedy()
-        chosen = self._worthwhile(chosen)
-        if self.accurate(chosen).calls * (1 + WORTH) > self.accurate(frozenset()).calls:
-            chosen = frozenset()
-        changes, between, none = self.confirm(chosen), self.between(chosen), frozenset[Effect]()
-        off = self.off(chosen) if chosen else np.zeros(len(self.rows))
+        chosen, rounds = self._certified()
+        unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
+        looks = (self.confirm, self.between, self.off)
+        changes, between, off = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
@@ -138,6 +144,20 @@ class Chooser(Candidates):
             rounds,
             self._reasons(chosen),
         )
+
+    def _certified(self) -> tuple[Set, int]:
+        """The choice that saves calls and is certified, and how many sets were put to the test for it."""
+        rounds = 0
+        while rounds < ROUNDS:
+            chosen, tested = self._greedy()
+            chosen, rounds = self._worthwhile(chosen), rounds + tested
+            saves = self.accurate(chosen).calls * (1 + WORTH) <= self.accurate(frozenset()).calls
+            if not chosen or not saves:
+                break
+            if self.certified(chosen):
+                return chosen, rounds
+            self.uncertified.add(chosen)
+        return frozenset(), rounds
 
     def _reasons(self, chosen: Set) -> tuple[str, ...]:
         """Reasons why larger sets that kept the tolerance were refused."""

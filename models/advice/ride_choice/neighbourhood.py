@@ -16,7 +16,8 @@ from models.advice.ride_choice.parameters import OFF, Parameter, changed, parame
 from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, of_speed
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.slopes import Sensitivity, Shifts
-from models.advice.ride_choice.waves import Filters, at_axles, filtered, frequencies, variances, weighting_factors
+from models.advice.ride_choice.waves import at_axles, filtered, frequencies, variances, weighting_factors
+from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -77,7 +78,7 @@ class Neighbourhood:
         if not factors:
             return np.asarray(np.sqrt(self._variances(rest, self.vehicles) / self.whole) - 1.0)
         scene, rest = (replace(each, vehicle=changed(each.vehicle, factors)) for each in (self.scene, rest))
-        vehicles = Vehicles(scene.vehicle, float(self.speeds[0]))
+        vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)
         changes = np.sqrt(self._variances(rest, vehicles) / self._variances(scene, vehicles)) - 1.0
         self.off += len(vehicles)
         return np.asarray(changes)
@@ -99,7 +100,7 @@ class Neighbourhood:
         return np.concatenate([self._sum(scene, vehicles, speeds).variances for speeds in groups])
 
     def _sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "Sum":
-        return Sum(scene, vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
+        return Sum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
         """Variances of a scene at a few speeds, with the slopes of all parameters."""
@@ -134,9 +135,9 @@ class Sum:
     """Sums over frequencies (w,) for what is left of a scene at speeds (m/s)."""
 
     def __init__(
-        self, scene: ReducedScene, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
+        self, excitation: Excitation, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
     ) -> None:
-        self.excitation, self.speeds = scene.excitation(), speeds
+        self.excitation, self.speeds = excitation, speeds
         rates = vehicle.modes.rates if vehicle.modes else _rates(vehicle.linear)
         ends = ENDS[0] * abs(rates).min(), ENDS[1] * abs(rates).max()
         self.omega, weights, self.apart = frequencies(rates, max(self.excitation.lengths) / float(speeds[0]), ends)
@@ -147,8 +148,9 @@ class Sum:
     @property
     def variances(self) -> np.ndarray:
         """Variances (v, q)."""
-        H, V = np.sqrt(self.weights)[..., None] * self.response.H, Filters(self.excitation).V
-        gains = [H @ (heights @ V) for heights in self.excitation.heights]
+        H = np.sqrt(self.weights)[..., None] * self.response.H
+        rows = H.reshape(-1, H.shape[2])
+        gains = [(rows @ heights).reshape(*H.shape[:2], -1) for heights in self.excitation.heights]
         return variances(gains, self.excitation, self.speeds, self.omega, self.apart)
 
     def heights(self) -> np.ndarray:

@@ -38,7 +38,8 @@ def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> Spat
 
     def part(group: str, before: Any) -> Any:
         known = [key for key in PARTS[group] if (group, before.name, key) in factors]
-        return replace(before, **{k: _times(getattr(before, k), factors[group, before.name, k]) for k in known})
+        after = {key: _times(getattr(before, key), factors[group, before.name, key]) for key in known}
+        return replace(before, **after) if after else before
 
     groups: dict[str, Any] = {group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARTS}
     return replace(vehicle, **groups)
