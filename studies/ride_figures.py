@@ -197,7 +197,9 @@ def detail_figure(
     for i, j in np.ndindex(values.shape):
         if np.isfinite(values[i, j]):
             dark = abs(values[i, j]) > 40
-            axis.text(j, i, _signed(float(values[i, j])), ha="center", va="center", fontsize=SMALL, color="w" if dark else "k")
+            axis.text(
+                j, i, _signed(float(values[i, j])), ha="center", va="center", fontsize=SMALL, color="w" if dark else "k"
+            )
     axis.set_xticks(range(len(heads)), heads, fontsize=SMALL)
     axis.set_yticks(range(len(names)), names)
     axis.grid(visible=False)
