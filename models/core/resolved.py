@@ -44,7 +44,7 @@ def missed_by_first_order(positions: np.ndarray, rates: np.ndarray, step: float,
     steps after or before them."""
     middle = (rates[1:] + rates[:-1]) / 2.0
     ways = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
-    return min(missed_velocity_share(*way, step, mass) for way in ways)
+    return min(missed_velocity_share(places, velocities, step, mass) for places, velocities in ways)
 
 
 def check_resolved(
