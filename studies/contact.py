@@ -133,7 +133,7 @@ def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
     if last.fields:
         title = (
             f"{scene.title}\n"
-            f"ξx = {motion[0]:.3g}, ξy = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
+            f"ξx = {motion[0]:.3g}, ξy = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m\n"
             f"Fx = {1e-3 * last.fx:.2f} kN, Fy = {1e-3 * last.fy:.2f} kN, Mz = {last.mz:.1f} N m "
             f"by {NAMES[scene.method.name]}"
         )

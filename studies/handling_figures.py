@@ -14,7 +14,14 @@ TYRES, LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
 """Colours of four tyres, and lines of the first four, the next four (of what is towed) and so on."""
 
 
-CORNERS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+CORNERS = {
+    "fl": "front left",
+    "fr": "front right",
+    "rl": "rear left",
+    "rr": "rear right",
+    "cl": "caravan left",
+    "cr": "caravan right",
+}
 """Names of tyres as readers know them; others keep theirs."""
 
 

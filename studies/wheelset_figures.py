@@ -188,7 +188,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
-    heading(figure, f"{title}: one cycle, the same in every implementation", results)
+    heading(figure, f"{title}\nOne cycle, the same in every implementation", results)
     save(figure, path)
 
 

@@ -16,7 +16,7 @@ from models.identification.uncertainty import profile, uncertainty
 from models.measured.outliers import without_outliers
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
-from studies.command.identify import identify
+from studies.command.identify import identify, late_clock, lines
 
 NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
 UNITS = {"yaw rate": "rad/s", "lateral acceleration": "m/s^2", "side slip": "rad"}
@@ -107,6 +107,17 @@ def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
     error, direction = known.combinations()[-1]
     assert np.argmax(np.abs(direction)) == 2 or error > 1.0
     assert not known.determined[2]
+
+
+@pytest.mark.parametrize("late", [0.0, 0.6])
+def test_a_clock_that_is_late_is_told(scene: SingleTrackScene, late: float) -> None:
+    """The model is held to a measurement of its own, whose clock shows more by 0.6 s."""
+    driven = run(scene)
+    columns = {name: (UNITS[name], np.interp(TIMES - late, TIMES, driven[name])) for name in NOISE}
+    write_table(Path(scene.folder) / "late.csv", {"time": ("s", TIMES), **columns})
+    known = uncertainty(fit(problem_of(begun(scene), Path(scene.folder) / "late.csv", ["vehicle.yaw_inertia"])))
+    assert late_clock(known) == pytest.approx(late, abs=0.1)  # the start has other tyres, which move the phase
+    assert any("the measurement's clock seems" in line for line in lines(known)) == (late > 0.0)
 
 
 def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:

@@ -123,7 +123,7 @@ def test_a_saved_result_is_read_and_compared_with_the_same_numbers(scene, result
     from studies.command.comparison import compare
 
     other = twinrig.run(scene, "reference")
-    result.save(tmp_path / "a.nc")
+    result.save(str(tmp_path / "a.nc"))
     other.save(tmp_path / "b.nc")
     report = twinrig.compare(result, tmp_path / "b.nc")
     files, _ = compare(tmp_path / "a.nc", tmp_path / "b.nc")
@@ -185,7 +185,7 @@ ERRORS = {
     "engine of no engine": (lambda r: run_short("contact_ellipse", "mujoco"), "no engine computes: leave it out"),
     "scene": (lambda r: twinrig.load("study_raod"), "no such scene.*did you mean 'study_road'"),
     "file": (lambda r: twinrig.load("nowhere.toml"), "nowhere.toml: no such file"),
-    "no scene": (lambda r: twinrig.load(5), "must be a name, a file, a table or a scene, not a int"),
+    "no scene": (lambda r: twinrig.load(5), "must be a name, a file, a table or a scene, not int"),
     "saved result": (lambda r: twinrig.load("run.nc"), "twinrig.read reads a saved result"),
     "key": (lambda r: twinrig.load("study_road", set={"run.duratoin": 2.0}), "did you mean 'duration'"),
     "value": (lambda r: twinrig.load("study_road", set={"run.step": -1.0}), "run.step = -1.0: must be above 0.*in s"),
@@ -211,7 +211,12 @@ ERRORS = {
     "no engine": (lambda r: twinrig.export("handling", "adams"), "^engine = 'adams': no engine that has files"),
     "no vehicle": (lambda r: twinrig.export("contact_ellipse", "mujoco"), "no vehicle that an engine builds"),
     "no such file": (lambda r: twinrig.export("handling", "mujoco", "x.py"), "^file = 'x.py': must end in .xml"),
-    "no quantities": (lambda r: twinrig.choose("study_road"), "quantities: is missing"),
+    "no quantities": (lambda r: twinrig.choose("study_road"), "quantities: is missing.*give both"),
+    "no saved file": (
+        lambda r: twinrig.read("nowhere.nc"),
+        r"^nowhere.nc: no such file \(a saved result ends in .nc\)$",
+    ),
+    "a folder": (lambda r: twinrig.read("."), "is a folder: name one file of it"),
 }
 
 

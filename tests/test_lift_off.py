@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from models.advice.choice.systems.ride import opened
-from models.core.errors import InputError
+from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import without
 from models.engines import reference
 from models.engines.assembly import Settings
+from models.engines.catalogue import CATALOGUE
 from models.engines.catalogue import RECOMMENDED as INTEGRATORS
 from models.engines.protocol import build
 from models.engines.spatial_protocol import build as build_spatial
@@ -147,6 +148,29 @@ def test_the_error_falls_with_the_square_of_the_step():
         errors.append(np.abs(run.states[:: round(1e-3 / step)] - exact).max())
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 1.5 < slope < 3.0  # a corner anywhere within a step: 2 on the average, not 4
+
+
+FIRST_ORDER = [
+    (engine, name)
+    for engine in ("exudyn", "mujoco")
+    for name, integrator in CATALOGUE[engine].items()
+    if integrator.order == 1
+]
+
+
+@pytest.mark.parametrize(("engine", "name"), FIRST_ORDER)
+def test_methods_of_first_order_run_where_tyres_lift(engine, name):
+    """On a rough road their errors fall with the step; steps that jump over landings of stiff tyres are told."""
+    assembly = assemble(scene({"road": ROAD}, duration=1.0))
+    exact = build("reference", assembly, Settings("RK4", 5e-5, 1.0)).run().states
+    errors = []
+    for step in (1e-3, 2.5e-4):
+        states = build(engine, assembly, Settings(name, step, 1.0)).run().states
+        errors.append(np.abs(states - exact[:: round(step / 5e-5)])[:, 4:].max())
+    assert 3.0 < errors[0] / errors[1] < 5.0  # a quarter of the step
+    stiff = assemble(scene(start=DROP, k1=2e7, k2=2e7, d1=0.0, d2=0.0))
+    with pytest.raises((RunFailed, InputError), match=r"goes unseen between them|stability limit"):
+        build(engine, stiff, Settings(name, 2e-3, 2.0)).run()
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -47,7 +47,7 @@ def load(scene: AnyScene, set: Changes = None) -> "Scene":
     if isinstance(scene, Mapping):
         return of_table(scene, "table", Path(), set or {})
     if not isinstance(scene, str | Path):
-        raise InputError("", "scene", None, f"must be a name, a file, a table or a scene, not a {type(scene).__name__}")
+        raise InputError("", "scene", None, f"must be a name, a file, a table or a scene, not {type(scene).__name__}")
     if str(scene).endswith(".nc"):
         raise InputError(scene, "", None, "is no scene; twinrig.read reads a saved result")
     path = scene_path(str(scene))
@@ -260,7 +260,7 @@ def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float |
     if scene.checked.study != study:
         for key, value in asked.items():
             if value is None:
-                raise InputError("choose", key, None, "is missing: this scene asks for no choice of its own")
+                raise InputError("choose", key, None, "is missing: this scene asks for no choice, so give both")
         changes |= {"study": study, **({"options": None} if "options" in scene.table else {})}
     return scene.with_(changes) if changes else scene
 

@@ -79,7 +79,7 @@ class Result:
         """Seconds of the march; of a result that was read from a file there are none."""
         return float(self.data.attrs["seconds"])
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write netCDF without the seconds: the same run gives the same bytes.
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
@@ -91,14 +91,16 @@ class Result:
             for name, variable in data.variables.items()
             if variable.size and variable.ndim and variable.dtype.kind in "fiu"
         }
-        write_whole(path, data.to_netcdf(engine="h5netcdf", encoding=checked))  # HDF5 itself crashes on a full disk
+        write_whole(
+            Path(path), data.to_netcdf(engine="h5netcdf", encoding=checked)
+        )  # HDF5 itself crashes on a full disk
 
-    def save_table(self, path: Path, *channels: str) -> None:
+    def save_table(self, path: Path | str, *channels: str) -> None:
         """Write channels that share one axis, or all of them, as columns of a CSV."""
         from models.core.tables import write_table
 
         names = channels or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
-        write_table(path, {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
+        write_table(Path(path), {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
 
 
 def result(
@@ -176,6 +178,9 @@ def load(path: Path) -> Result:
     """Read a saved result; raises InputError if the file is not one."""
     import xarray as xr
 
+    if not path.is_file():
+        told = "is a folder: name one file of it" if path.is_dir() else "no such file"
+        raise InputError(path, "", None, f"{told} (a saved result ends in .nc)")
     try:
         with xr.open_dataset(path, engine="h5netcdf") as data:
             return Result(data.load())

@@ -159,10 +159,12 @@ def landings_followed(
     times (n,) in s, states (n, 8); nothing is looked at where tyres cannot lift.
     """
     lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
-    if not lifts or CATALOGUE[engine][settings.integrator].adaptive:
+    integrator = CATALOGUE[engine][settings.integrator]
+    if not lifts or integrator.adaptive:
         return
     p = assembly.parameters
-    check_resolved(engine, times, states[:, :4], states[:, 4:], np.array([p.m1, p.m2, p.m3, p.I]))
+    mass = np.array([p.m1, p.m2, p.m3, p.I])
+    check_resolved(engine, times, states[:, :4], states[:, 4:], mass, integrator.order)
 
 
 def balanced(

@@ -109,7 +109,7 @@ class Overlay:
 
 def _share(relative: float) -> str:
     """A relative error; what does not move has none."""
-    return f"{relative:.2%}" if np.isfinite(relative) else "-"
+    return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
 def _within_error_text(match: Match) -> str:
@@ -248,7 +248,10 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         below.plot(match.times, match.error, color=BLUE)
         below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
-        below.set(title=f"rms error {match.rms:.3g} {unit}, {_share(match.relative)}", xlabel="time of the run [s]")
+        below.set(
+            title=f"rms error {match.rms:.3g} {unit}, {_share(match.relative)} of its deviation",
+            xlabel="time of the run [s]",
+        )
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})

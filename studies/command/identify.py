@@ -16,11 +16,14 @@ from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
 from models.identification.uncertainty import Profile, Uncertainty, profile, uncertainty
+from models.measured.time_shift import Pair, time_shift
 
 STAGES = "stages"
 """Folder of finished stages, from which ``--resume`` goes on."""
 NAMED_SHARE = 0.3
 """Share of a combination from which on a parameter is named in it."""
+NEARER = 2.0
+"""Times as near as they are must run and measurement come by a shift of the clock for it to be told."""
 Tell = Callable[[str, float], None]
 
 
@@ -161,11 +164,40 @@ def lines(known: Uncertainty, profiles: Sequence[Profile] = ()) -> list[str]:
     table.append("  left out as spikes or not measured: " + ", ".join(f"{n} of {name}" for name, n in left.items()))
     if not solved.converged:
         table.append("  the search has not settled: resume it, or start nearer")
+    if late := late_clock(known):
+        table.append(
+            f"  DOUBT: the measurement's clock seems {late:.4g} s later than the run's: take that off its times"
+        )
     for curve in profiles:
         shape = "as the standard error says" if curve.quadratic else "not as the standard error says"
         at = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
         table.append(f"  profile of {curve.name}: {at} (95 % below 3.84), {shape}")
     return table
+
+
+def late_clock(known: Uncertainty) -> float:
+    """s by which the measurement seems later than the model; 0 unless both are ``NEARER`` as near when laid so.
+
+    The model is that of the start: estimates take up a part of the delay.
+    """
+    problem, times = known.fit.problem, known.fit.problem.clock.times
+    measured = [np.where(channel.used, channel.values, np.nan) for channel in problem.channels]
+    start = np.array([each.start for each in problem.parameters])
+    pairs = [Pair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)]
+    shift = time_shift(pairs).seconds
+    return shift if _distance(pairs, shift) * NEARER < _distance(pairs, 0.0) else 0.0
+
+
+def _distance(pairs: Sequence[Pair], shift: float) -> float:
+    """Mean, over channels, of the rms difference by the measurement's deviation, the measurement laid earlier by so
+    many seconds."""
+    shares = []
+    for pair in pairs:
+        at = pair.times - shift
+        inside = np.isfinite(pair.values) & (at >= pair.run_times[0]) & (at <= pair.run_times[-1])
+        gap = np.interp(at[inside], pair.run_times, pair.run) - pair.values[inside]
+        shares.append(float(np.sqrt(np.mean(gap**2))) / (float(np.nanstd(pair.values)) or 1.0))
+    return float(np.mean(shares))
 
 
 def _combined(known: Uncertainty) -> list[str]:
@@ -200,7 +232,7 @@ def draw_fit(known: Uncertainty, title: str, path: Path) -> None:
         top.plot(times, row, color=VERMILION, linewidth=0.8, label="model")
         top.set(title=channel.name, ylabel=f"[{channel.unit or '-'}]")
         below.plot(times, row - measured, color=BLUE, linewidth=0.8)
-        below.set(ylabel="model less\nmeasured")
+        below.set(ylabel=f"model less\nmeasured [{channel.unit or '-'}]")
     axes[-1, 0].set_xlabel("time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     heading(figure, title, {})

@@ -305,4 +305,4 @@ def _table(columns: Columns, pages: list[str]) -> list[str]:
         for name, values in list(moving.items())[:12]
     ]
     rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
-    return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]
+    return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: {', '.join(['sweep.csv', *pages])}"]

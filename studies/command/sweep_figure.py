@@ -80,10 +80,10 @@ def _results_of_engine(results: Results, engine: str) -> Results:
 
 
 def draw_sweep(swept: Swept, folder: Path) -> list[str]:
-    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
+    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names; none where no number changes."""
     changing = _changing(swept.columns)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
-    shown = list(changing.items())[: size * MOST_PAGES] or [("no number changes", {})]
+    shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
         _page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")

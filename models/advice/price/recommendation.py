@@ -350,6 +350,8 @@ def _default_cost(search: Search, ladder: Ladder, timed: list[SettingChoice]) ->
     if met is not None or not clear:
         return Default(as_it_is, met, False)
     finest = min(clear, key=lambda attempt: attempt.setting.value)
+    if search.meets(finest):  # over the part that was searched, and not over the whole run
+        return Default(as_it_is, None, False)
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)
     longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration

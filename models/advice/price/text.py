@@ -105,7 +105,7 @@ def _defaults(recommendation: Recommendation) -> list[str]:
 def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool) -> str:
     """Text: cost of the refined default method beside the engine's cheapest setting and the cheapest of all."""
     if refined is None:
-        return "; no step tried gives an answer"
+        return "; no step that was tried holds the tolerance over the whole run"
     parts = [
         f"{ratio:.3g} times the {kind} of {whose}"
         for whose, key in ((f"{LABELS[engine]}'s cheapest", engine), ("the cheapest of all", ""))
