@@ -162,7 +162,7 @@ def outcome(name, folder):
 
 def test_without_the_check_of_the_arrangement_a_plane_is_silent(monkeypatch, tmp_path):
     monkeypatch.setattr(sensor_array, "PLANE", 0.0)
-    monkeypatch.setattr(sensor_array, "FLAT", 0.0)
+    monkeypatch.setattr(sensor_array, "FLAT_SPREAD_RATIO", 0.0)
     assert outcome("accelerometers nearly in a plane", tmp_path) == "SILENT"
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from models.core.systems import DEFAULT, SYSTEMS, of_table
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from validation.blind_spots.rewriting import ROOT
 
 FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
@@ -37,7 +37,7 @@ def runs() -> list[Run]:
 
 def engines_of(scene: Path) -> tuple[str, ...]:
     """The engines of a scene's system."""
-    system = SYSTEMS[tomllib.loads(scene.read_text(encoding="utf-8")).get("system", DEFAULT)]
+    system = SYSTEMS[tomllib.loads(scene.read_text(encoding="utf-8")).get("system", DEFAULT_SYSTEM)]
     return (*system.engines, *system.on_request)
 
 
