@@ -38,7 +38,7 @@ class Line:
 
     ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
     writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked), "not
-    audited" (it is shared, and nothing was asked yet);
+    audited" (it is shared, and not all that call it were asked);
     calling : in how many cases and tests that were asked it gives numbers, which are those on independent grounds, and
     all others if none of these noticed; left : how many of them were not run, for want of time; commit : that the line
     belongs to; kind : "compiled", or "Python" and the engines that call the function.
