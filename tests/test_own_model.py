@@ -125,6 +125,27 @@ def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
     assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
 
 
+PUSHED = TIED.replace(
+    "</mujoco>",
+    """<actuator><motor name="jet" site="elbow" gear="1 -2 .5 .3 .1 -.2" ctrlrange="1.5 2"/>
+    <general name="prop" site="ring" gear="0 0 3 0 0 .4" biastype="affine" biasprm="2 0 0"/></actuator></mujoco>""",
+)
+"""Forces and moments that turn with bodies."""
+
+
+def test_actuators_that_push_sites_are_those_of_the_file(tmp_path):
+    """To rounding; the fault: a force that is 1 % larger, a moment along other axes."""
+    twin = _read(tmp_path, PUSHED).twin
+    assert all(max(row.force, row.acceleration) < 1e-11 for row in certificate(twin, 20))
+    jet, prop = twin.driven.body_loads
+    for wrong in (replace(jet, force=1.01 * jet.force), replace(jet, moment=jet.moment[[1, 0, 2]])):
+        driven = replace(twin.driven, body_loads=(wrong, prop))
+        assert all(row.acceleration > 1e-5 for row in certificate(replace(twin, driven=driven), 20))
+    other = _read(tmp_path, changed(PUSHED, "prop", "0 0 3 0 0 .4", "0 0 3 0 0 .5"), "b.xml").twin
+    comparison = compare(twin, other, 3)
+    assert [(each.kind, each.owner) for each in comparison.influential] == [("gear", "actuator 'prop'")]
+
+
 @pytest.mark.parametrize("text", [LINKED, HELD, HUNG], ids=["linked", "held", "hung"])
 def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     """To rounding, rigid in two builds; what gives way in MuJoCo is its law; ends that are 1 mm off are seen in all."""
@@ -399,7 +420,9 @@ def test_thirty_joints_are_certified(tmp_path):
     assert all(row.alike for row in certificate(_read(tmp_path, chain(30)).twin, 100))
 
 
+DAMPED = '<actuator><general name="damp" site="s" biastype="affine" biasprm="0 0 -1"/></actuator>'
 REFUSED = [
+    ("actuator", '<site name="s"/>', "actuator: actuator 'damp' (a.xml:2)"),
     ("contact", '<geom name="box" type="box" size=".1 .1 .1"/>', "geom 'box' (a.xml:2)"),
     ("friction_loss", '<joint name="rub" type="ball" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
     ("turning_law", '<joint name="soft" type="ball" armature="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
@@ -413,6 +436,8 @@ def test_content_without_an_equal_is_refused_by_name_and_line(tmp_path, kind, el
         f'<mujoco><worldbody>{floor}<body name="b"><inertial pos="0 .1 0" mass="1" diaginertia="1 1 1"/>\n'
         f'{element}<joint name="j" axis="0 0 1"/></body></worldbody></mujoco>'
     )
+    if kind == "actuator":
+        text = text.replace("</mujoco>", f"{DAMPED}</mujoco>")
     if "ball" in element:
         text = text.replace('<joint name="j" axis="0 0 1"/>', "")
     path = _file(tmp_path, text)
