@@ -69,7 +69,7 @@ def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
     ]
 
 
-def start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
+def set_start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
     """Let a system begin with coordinates and rates (n,), in Exudyn's own order."""
     initial = exu.ConfigurationType.Initial
     mbs.systemData.SetODE2Coordinates(q, initial)

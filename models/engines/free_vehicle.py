@@ -29,7 +29,7 @@ from models.engines.native_parts import (
     TurningSpring,
     joint_parts,
 )
-from models.engines.protocol import guard, timed
+from models.engines.protocol import guard, settings_of
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class FreeModel(ABC):
 
         RunFailed unless all of it is finite and sane.
         """
-        settings, rest = timed(self.ENGINE, self.settings), np.zeros(self.size)
+        settings, rest = settings_of(self.ENGINE, self.settings), np.zeros(self.size)
         steps, step = settings.steps, settings.step
         states = self.march(rest if q is None else q, rest if v is None else v, steps, step)
         times = step * np.arange(steps + 1)

@@ -8,7 +8,16 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start, tie_gaps, ties
+from models.engines.exudyn_system import (
+    items,
+    mass_and_force,
+    packed_forces,
+    recorders,
+    set_start,
+    solve,
+    tie_gaps,
+    ties,
+)
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import (
@@ -88,7 +97,7 @@ class FreeExudyn(FreeModel):
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Exudyn's own mass matrix (n, n) and residual (n,)."""
-        start(self.mbs, q, v)
+        set_start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
 
     def ties(self, places: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -101,7 +110,7 @@ class FreeExudyn(FreeModel):
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
-        start(self.mbs, q, v)
+        set_start(self.mbs, q, v)
         if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))
         return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for (sensor,) in self._sensors])

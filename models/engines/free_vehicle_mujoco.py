@@ -25,7 +25,7 @@ from models.engines.native_mujoco import (
     add_rotors,
     add_turning_spring,
     built_elements,
-    ends,
+    end_bodies,
     set_laws,
     set_line_springs,
     set_rotors,
@@ -79,7 +79,7 @@ def _merged(driven: Driven) -> dict[str, str]:
     held += [body for connection in driven.connections for body, _ in connection.ends]
     held += [body for each in driven.turning_springs for body in each.bodies]
     held += [load.body for load in driven.body_loads]
-    bearing = ends(driven.parts) | {body for body in held if body is not None}
+    bearing = end_bodies(driven.parts) | {body for body in held if body is not None}
     return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 
 

@@ -50,7 +50,7 @@ class Affine(NamedTuple):
     high: float = ENDLESS
 
 
-def ends(parts: Sequence[NativePart]) -> set[str]:
+def end_bodies(parts: Sequence[NativePart]) -> set[str]:
     """Bodies on which parts have sites: MuJoCo must know them apart from what rides on them."""
     axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
     return {name for travel in axial for name in (travel.frame, travel.body)}

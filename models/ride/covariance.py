@@ -18,7 +18,7 @@ from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import ACCURACY, TOLD, Growth, MarginalParts, growth, split_marginal
+from models.ride.marginal import ACCURACY, ZERO_MARGIN, Growth, MarginalParts, growth, split_marginal
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 """What an output can be."""
@@ -112,6 +112,8 @@ def hits(system: DelayedSystem) -> Hits:
         return Hits([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
     at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
+    if len(delays) == len(system.B):
+        return Hits([system.B[i] for (i,) in at], [system.D[i] for (i,) in at], delays, False)
     B, D = ([np.sum([each[i] for i in together], axis=0) for together in at] for each in (system.B, system.D))
     return Hits(B, D, delays, False)
 
@@ -263,7 +265,7 @@ def verdicts(
     rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.
     """
     direct = sum((d**2).sum(axis=1) for d in D) * fastest
-    white = direct > (TOLD * accuracy) ** 2 * variance + floor
+    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
     each = [_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
     return tuple(status for status, _ in each), tuple(reason for _, reason in each)
 

@@ -1,7 +1,8 @@
 """M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from models.vehicles.spatial import (
     Vector,
 )
 
-NOTHING = 1e-10
+NEGLIGIBLE_TRAVEL = 1e-10
 """Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
@@ -50,6 +51,8 @@ class Kinematics:
         self._bodies = {body.name: body for body in vehicle.bodies}
         self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
         self.size = len(self._index)
+        bodies = ((body.name, body.parent, body.position, body.freedoms) for body in vehicle.bodies)
+        self._shifts = _shifts_of(tuple(bodies))
 
     def coordinate(self, body: str, freedom: str) -> np.ndarray:
         """Row (n,) that picks one coordinate out of q, zeros where the body does not have it."""
@@ -59,7 +62,15 @@ class Kinematics:
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
+        """(3, n): displacement of a point (m) by the coordinates, read-only; zeros on the ground, None."""
+        x, y, z = point
+        place = body, (x, y, z)
+        if place not in self._shifts:
+            self._shifts[place] = self._shift_of(*place)
+            self._shifts[place].flags.writeable = False
+        return self._shifts[place]
+
+    def _shift_of(self, body: str | None, point: Vector) -> np.ndarray:
         columns = np.zeros((3, self.size))
         for rider, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
@@ -89,7 +100,7 @@ class Kinematics:
 
     def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
         """(3, n): change of an axis that is fixed in a body, by the coordinates; zeros for the space, None."""
-        return np.zeros((3, self.size)) if frame is None else np.cross(self.turn(frame), axis, axisa=0).T
+        return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
 
     def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
         """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
@@ -109,6 +120,13 @@ class Kinematics:
         rider = self._bodies[body]
         coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
         return self._motions(rider.parent) + coordinates
+
+
+@lru_cache(maxsize=16)
+def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[End, np.ndarray]:
+    """Displacements (3, n) of points that were asked for, shared by all vehicles of these ``bodies``: name, parent,
+    position and freedoms."""
+    return {}
 
 
 def _check_parallel(vehicle: SpatialVehicle) -> None:
@@ -135,7 +153,8 @@ def linearise(
     gains |= equivalent or {}
     tyres = _tyres(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
-    for row, k, c in (*_parts_by_name(vehicle, motion, gains).values(), *tyres.values()):
+    parts = _parts_by_name(vehicle, motion, gains)
+    for row, k, c in (*parts.values(), *tyres.values()):
         stiffness += k * np.outer(row, row)
         damping += c * np.outer(row, row)
     stiffness += _geometric(vehicle, motion)
@@ -148,7 +167,7 @@ def linearise(
         road_damping=np.column_stack([c * row for row, _, c in tyres.values()]),
         coordinates=vehicle.coordinates(),
         wheels=wheels(vehicle),
-        outputs=outputs(vehicle, motion, gains),
+        outputs=tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
     return limited(whole, vehicle, vehicle.limits)[0] if vehicle.limits else whole
@@ -159,11 +178,9 @@ def wheels(vehicle: SpatialVehicle) -> tuple[Wheel, ...]:
     return tuple(Wheel(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
-def outputs(
-    vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains] | None = None
-) -> tuple[Output, ...]:
+def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
     """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
-    parts, tyres = _parts_by_name(vehicle, motion, gains or _gains(vehicle)), _tyres(vehicle, motion)
+    parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
@@ -373,17 +390,13 @@ def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> t
 
     linear : the vehicle without limits. InputError where nothing is left that could move.
     """
-    M, N = massless(linear.mass, vehicle, limits.massless), _free(vehicle, limits)
+    M, N = massless(linear.mass, vehicle, limits.massless), _free(linear.coordinates, vehicle, limits)
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
+    moved = [factors @ N for factors in linear.read[:3]] if linear.outputs else [()] * 3
     outputs = tuple(
-        replace(
-            o,
-            acceleration_factors=o.acceleration_factors @ N,
-            rate_factors=o.rate_factors @ N,
-            displacement_factors=o.displacement_factors @ N,
-        )
-        for o in linear.outputs
+        Output(o.name, o.unit, o.kind, acceleration, rate, displacement, o.road_factors, o.road_rate_factors)
+        for o, acceleration, rate, displacement in zip(linear.outputs, *moved, strict=True)
     )
     return replace(
         linear,
@@ -407,10 +420,12 @@ def massless(matrix: np.ndarray, vehicle: SpatialVehicle, names: frozenset[str])
     return mass(replace(vehicle, bodies=light))
 
 
-def _free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+def _free(coordinates: Sequence[tuple[str, str]], vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
     """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
-    coordinates, motion = vehicle.coordinates(), Kinematics(vehicle)
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
+    if not limits.rigid:
+        return kept
+    motion = Kinematics(vehicle)
     rows = [
         np.array(s.axis)
         @ (motion.shift(s.second_body, s.second_point) - motion.shift(s.first_body, s.first_point))
@@ -418,4 +433,4 @@ def _free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
         for s in vehicle.springs
         if s.name in limits.rigid
     ]
-    return kept @ null_space(np.array(rows), rcond=NOTHING) if rows else kept
+    return kept @ null_space(np.array(rows), rcond=NEGLIGIBLE_TRAVEL) if rows else kept

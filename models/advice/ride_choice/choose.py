@@ -29,12 +29,12 @@ from models.systems.ride.reduced_scene import Effect, illegal
 
 ROUNDS = 30
 """Choices that are confirmed at most."""
-WORTH, EVEN = 0.05, 1e-3
+EQUAL_COST_LOG, EVEN = 0.05, 1e-3
 """Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
 them."""
-SHORTER = 0.9
+STEP_FACTOR = 0.9
 """A step that no run confirms becomes so many times as long."""
-LEAST = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 
 Saved = Callable[[Set, Set], float]
@@ -74,13 +74,21 @@ class Chooser(Candidates):
         return {}
 
     @cached_property
+    def uncertified(self) -> set[Set]:
+        """Sets that kept the tolerance and whose certificate was not exact."""
+        return set()
+
+    @cached_property
     def singles(self) -> list[Set]:
         """Sets of an effect with all effects that it needs."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
     def within_tolerance(self, chosen: Set) -> bool:
-        """Whether the tolerance holds without these effects, wherever and whatever of them is left out."""
+        """Whether the tolerance holds without these effects, wherever and whatever of them is left out.
+
+        A certificate is asked of what is chosen at last, and once it failed, of all that it failed for.
+        """
         if not chosen:
             return True
         if not (self.holds(self.solved(chosen)) and self.holds(self.between(chosen))):
@@ -91,7 +99,7 @@ class Chooser(Candidates):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
             self.refused[chosen] = why
-        return not why and self.certified(chosen)
+        return not why and chosen not in self.uncertified
 
     def _cancels(self, chosen: Set) -> str:
         """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
@@ -113,17 +121,15 @@ class Chooser(Candidates):
         """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
         step, marches = self.accurate(chosen).step, self.marches(chosen)
         while step and not confirms(marches[len(marches) // 2], step):
-            step *= SHORTER
+            step *= STEP_FACTOR
         return self.at_step(chosen, step)
 
     def choose(self) -> RideChoice:
         """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
-        chosen, rounds = self._greedy()
-        chosen = self._worthwhile(chosen)
-        if self.accurate(chosen).calls * (1 + WORTH) > self.accurate(frozenset()).calls:
-            chosen = frozenset()
-        changes, between, none = self.confirm(chosen), self.between(chosen), frozenset[Effect]()
-        off = self.off(chosen) if chosen else np.zeros(len(self.rows))
+        chosen, rounds = self._certified()
+        unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
+        looks = (self.confirm, self.between, self.off)
+        changes, between, off = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
@@ -138,6 +144,20 @@ class Chooser(Candidates):
             rounds,
             self._reasons(chosen),
         )
+
+    def _certified(self) -> tuple[Set, int]:
+        """The choice that saves calls and is certified, and how many sets were put to the test for it."""
+        rounds = 0
+        while rounds < ROUNDS:
+            chosen, tested = self._greedy()
+            chosen, rounds = self._worthwhile(chosen), rounds + tested
+            saves = self.accurate(chosen).calls * (1 + EQUAL_COST_LOG) <= self.accurate(frozenset()).calls
+            if not chosen or not saves:
+                break
+            if self.certified(chosen):
+                return chosen, rounds
+            self.uncertified.add(chosen)
+        return frozenset(), rounds
 
     def _reasons(self, chosen: Set) -> tuple[str, ...]:
         """Reasons why larger sets that kept the tolerance were refused."""
@@ -173,10 +193,10 @@ class Chooser(Candidates):
         for each other."""
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
-            if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
+            if self.cost(less).step < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
                 continue  # it alone bounds the step
-            same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)
-            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH)
+            same = self.cost(less).step >= self.cost(chosen).step * (1 - EQUAL_COST_LOG)
+            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
             if same and self.within_tolerance(less):
                 return self._worthwhile(less)
         return chosen
@@ -205,7 +225,7 @@ class Chooser(Candidates):
         """Logarithm, of savings worth the tolerance they take."""
         then = self.cost(further).calls
         saved = log(self.cost(chosen).calls / then) if then < inf else 0.0
-        return saved if saved > WORTH else 0.0
+        return saved if saved > EQUAL_COST_LOG else 0.0
 
     def _work_saved(self, chosen: Set, further: Set) -> float:
         now, then = self.cost(chosen), self.cost(further)
@@ -226,10 +246,10 @@ class Chooser(Candidates):
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
             saves = saved(chosen, further)
-            if saves <= LEAST * most:
+            if saves <= NEGLIGIBLE_SHARE * most:
                 continue  # whatever error it adds
             share = self.share(further)
-            score = saves / max(share - now, LEAST) if share <= 1.0 else 0.0
+            score = saves / max(share - now, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best

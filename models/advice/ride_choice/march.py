@@ -11,7 +11,7 @@ A wave e^(i w t) of the road moves x by e^(i w h) - R, and what a run samples is
 its steps, w + 2 pi m / h: the variance is an integral from 0 to pi / h, and no run and no chance is in it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -28,9 +28,9 @@ ALIKE, BEYOND = 6, 6.0
 stand for all beyond, which fall with their square."""
 LOWEST = 1e-4
 """Where panels of frequencies begin, by the highest frequency that steps can tell."""
-SHORTEST, STEPS, FINE = 1 / 32, 8, 64
+SHORTEST_STEP_SHARE, STEPS, FINE = 1 / 32, 8, 64
 """Shortest step that is tried, by the longest stable one; steps from there on, and parts of what lies between two."""
-TINY = 1e-12
+NEGLIGIBLE_SHARE = 1e-12
 """An error, by the tolerance, that is none."""
 
 
@@ -79,14 +79,15 @@ class March:
         alike = np.arange(-last, last + 1)[:, None]
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = np.zeros((len(omega), len(self.rows)))
-        for odd in (0, 1):
+        for odd, gains in enumerate(self._gains(half, step)):
             these = alike[:, 0] % 2 == odd
             waves = omega + 2 * np.pi * alike[these] / step
-            total += self._met(self._gains((1 - 2 * odd) * half, step), waves, count[these], apart)
+            total += self._met(gains, waves, count[these], apart)
         return np.sqrt(weights @ (total * abs(self._heard(omega).T) ** 2) / np.pi)
 
-    def _gains(self, half: np.ndarray, step: float) -> list[np.ndarray]:
-        """Quantities by the motions of every axle's filter (w, q, m), for waves that turn by ``half`` in half a step.
+    def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
+        """Quantities by the states of every axle's filter (w, q, m), for waves that turn by ``half`` in half a step,
+        and for those that turn by its opposite, which look alike at the steps.
 
         White noise is read as its mean over a step, as the filters' states at its begin, middle and end tell it.
         """
@@ -99,15 +100,17 @@ class March:
             (seen.T[:, :, None] * part[:, None, :]).reshape(len(rates), -1)
             for part in np.split(forced, [axles * m], axis=1)
         )
-        at = half[:, None]
-        moved = motions @ (begin[:, None] * by_road) + at * (motions @ (middle[:, None] * by_road))
-        moved = (moved + at**2 * (motions @ by_road)).reshape(len(half), len(seen), axles, m)
-        moved += self.read[:, self.vehicle :].reshape(len(seen), axles, m)
-        if by_noise.any():
-            noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, axles * k)
-            moved += (noise.reshape(len(half), -1, k) @ self._mean_noise(half, step)).reshape(moved.shape)
-        turned = moved @ self.filters.V
-        return [turned[:, :, i] for i in range(axles)]
+        shape = len(half), len(seen), axles, m
+        outer = motions @ (begin[:, None] * by_road) + end[:, None] * (motions @ by_road)
+        outer += self.read[:, self.vehicle :].reshape(-1)
+        inner = motions @ (middle[:, None] * by_road)
+        noisy = by_noise.any()
+        noise = (motions @ ((begin + middle + 1)[:, None] * by_noise)).reshape(len(half), -1, k) if noisy else None
+        for at in (half, -half):
+            moved = (outer + at[:, None] * inner).reshape(shape)
+            if noise is not None:
+                moved += (noise @ self._mean_noise(at, step)).reshape(shape)
+            yield [moved[:, :, i] for i in range(axles)]
 
     def _mean_noise(self, half: np.ndarray, step: float) -> np.ndarray:
         """Mean noise of a step by the states of a filter at its begin (w, k, m)."""
@@ -118,10 +121,10 @@ class March:
     def _met(self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray) -> np.ndarray:
         """Densities (w, q) of quantities by all ``waves`` (a, w) that look alike, each with its ``count`` (a, 1)."""
         road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
-        late = {}
+        late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
             density = count * pair.density(speeds, waves.ravel()).reshape(waves.shape)
-            own, shared = together(gains, pair, road.independent)
+            own, shared = together(by_noises, pair, road.independent)
             total = total + (density.sum(axis=0)[:, None] * own).real
             for (i, j), met in shared.items():
                 length = road.lengths[i] - road.lengths[j]
@@ -178,11 +181,11 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
             if not error <= 1.0:
                 runs.insert(0, runs.pop(i))  # what broke it here is likely to break it elsewhere
                 return float(np.log(error)) if error < np.inf else np.inf
-            worst = max(worst, float(np.log(max(error, TINY))))
+            worst = max(worst, float(np.log(max(error, NEGLIGIBLE_SHARE))))
         return worst
 
     high = 0.999 * min(march.longest for march in marches)
-    steps = np.geomspace(SHORTEST * high / 0.999, high, STEPS)
+    steps = np.geomspace(SHORTEST_STEP_SHARE * high / 0.999, high, STEPS)
     shares, low, broken = dict[int, float](), -1, STEPS
     while broken - low > 1:
         middle = (low + broken) // 2

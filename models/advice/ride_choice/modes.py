@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import block_diag, matrix_balance
+from scipy.linalg import block_diag
+from scipy.linalg.lapack import dgebal
 
 from models.ride.weighting import WEIGHTINGS
 
@@ -18,7 +19,7 @@ alike to tell."""
 INVERSE = 1e-9
 """By how much W V may differ from the unit matrix."""
 
-REACH = np.linspace(0.0, 3.0, 601)[1:]
+STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
 """Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
 
 
@@ -35,7 +36,7 @@ class Modes:
 
         The states are scaled as they balance A, so that units have no part in it.
         """
-        scale = matrix_balance(A, permute=False, separate=True)[1][0]
+        scale = dgebal(A, scale=1, permute=0)[3]
         V, W = self.V / scale[:, None], self.W * scale
         off = abs(W @ V - np.eye(len(A))).max(initial=0.0)
         grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
@@ -69,7 +70,7 @@ def modes_of(A: np.ndarray) -> Modes | None:
         return None
 
 
-def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
     """Motions of u' = A_u u, x' = A_x x + coupling u together, the state (u, x); None where they are not told apart."""
     if driver is None or system is None:
         return None
@@ -77,12 +78,16 @@ def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> 
     if not apart.all():
         return None
     met = (system.W @ coupling @ driver.V) / apart
-    corner = np.zeros((len(driver.rates), len(system.rates)))
-    return Modes(
-        np.concatenate([driver.rates, system.rates]),
-        np.block([[driver.V, corner], [system.V @ met, system.V]]),
-        np.block([[driver.W, corner], [-met @ driver.W, system.W]]),
-    )
+    rates = np.concatenate([driver.rates, system.rates])
+    return Modes(rates, _below(driver.V, system.V @ met, system.V), _below(driver.W, -met @ driver.W, system.W))
+
+
+def _below(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarray:
+    """Block matrix [[upper, 0], [corner, lower]]."""
+    n = len(upper)
+    whole = np.zeros((n + len(lower),) * 2, complex)
+    whole[:n, :n], whole[n:, :n], whole[n:, n:] = upper, corner, lower
+    return whole
 
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
@@ -90,23 +95,20 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
     n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
-    both = driven(road, A[:n, n:], vehicle)
+    both = driven_motions(road, A[:n, n:], vehicle)
     if both is None:
         return None
-    order = np.roll(np.arange(len(A)), n)
+    order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
     return Modes(both.rates, both.V[order], both.W[:, order]).of(A)
 
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
     """Motions of a system before the weightings of its outputs, the state (x, w), A that of both."""
-    parts = [_weighting(name) for name in names]
-    if system is None or None in parts:
+    filters = _weightings(names)
+    if system is None or filters is None:
         return None
     n = len(system.rates)
-    filters = [part for part in parts if part]
-    V, W = (block_diag(*(getattr(part, key) for part in filters)) for key in ("V", "W"))
-    together = Modes(np.concatenate([part.rates for part in filters]), V, W)
-    both = driven(system, A[n:, :n], together)
+    both = driven_motions(system, A[n:, :n], filters)
     return None if both is None else both.of(A)
 
 
@@ -118,16 +120,21 @@ def _filters(F: bytes, size: int, axles: int) -> Modes | None:
     return Modes(np.tile(each.rates, axles), block_diag(*[each.V] * axles), block_diag(*[each.W] * axles))
 
 
-@lru_cache(maxsize=16)
-def _weighting(name: str) -> Modes | None:
-    return modes_of(WEIGHTINGS[name].matrices()[0])
+@lru_cache(maxsize=64)
+def _weightings(names: tuple[str, ...]) -> Modes | None:
+    parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
+    filters = [part for part in parts if part]
+    if len(filters) < len(parts):
+        return None
+    V, W = (block_diag(*(getattr(part, key) for part in filters)) for key in ("V", "W"))
+    return Modes(np.concatenate([part.rates for part in filters]), V, W)
 
 
 def stable_step(values: np.ndarray) -> float:
     """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
-    values = values[abs(values) > 0]
-    z = values[:, None] / abs(values)[:, None] * REACH
+    values = values[(abs(values) > 0) & (values.imag >= 0)]  # those of a pair allow the same step
+    z = values[:, None] / abs(values)[:, None] * STEP_TIMES_EIGENVALUE
     grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
-    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(REACH))
-    reach = np.where(first > 0, REACH[np.maximum(first, 1) - 1], 0.0)
+    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(STEP_TIMES_EIGENVALUE))
+    reach = np.where(first > 0, STEP_TIMES_EIGENVALUE[np.maximum(first, 1) - 1], 0.0)
     return float((reach / abs(values)).min(initial=np.inf))

@@ -5,7 +5,7 @@ What rigid springs, locked freedoms and bodies without mass leave of the vehicle
 roads, if it does not depend on the speed.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -78,10 +78,47 @@ class Reduced:
         return noise_of(self.system, self.modes.moved if self.modes else None)
 
 
-class Vehicles:
-    """What is left of a vehicle, made once: every choice keeps those that it has asked for."""
+class Numbers:
+    """Numbers of values, the same for equal ones; an object that has been seen is known without its long hash."""
 
-    def __init__(self, full_vehicle: SpatialVehicle, speed: float) -> None:
+    def __init__(self) -> None:
+        self._of_object: dict[int, tuple[object, int]] = {}
+        self._of_value: dict[Hashable, int] = {}
+
+    def of(self, thing: object, value: Callable[[], Hashable]) -> int:
+        """Number of the value of an object, which is kept: its identity stands for it."""
+        known = self._of_object.get(id(thing))
+        if known is None:
+            known = self._of_object[id(thing)] = thing, self._of_value.setdefault(value(), len(self._of_value))
+        return known[1]
+
+
+class Roads:
+    """Roads under what is left of a scene, made once for all speeds."""
+
+    def __init__(self) -> None:
+        self._numbers = Numbers()
+        self._made: dict[int, Excitation] = {}
+
+    def number(self, scene: ReducedScene) -> int:
+        """What tells one road from another: effects of the road, and tables that add to it."""
+        ride = scene.ride
+        return self._numbers.of(ride, lambda: (ride.road, *tables_of(ride)))
+
+    def of(self, scene: ReducedScene) -> Excitation:
+        """The road of a scene."""
+        number = self.number(scene)
+        if number not in self._made:
+            self._made[number] = scene.excitation()
+        return self._made[number]
+
+
+class Vehicles:
+    """What is left of a vehicle, made once: every choice keeps those that it has asked for; ``roads`` are theirs."""
+
+    def __init__(self, full_vehicle: SpatialVehicle, speed: float, roads: Roads | None = None) -> None:
+        self.roads = roads or Roads()
+        self._numbers = Numbers()
         self._made: dict[Hashable, ReducedVehicle] = {}
         self._linear: dict[Hashable, LinearVehicle] = {}
         self.mass = self.linear(full_vehicle, speed).mass
@@ -91,15 +128,19 @@ class Vehicles:
 
     def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
         """The vehicle of a scene at a speed (m/s); InputError where nothing sensible is left."""
-        key = scene.vehicle, scene.limits, of_speed(scene.vehicle, speed)
+        key = self.number(scene.vehicle), scene.limits, of_speed(scene.vehicle, speed)
         made = self._made.get(key)
         if made is None:
             made = self._made[key] = self._make(scene, speed)
         return made
 
+    def number(self, vehicle: SpatialVehicle) -> int:
+        """What tells one vehicle from another."""
+        return self._numbers.of(vehicle, lambda: vehicle)
+
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
         """The vehicle without its limits."""
-        key = vehicle, of_speed(vehicle, speed)
+        key = self.number(vehicle), of_speed(vehicle, speed)
         if key not in self._linear:
             self._linear[key] = linearise(vehicle, speed)
         return self._linear[key]
@@ -124,14 +165,14 @@ class FullScene:
         self.scene, self.speed = scene, speed
         self.vehicles = Vehicles(scene.vehicle, speed) if vehicles is None else vehicles
         self.linear = self.vehicles.linear(scene.vehicle, speed)
-        self.excitation = scene.excitation()
+        self.excitation = self.vehicles.roads.of(scene)
         self._made: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
         """What is left of the scene; raises InputError where it is no system."""
-        key = (scene.vehicle, *_road(scene), scene.limits)
+        key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
         made = self._made.get(key)
         if made is None:
             made = self._made[key] = self._weighted(self._make(scene))
@@ -165,16 +206,11 @@ class FullScene:
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
         """The road that is left, and ``_of_road`` of it."""
-        key = _road(scene)
+        key = self.vehicles.roads.number(scene)
         if key not in self._roads:
-            excitation = scene.excitation()
+            excitation = self.vehicles.roads.of(scene)
             self._roads[key] = (excitation, *_of_road(self.scene, self.excitation, scene, excitation))
         return self._roads[key]
-
-
-def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
-    """What tells one road of a scene less some effects from another."""
-    return scene.ride.road, tuple(tables_of(scene.ride))
 
 
 def _of_road(

@@ -1,6 +1,6 @@
 """Frequencies at which spectra of a vehicle on a road are summed, and the road's waves there at many speeds at once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -12,9 +12,9 @@ from models.road.excitation import Excitation
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 PER_DECADE = 8
 """Panels of ``NODES`` Gauss points per decade."""
-AROUND = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
+RESONANCE_EDGES = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
 """Edges of panels about a resonance, in half-widths."""
-TURN, LAST = 8.0, 30
+PANEL_ANGLE, NARROW_PANELS = 8.0, 30
 """Radians by which waves turn between axles within a panel, and panels so narrow; beyond them axles count as meeting
 roads that know nothing of one another, for sums over quick turns vanish."""
 
@@ -28,8 +28,8 @@ def frequencies(rates: np.ndarray, delay: float, ends: tuple[float, float]) -> t
     """
     low, high = ends
     swinging = rates[rates.imag > 0]
-    near = (swinging.imag[:, None] - swinging.real[:, None] * AROUND).ravel()
-    late = TURN / delay * np.arange(1, LAST + 1) if delay > 0 else np.array([np.inf])
+    near = (swinging.imag[:, None] - swinging.real[:, None] * RESONANCE_EDGES).ravel()
+    late = PANEL_ANGLE / delay * np.arange(1, NARROW_PANELS + 1) if delay > 0 else np.array([np.inf])
     inner = np.concatenate([near, late])
     even = np.geomspace(low, high, max(2, round(PER_DECADE * np.log10(high / low))))
     edges = np.unique(np.concatenate([[0.0], even, inner[(inner > low) & (inner < high)]]))
@@ -67,10 +67,9 @@ def at_axles(
 
 @dataclass(frozen=True)
 class Pair:
-    """Two corners (1/m) of an axle's filter, and what the noise gives to both (m, m), by the filter's motions."""
+    """Two corners (1/m) of an axle's filter."""
 
     corners: tuple[complex, complex]
-    noise: np.ndarray
 
     def density(self, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Density (v, w) at speeds (v,) in m/s and frequencies (w,) in rad/s; real where both corners are one."""
@@ -81,31 +80,42 @@ class Pair:
 
 
 class Filters:
-    """An axle's filter in its motions V (m, m), which meet pairs by pairs of corners."""
+    """An axle's filter in its motions, which meet pairs by pairs of corners; ``noises``: what unit noises give to the
+    filter's states through the motions of each corner (m, k)."""
 
     def __init__(self, excitation: Excitation) -> None:
-        corners, self.V = np.linalg.eig(excitation.F)
-        driven = np.linalg.solve(self.V, excitation.G + 0j)
+        corners, V = np.linalg.eig(excitation.F)
+        driven = np.linalg.solve(V, excitation.G + 0j)
         noise = driven @ driven.conj().T
         keys = dict.fromkeys((a, b) for i, a in enumerate(corners) for j, b in enumerate(corners) if noise[i, j])
-        met = {key: np.outer(corners == key[0], corners == key[1]) for key in keys}
-        self.pairs = [Pair((complex(a), complex(b)), np.where(met[a, b], noise, 0.0)) for a, b in keys]
+        self.pairs = [Pair((complex(a), complex(b))) for a, b in keys]
+        self.noises = {complex(c): V[:, corners == c] @ driven[corners == c] for c in corners}
+
+    def by_noises(self, gains: Sequence[np.ndarray]) -> dict[complex, list[np.ndarray]]:
+        """Of each corner the gains (w, q, k) of every axle by noises; gains : (w, q, m) by the filter's states."""
+        rows = [gain.reshape(-1, gain.shape[2]) for gain in gains]
+        return {
+            corner: [(row @ noise).reshape(*gain.shape[:2], -1) for row, gain in zip(rows, gains, strict=True)]
+            for corner, noise in self.noises.items()
+        }
 
 
 def together(
-    gains: Sequence[np.ndarray], pair: Pair, alone: bool
+    gains: Mapping[complex, Sequence[np.ndarray]], pair: Pair, alone: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
     """What a quantity makes of a pair's density: (w, q) of every axle for itself, and of every two axles, if not all
-    are ``alone``, before the delay between them. gains: (w, q, m) by axle, of the filter's motions."""
-    axles = range(len(gains))
-    own = sum(_by(gains[i], pair, gains[i]) for i in axles)
+    are ``alone``, before the delay between them. gains: of ``Filters.by_noises``."""
+    first, second = (gains[corner] for corner in pair.corners)
+    axles = range(len(first))
+    own = sum(_product(first[i], second[i]) for i in axles)
     return np.asarray(own), {} if alone else {
-        (i, j): 2.0 * _by(gains[i], pair, gains[j]) for i, j in combinations(axles, 2)
+        (i, j): 2.0 * _product(first[i], second[j]) for i, j in combinations(axles, 2)
     }
 
 
-def _by(first: np.ndarray, pair: Pair, second: np.ndarray) -> np.ndarray:
-    return np.asarray(((first @ pair.noise) * second.conj()).sum(axis=2))
+def _product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Sum over noises of (w, q, k) and the conjugate of (w, q, k): (w, q)."""
+    return np.einsum("wqk,wqk->wq", first, second.conj())
 
 
 def variances(
@@ -113,14 +123,15 @@ def variances(
 ) -> np.ndarray:
     """Variances (v, q) at speeds (v,): sums over frequencies (w,) of what axles meet after their delays.
 
-    gains : (w, q, m) of every axle, of its filter's motions, with the root of the weights of the sum. Axles that are
+    gains : (w, q, m) of every axle, of its filter's states, with the root of the weights of the sum. Axles that are
     ``apart`` (w,), or independent, know nothing of one another.
     """
     total, near = np.zeros((len(speeds), gains[0].shape[1])), ~apart
-    late = {}
-    for pair in Filters(excitation).pairs:
+    late, filters = {}, Filters(excitation)
+    by_noises = filters.by_noises(gains)
+    for pair in filters.pairs:
         density = pair.density(speeds, omega)
-        own, shared = together(gains, pair, excitation.independent)
+        own, shared = together(by_noises, pair, excitation.independent)
         total += (density @ own).real if np.iscomplexobj(density) else density @ own.real
         for (i, j), met in shared.items():
             length = excitation.lengths[i] - excitation.lengths[j]
