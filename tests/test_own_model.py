@@ -488,6 +488,32 @@ def test_what_must_not_reach_the_parser_does_not(tmp_path, text, said):
     assert said in str(error.value) and "a.xml" in str(error.value)
 
 
+@pytest.mark.parametrize(
+    "text,old,new,said",
+    [
+        (LINKED, 'anchor=".6 0 0"', 'anchor="nan 0 0"', "eq_data: must be finite"),
+        (JOINTED, 'stiffness="2"', 'stiffness="nan"', "jnt_stiffness: must be finite"),
+        (JOINTED, 'gear="3"', 'gear="nan"', "actuator_gear: must be finite"),
+        (JOINTED, 'gravity="1 2 -9"', 'gravity="nan 2 -9"', "gravity: must be finite"),
+        (JOINTED, 'gravity="1 2 -9"', 'timestep="0"', "timestep = 0.0: must be a finite number above 0"),
+        (GEARED, 'frictionloss=".4"', 'frictionloss="-1"', "frictionloss = -1.0: must be 0 or more"),
+    ],
+)
+def test_numbers_that_the_parser_passes_are_refused(tmp_path, text, old, new, said):
+    with pytest.raises(InputError) as error:
+        _read(tmp_path, text.replace(old, new, 1))
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "old,new",
+    [("<worldbody>", '<option solver="PGS" iterations="3"/><worldbody>'), ('torquescale="2"', 'torquescale="0"')],
+)
+def test_solvers_of_constraints_and_welds_without_torque(tmp_path, old, new):
+    twin = _read(tmp_path, LINKED.replace(old, new, 1)).twin
+    assert all(row.alike for row in certificate(twin, 3))
+
+
 def test_a_hundred_spoilt_files_are_answered(tmp_path):
     """Bytes changed, cut out or doubled at random: read, or one clear error, never anything else."""
     draw, refused = np.random.default_rng(3), 0

@@ -92,6 +92,9 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     for row in left_out:
         KINDS[row.kind][2](model)
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
+    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
+    model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
+    model.opt.tolerance = min(1e-8, model.opt.tolerance)
     return left_out
 
 

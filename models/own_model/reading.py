@@ -297,7 +297,8 @@ def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connec
         if first == second:
             continue
         (start, turned), (end, other) = _frames(model, design, e)
-        axes = (turned, other) if model.eq_type[e] == WELD else None
+        turns = model.eq_type[e] == WELD and model.eq_data[e, 10]
+        axes = (turned, other) if turns else None
         softness = tuple(model.eq_solref[e].tolist()), tuple(model.eq_solimp[e].tolist())
         ends = (first, _vector(start)), (second, _vector(end))
         yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
