@@ -173,6 +173,11 @@ WRONG = {
         '<tendon><spatial name="rope" stiffness="1"><site site="driver"/><site site="hub_rr"/></spatial>',
         "rope.*springs of a car act along joints",
     ),
+    "jet": (
+        "<actuator>",
+        '<actuator><general name="jet" site="driver" biastype="affine" biasprm="5 0 0"/>',
+        "jet.*actuators of a car act along joints",
+    ),
     "massless": ("<worldbody>", '<worldbody><body name="loose"><joint/></body>', "parser refuses it"),
 }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from models.advice.own_model_price import priced
@@ -123,6 +124,45 @@ def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
             wrong = replace(twin.driven, turning_springs=tuple(springs))
             assert all(row.acceleration > 1e-6 for row in certificate(replace(twin, driven=wrong), 20))
     assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
+
+
+PUSHED = TIED.replace(
+    "</mujoco>",
+    """<actuator><motor name="jet" site="elbow" gear="1 -2 .5 .3 .1 -.2" ctrlrange="1.5 2"/>
+    <general name="prop" site="ring" gear="0 0 3 0 0 .4" biastype="affine" biasprm="2 0 0"/></actuator></mujoco>""",
+)
+"""Forces and moments that turn with bodies."""
+
+
+def test_actuators_that_push_sites_are_those_of_the_file(tmp_path):
+    """To rounding; the fault: a force that is 1 % larger, a moment along other axes."""
+    twin = _read(tmp_path, PUSHED).twin
+    assert all(max(row.force, row.acceleration) < 1e-11 for row in certificate(twin, 20))
+    jet, prop = twin.driven.body_loads
+    for wrong in (replace(jet, force=1.01 * jet.force), replace(jet, moment=jet.moment[[1, 0, 2]])):
+        driven = replace(twin.driven, body_loads=(wrong, prop))
+        assert all(row.acceleration > 1e-5 for row in certificate(replace(twin, driven=driven), 20))
+    other = _read(tmp_path, changed(PUSHED, "prop", "0 0 3 0 0 .4", "0 0 3 0 0 .5"), "b.xml").twin
+    comparison = compare(twin, other, 3)
+    assert [(each.kind, each.owner) for each in comparison.influential] == [("gear", "actuator 'prop'")]
+
+
+FALLING = """<mujoco><option gravity="0 0 -9.8"/><worldbody><site name="foot"/><body name="ball">
+<freejoint name="free"/><inertial pos="0 0 0" mass="1" diaginertia=".04 .1 .1"/><site name="tip"/></body></worldbody>
+<tendon><spatial name="spring" stiffness="10" damping=".5" springlength="0"><site site="foot"/><site site="tip"/>
+</spatial></tendon></mujoco>"""
+"""A free body on a spring without length, whose ends meet in the design position."""
+
+
+@pytest.mark.parametrize("height", [0.0, -1e-3])
+def test_a_tendon_without_length_is_not_damped_in_mujoco(tmp_path, height):
+    """One step from rest beside the exact motion: the second of four stages lacks c g h / 2, as the ends still meet."""
+    twin, (k, c, g), h = _read(tmp_path, FALLING).twin, (10.0, 0.5, 9.8), 5e-3
+    rest, start = -g / k, np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
+    exact = (expm(h * np.array(((0.0, 1.0), (-k, -c)))) @ (height - rest, 0.0))[1]
+    for engine, error in (("exudyn", 0.0), ("mujoco", -c * g * h**2 / 6.0 if height == 0.0 else 0.0)):
+        speed = free_model(engine, twin.driven).march(start, np.zeros(6), 1, h)[-1, 8]
+        assert abs(speed - exact - error) < 5e-8  # the next order, g h^3 k / 24; Runge-Kutta's own is 2e-11 m/s
 
 
 @pytest.mark.parametrize("text", [LINKED, HELD, HUNG], ids=["linked", "held", "hung"])
@@ -399,7 +439,9 @@ def test_thirty_joints_are_certified(tmp_path):
     assert all(row.alike for row in certificate(_read(tmp_path, chain(30)).twin, 100))
 
 
+DAMPED = '<actuator><general name="damp" site="s" biastype="affine" biasprm="0 0 -1"/></actuator>'
 REFUSED = [
+    ("actuator", '<site name="s"/>', "actuator: actuator 'damp' (a.xml:2)"),
     ("contact", '<geom name="box" type="box" size=".1 .1 .1"/>', "geom 'box' (a.xml:2)"),
     ("friction_loss", '<joint name="rub" type="ball" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
     ("turning_law", '<joint name="soft" type="ball" armature="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
@@ -413,6 +455,8 @@ def test_content_without_an_equal_is_refused_by_name_and_line(tmp_path, kind, el
         f'<mujoco><worldbody>{floor}<body name="b"><inertial pos="0 .1 0" mass="1" diaginertia="1 1 1"/>\n'
         f'{element}<joint name="j" axis="0 0 1"/></body></worldbody></mujoco>'
     )
+    if kind == "actuator":
+        text = text.replace("</mujoco>", f"{DAMPED}</mujoco>")
     if "ball" in element:
         text = text.replace('<joint name="j" axis="0 0 1"/>', "")
     path = _file(tmp_path, text)
@@ -442,6 +486,32 @@ def test_what_must_not_reach_the_parser_does_not(tmp_path, text, said):
     with pytest.raises(InputError) as error:
         _read(tmp_path, text)
     assert said in str(error.value) and "a.xml" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "text,old,new,said",
+    [
+        (LINKED, 'anchor=".6 0 0"', 'anchor="nan 0 0"', "eq_data: must be finite"),
+        (JOINTED, 'stiffness="2"', 'stiffness="nan"', "jnt_stiffness: must be finite"),
+        (JOINTED, 'gear="3"', 'gear="nan"', "actuator_gear: must be finite"),
+        (JOINTED, 'gravity="1 2 -9"', 'gravity="nan 2 -9"', "gravity: must be finite"),
+        (JOINTED, 'gravity="1 2 -9"', 'timestep="0"', "timestep = 0.0: must be a finite number above 0"),
+        (GEARED, 'frictionloss=".4"', 'frictionloss="-1"', "frictionloss = -1.0: must be 0 or more"),
+    ],
+)
+def test_numbers_that_the_parser_passes_are_refused(tmp_path, text, old, new, said):
+    with pytest.raises(InputError) as error:
+        _read(tmp_path, text.replace(old, new, 1))
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "old,new",
+    [("<worldbody>", '<option solver="PGS" iterations="3"/><worldbody>'), ('torquescale="2"', 'torquescale="0"')],
+)
+def test_solvers_of_constraints_and_welds_without_torque(tmp_path, old, new):
+    twin = _read(tmp_path, LINKED.replace(old, new, 1)).twin
+    assert all(row.alike for row in certificate(twin, 3))
 
 
 def test_a_hundred_spoilt_files_are_answered(tmp_path):

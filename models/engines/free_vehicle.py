@@ -19,6 +19,7 @@ from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.native_parts import (
+    BodyLoad,
     Connection,
     Coupling,
     DryFriction,
@@ -46,7 +47,8 @@ class Driven:
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
     parts, ground_springs, line_springs, turning_springs : springs, dampers, mounts and bars that the engine has as its
     own beside the kernel's forces; frictions, couplings, connections : along its coordinates, between them, and between
-    points of bodies, as the engine has them: explicit integrators of Exudyn ignore the latter two.
+    points of bodies, as the engine has them: explicit integrators of Exudyn ignore the latter two; body_loads : forces
+    that turn with bodies.
     """
 
     vehicle: SpatialVehicle
@@ -61,6 +63,7 @@ class Driven:
     couplings: tuple[Coupling, ...] = ()
     connections: tuple[Connection, ...] = ()
     turning_springs: tuple[TurningSpring, ...] = ()
+    body_loads: tuple[BodyLoad, ...] = ()
 
     @property
     def size(self) -> int:

@@ -22,6 +22,7 @@ from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import (
     Coordinates,
+    add_body_load,
     add_connection,
     add_ground_spring,
     add_line_spring,
@@ -65,6 +66,8 @@ class FreeExudyn(FreeModel):
             add_ground_spring(built, spring)
         for line in driven.line_springs:
             add_line_spring(built, line)
+        for load in driven.body_loads:
+            add_body_load(built, load)
         for turning in driven.turning_springs:
             add_turning_spring(built, turning)
         coordinates = Coordinates(built, node)

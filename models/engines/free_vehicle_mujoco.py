@@ -16,6 +16,7 @@ from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.native_mujoco import (
+    add_body_load,
     add_connection,
     add_constraints,
     add_ground_spring,
@@ -60,6 +61,8 @@ def specified(driven: Driven) -> mujoco.MjSpec:
         add_ground_spring(spec, driven.vehicle, spring)
     for line in driven.line_springs:
         add_line_spring(spec, driven.vehicle, line)
+    for load in driven.body_loads:
+        add_body_load(spec, driven.vehicle, load)
     for turning in driven.turning_springs:
         add_turning_spring(spec, driven.vehicle, turning)
     add_constraints(spec, driven.vehicle, driven.frictions, driven.couplings)
@@ -75,6 +78,7 @@ def _merged(driven: Driven) -> dict[str, str]:
     held = [body for line in driven.line_springs for body, _ in line.ends]
     held += [body for connection in driven.connections for body, _ in connection.ends]
     held += [body for each in driven.turning_springs for body in each.bodies]
+    held += [load.body for load in driven.body_loads]
     bearing = end_bodies(driven.parts) | {body for body in held if body is not None}
     return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 

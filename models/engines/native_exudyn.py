@@ -19,6 +19,7 @@ from models.engines.exudyn_tree import JOINTS, Build
 from models.engines.native_parts import (
     SLIDES,
     AxialTravel,
+    BodyLoad,
     Connection,
     CoordinateTravel,
     Coupling,
@@ -88,6 +89,16 @@ def add_line_spring(built: Build, spring: LineSpring) -> None:
             force=spring.stiffness * (length - spring.length),
         )
     )
+
+
+def add_body_load(built: Build, load: BodyLoad) -> None:
+    """A force and a moment along the axes of a body."""
+    marker, axes = built.marker(load.body, load.point, True), {"bodyFixed": True}
+    force, moment = (built.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
+    if force.any():
+        built.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=force, **axes))
+    if moment.any():
+        built.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
 
 
 def add_turning_spring(built: Build, spring: TurningSpring) -> None:

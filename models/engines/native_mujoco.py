@@ -17,6 +17,7 @@ import numpy as np
 
 from models.engines.native_parts import (
     AxialTravel,
+    BodyLoad,
     Connection,
     CoordinateTravel,
     Coupling,
@@ -154,6 +155,15 @@ def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Con
     equality.data[10] = connection.torque_scale
     equality.solref[:], equality.solimp[:] = connection.solref, connection.solimp
     _allow_constraints(spec)
+
+
+def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) -> None:
+    """An actuator of constant force on a site."""
+    site = f"load {len(spec.sites)}"
+    _add_site(spec, vehicle, site, load.body, load.point)
+    push = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=site)
+    push.gear[:], push.gainprm[0], push.biastype = (*load.force, *load.moment), 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+    push.biasprm[0] = 1.0
 
 
 def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:

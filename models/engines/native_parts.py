@@ -127,6 +127,20 @@ class Coupling:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyLoad:
+    """A force (3,) in N on a point (m) of a body and a moment (3,) in N m, which turn with it.
+
+    All three as they are in the design position, along the axes of space.
+    """
+
+    name: str
+    body: str
+    point: Vector
+    force: np.ndarray
+    moment: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class TurningSpring:
     """A spring and damper between the turning of two bodies (None: the ground), the same about all axes.
 

@@ -83,7 +83,8 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
     turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions, turns)
+    pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions, turns, pushes)
 
 
 def expected(twin: TwinModel, build: str) -> Equations:

@@ -18,7 +18,7 @@ from models.own_model.car_bodies import CarBodies, car_bodies
 from models.own_model.car_joints import Roles, forget, roles_of
 from models.own_model.content import KINDS, contents, ranges
 from models.own_model.file import check_sane, compiled
-from models.own_model.reading import joint_elements, label, line_springs, moving, place_of
+from models.own_model.reading import body_loads, joint_elements, label, line_springs, moving, place_of
 from models.own_model.wheel_sites import WheelSite, wheel_sites
 from models.own_model.xml_guard import Document, guarded
 from models.vehicles.free_vehicle import CARRIER, SWAY, rotor
@@ -107,6 +107,8 @@ class _Reader:
             joints.append("contacts")
         for line in line_springs(self.model, self.design):
             self._refuse(line.name, None, "lies along a line between two sites: springs of a car act along joints")
+        for load in body_loads(self.model, self.design):
+            self._refuse(load.name, None, "pushes a site: actuators of a car act along joints")
         if joints or acted:
             listed = ", ".join((*joints, *acted))
             self.notes.append(f"tyres, steering, brakes and drive are twinrig's; not built: {listed}")

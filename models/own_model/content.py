@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import is_fixed, is_line, is_tie, joins, label, rubs
+from models.own_model.reading import affine_law, is_fixed, is_line, is_tie, joins, label, pushes_site, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -92,6 +92,9 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     for row in left_out:
         KINDS[row.kind][2](model)
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
+    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
+    model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
+    model.opt.tolerance = min(1e-8, model.opt.tolerance)
     return left_out
 
 
@@ -146,10 +149,11 @@ def _odd_actuators(model: mujoco.MjModel) -> Listed:
         kind = int(model.actuator_trntype[i])
         along_joint = kind in JOINT_TARGETS and int(model.jnt_type[target]) not in (BALL, FREE)
         along_tendon = kind == TRN.mjTRN_TENDON and is_fixed(model, target)
+        on_site = pushes_site(model, i) and not any(affine_law(model, i, control)[2] for control in (0.0, 1.0))
         straight = int(model.actuator_gaintype[i]) in AFFINE_GAINS and int(model.actuator_biastype[i]) in AFFINE_BIASES
         more = model.actuator_damping[i] or model.actuator_armature[i] or model.actuator_dampingpoly[i].any()
         stateless = model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE and not model.actuator_delay[i]
-        if not ((along_joint or along_tendon) and straight and stateless) or more:
+        if not ((along_joint or along_tendon or on_site) and straight and stateless) or more:
             yield "actuator", i
 
 
@@ -274,7 +278,8 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
     ),
     "actuator": (
         _odd_actuators,
-        "a state, a delay, a muscle, a rotor of its own, or a target other than a joint or a fixed tendon",
+        "a state, a delay, a muscle, a rotor of its own, or a target other than a hinge, a slide, a fixed tendon, or a "
+        "site that it does not damp",
         _forget_actuators,
     ),
     "force_range": (_bounded, "a force that is cut off at a bound", _forget_bounds),

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import CONNECT, by_sites, is_line, is_tie, joins, label, sites_of
+from models.own_model.reading import CONNECT, by_sites, is_line, is_tie, joins, label, pushes_site, sites_of
 
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
@@ -191,6 +191,15 @@ def _write_gravity(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
     model.opt.gravity[:] = value
 
 
+def _read_gear(model: mujoco.MjModel, i: int) -> np.ndarray:
+    """What an actuator's force is multiplied by: six numbers on a site, one elsewhere."""
+    return model.actuator_gear[i, : 6 if pushes_site(model, i) else 1].copy()
+
+
+def _write_gear(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+    model.actuator_gear[i, : value.size] = value
+
+
 def _of_actuator(field: str, count: int) -> tuple[Callable, Callable]:
     return _field(field, lambda model, i: (i, slice(count)))
 
@@ -281,7 +290,7 @@ KINDS = (
     _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
     _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
     _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
-    _Kind("actuator", "gear", "", *_of_actuator("actuator_gear", 1)),
+    _Kind("actuator", "gear", "", _read_gear, _write_gear),
     _Kind("actuator", "gain", "", *_of_actuator("actuator_gainprm", 3)),
     _Kind("actuator", "bias", "", *_of_actuator("actuator_biasprm", 3)),
     _Kind("actuator", "control range", "", *_field("actuator_ctrlrange", lambda model, i: i)),

@@ -14,6 +14,14 @@ from models.own_model.content import Content, check_and_leave_out, ranges
 from models.own_model.reading import TwinModel, described
 from models.own_model.xml_guard import Document, guarded
 
+FINITE = (
+    *("body_mass", "body_inertia", "body_pos", "body_quat", "body_gravcomp", "site_pos", "site_quat"),
+    *("qpos0", "qpos_spring", "jnt_stiffness", "jnt_range", "dof_damping", "dof_armature", "dof_frictionloss"),
+    *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
+    *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
+)
+"""Numbers of a compiled model that move something."""
+
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
@@ -72,6 +80,12 @@ def check_sane(model: mujoco.MjModel, name: str) -> None:
     """InputError where nothing moves, or a number that moves something is not finite."""
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
-    for numbers in ("body_mass", "body_inertia", "body_pos", "body_quat", "qpos0", "dof_damping", "dof_armature"):
+    for numbers in FINITE:
         if not np.isfinite(getattr(model, numbers)).all():
             raise InputError(name, numbers, None, "must be finite numbers")
+    if not np.isfinite(model.opt.gravity).all():
+        raise InputError(name, "option gravity", None, "must be finite numbers")
+    if not (np.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):
+        raise InputError(name, "option timestep", model.opt.timestep, "must be a finite number above 0")
+    if (model.dof_frictionloss < 0.0).any():
+        raise InputError(name, "frictionloss", float(model.dof_frictionloss.min()), "must be 0 or more")

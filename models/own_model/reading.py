@@ -12,6 +12,7 @@ import numpy as np
 
 from models.engines.free_vehicle import Driven
 from models.engines.native_parts import (
+    BodyLoad,
     Connection,
     Coupling,
     DryFriction,
@@ -61,7 +62,8 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     ties = tuple(dry_frictions(model)), tuple(couplings(model)), tuple(connections(model, design))
     parts = joint_parts(vehicle)
     turns = tuple(turning_springs(model, design))
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns)
+    pushes = tuple(body_loads(model, design))
+    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns, pushes)
     return TwinModel(name, model, driven, Coordinates(model, design))
 
 
@@ -295,7 +297,8 @@ def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connec
         if first == second:
             continue
         (start, turned), (end, other) = _frames(model, design, e)
-        axes = (turned, other) if model.eq_type[e] == WELD else None
+        turns = model.eq_type[e] == WELD and model.eq_data[e, 10]
+        axes = (turned, other) if turns else None
         softness = tuple(model.eq_solref[e].tolist()), tuple(model.eq_solimp[e].tolist())
         ends = (first, _vector(start)), (second, _vector(end))
         yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
@@ -353,24 +356,50 @@ def controls(model: mujoco.MjModel) -> np.ndarray:
     return np.clip(np.zeros(len(low)), low, high)
 
 
+def pushes_site(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator pushes a site, and not against another one: it has no length then."""
+    kind, (_, other) = model.actuator_trntype[actuator], model.actuator_trnid[actuator]
+    return bool(kind == mujoco.mjtTrn.mjTRN_SITE and other < 0)
+
+
+def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarray:
+    """(3,): the force of an actuator at a control, what it gains by length and by speed."""
+    gain = np.array(model.actuator_gainprm[actuator, :3])
+    gain[1:] *= model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE
+    affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+    law: np.ndarray = gain * control + np.array(model.actuator_biasprm[actuator, :3]) * affine
+    return law
+
+
+def _acting(model: mujoco.MjModel) -> list[int]:
+    """Actuators that are not switched off."""
+    all_off, groups = _disabled(model, "ACTUATION"), model.opt.disableactuator
+    return [i for i in range(model.nu) if not (all_off or groups & (1 << int(model.actuator_group[i])))]
+
+
+def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoad]:
+    """Forces and moments of actuators that push sites, at constant controls."""
+    constant, numbers = controls(model), moving(model)
+    for i in (i for i in _acting(model) if pushes_site(model, i)):
+        site = int(model.actuator_trnid[i, 0])
+        body, axes = int(model.site_bodyid[site]), design.site_xmat[site].reshape(3, 3)
+        force = affine_law(model, i, float(constant[i]))[0]
+        wrench = force * model.actuator_gear[i].reshape(2, 3) @ axes.T
+        if wrench.any() and body in numbers:
+            yield BodyLoad(label(model, "actuator", i), _massive(body), _vector(design.site_xpos[site]), *wrench)
+
+
 def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
     """Forces gain u + bias, affine in length and speed of a joint or a fixed tendon, at constant controls."""
-    if _disabled(model, "ACTUATION"):
-        return
     constant = controls(model)
-    for i in range(model.nu):
-        if model.opt.disableactuator & (1 << int(model.actuator_group[i])):
-            continue
+    for i in (i for i in _acting(model) if not pushes_site(model, i)):
         gear, target = float(model.actuator_gear[i, 0]), int(model.actuator_trnid[i, 0])
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             places, factors, start = _along_tendon(model, target)
         else:
             places, factors = (place_of(model, target),), (1.0,)
             start = float(model.qpos0[model.jnt_qposadr[target]])
-        gain = np.array(model.actuator_gainprm[i, :3])
-        gain[1:] *= model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_AFFINE
-        bias = np.array(model.actuator_biasprm[i, :3]) * (model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE)
-        offset, slope, rate = gain * constant[i] + bias
+        offset, slope, rate = affine_law(model, i, float(constant[i]))
         if offset or slope or rate:
             numbers = (-slope, -rate, -(offset + slope * gear * start))
             yield JointElement(label(model, "actuator", i), places, tuple(gear * k for k in factors), *numbers)

@@ -13,6 +13,8 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 
 Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
 """Two points of bodies (None: the ground) in the design position; N/m, N s/m and m of a spring along their line."""
+Follower = tuple[str, Vector, np.ndarray, np.ndarray]
+"""A body, a point (m) on it in the design position, a force and a moment (3,) in N and N m that turn with it."""
 Turn = tuple[tuple[str | None, str], Axes, float, float]
 """Two bodies (None: the ground), their axes that are parallel at rest, N m/rad and N m s/rad about all axes."""
 Friction = tuple[int, float, float]
@@ -47,13 +49,15 @@ class PlainTree:
         lines: Sequence[Line] = (),
         frictions: Sequence[Friction] = (),
         turns: Sequence[Turn] = (),
+        followers: Sequence[Follower] = (),
     ) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])
         self._lines, self._ends = lines, self.bodies.points([end for ends, *_ in lines for end in ends])
-        self._turns = turns
+        self._turns, self._followers = turns, followers
+        self._pushed = self.bodies.points([(body, point) for body, point, *_ in followers])
         self._rows = joint_rows(self.bodies, vehicle)
         self._stiffness, self._damping, self._held, self._inertia = joint_numbers(vehicle)
         self._rubbing = [coordinate for coordinate, _, _ in frictions]
@@ -69,6 +73,10 @@ class PlainTree:
             force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
         if self._lines:
             force += self._line_spring_forces(motion)
+        for (body, _, push, moment), point in zip(self._followers, motion.at(self._pushed), strict=True):
+            row = self.bodies.row[body]
+            axes = motion.axes(row)[PLACE]
+            force += point[FIRST:] @ (axes @ push) + motion.by_moment(row, axes @ moment)
         for turn in self._turns:
             force -= self._turning_resistance(turn, motion, v)
         force[self._rubbing] -= self._friction * np.clip(v[self._rubbing] / self._slides, -1.0, 1.0)
