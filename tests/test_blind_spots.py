@@ -12,7 +12,7 @@ from numba import njit
 import validation.blind_spots.compiled_spoiling  # noqa: F401  makes numba know what is spoiled
 from docs import not_covered
 from models.core.errors import InputError, RunFailed
-from models.core.systems import DEFAULT, SYSTEMS
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.machine.records import record
 from studies.command_line import validate
 from validation.blind_spots import memory, probe
@@ -190,7 +190,7 @@ def test_a_function_of_python_is_shared_where_several_engines_call_it_in_one_sce
 
 
 def test_sides_are_runs_of_scenes_of_every_system_that_has_several_engines():
-    systems = {getattr(prepared(scene), "system", DEFAULT) for scene, _ in runs()}
+    systems = {getattr(prepared(scene), "system", DEFAULT_SYSTEM) for scene, _ in runs()}
     assert systems == {name for name, system in SYSTEMS.items() if len(system.engines) > 1}
     traces = [job.trace for job in (*jobs(False), *(Job([], [], [run]) for run in runs()))]
     assert len({*traces}) == len(traces), "a trace of its own for each"

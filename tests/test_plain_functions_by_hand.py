@@ -11,7 +11,7 @@ from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers.five_phase import FivePhase
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.port.ask import ask
-from models.brake.pressure import Chambers, still
+from models.brake.pressure import Chambers, resting_chambers
 from models.brake.steering import Steering
 from models.drift.score import low_pass, rms
 from models.multibody.numbers import Handling
@@ -57,7 +57,7 @@ def test_torque_rises_and_falls_along_the_lines_of_its_own_brake():
 
 
 def test_nothing_is_under_pressure_at_the_start_but_the_supply():
-    air = still(Chambers(np.array([0.15]), np.array([0.1]), 6.25), SAMPLE)
+    air = resting_chambers(Chambers(np.array([0.15]), np.array([0.1]), 6.25), SAMPLE)
     assert air.supply == pytest.approx([6.25], rel=1e-12)
     assert not np.any(air[0]) and not np.any(air[1])
 
