@@ -7,7 +7,9 @@ import re
 from html import unescape
 from typing import Any
 
-MARKED = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<formula>.*?)\\[)\]]</(?P=tag)>', re.DOTALL)
+MARKED_FORMULA = re.compile(
+    r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<formula>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
+)
 """A formula in the words of LaTeX: within a line (span) or as a line of its own (div)."""
 
 
@@ -25,4 +27,4 @@ def on_page_content(html: str, page: Any = None, **unused: Any) -> str:
             raise ValueError(f"{page}: the formula {formula!r} has a command that is not known")
         return math
 
-    return MARKED.sub(drawn, html)
+    return MARKED_FORMULA.sub(drawn, html)

@@ -8,7 +8,7 @@ from itertools import groupby
 from textwrap import fill
 
 from docs.pages import ROOT
-from validation.blind_spots.table import WHY_HARMLESS, Line, read, uncovered
+from validation.blind_spots.table import NOT_AUDITED, WHY_HARMLESS, Line, read, uncovered
 
 PAGE = ROOT / "docs" / "not_covered.md"
 START = "<!-- functions: written by `python -m docs.not_covered`; do not edit below -->\n"
@@ -16,7 +16,8 @@ HEADINGS = {
     "noticed by nothing": "No row or test that has an independent second side and runs them noticed these:",
     "noticed by nothing independent": "Rows noticed these, but none with an independent second side:",
     "run by nothing": "Nothing with an independent second side runs these in the quick cases:",
-    "not audited": "The audit's rewriting sees nothing that these give back or write:",
+    "not spoiled": "The audit's rewriting sees nothing that these give back or write:",
+    NOT_AUDITED: "These are shared, and were not put off so far:",
     WHY_HARMLESS[
         0
     ]: "A fault in these moves where a search begins, or its steps, and no value beyond the stated error, "

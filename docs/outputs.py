@@ -30,7 +30,7 @@ COLUMNS = 100
 """Width of the terminal that examples see."""
 WORKERS = 2
 """Pages that run at the same time."""
-LONGEST = 600.0
+EXAMPLE_TIMEOUT = 600.0
 """Seconds after which an example is ended: far more than any takes on a busy machine."""
 
 
@@ -72,7 +72,7 @@ class Session:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT if fails else subprocess.PIPE,
             text=True,
-            timeout=LONGEST,
+            timeout=EXAMPLE_TIMEOUT,
         )
         if (ended.returncode != 0) is not fails:
             raise ExampleFailed(f"`{line}` ended with code {ended.returncode}: {ended.stdout}{ended.stderr or ''}")

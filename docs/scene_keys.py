@@ -20,7 +20,7 @@ from pydantic.fields import FieldInfo
 from docs.pages import ROOT
 from models.core.scene_effects import listing, module_of, names_of
 from models.core.scene_file import SceneFile
-from models.core.strict import LARGEST
+from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS
 from studies.command.asked import studies
 
@@ -101,7 +101,7 @@ def _kind(field: FieldInfo) -> str:
     """Type of a field, and the limits of a number."""
     signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
     limits = [(sign, getattr(rule, kind, None)) for rule in field.metadata for kind, sign in signs.items()]
-    said = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None and abs(limit) < LARGEST]
+    said = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None and abs(limit) < LARGEST_QUANTITY]
     return ", ".join([_words(field.annotation), *said])
 
 

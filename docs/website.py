@@ -20,14 +20,14 @@ from docs.outputs import run_pages
 from docs.pages import OUTSIDE, ROOT, pages
 from docs.validation_cases import counts, newest_report, rows
 
-QUIET = {"NO_MKDOCS_2_WARNING": "1"}
+QUIET_ENVIRONMENT = {"NO_MKDOCS_2_WARNING": "1"}
 """No news of MkDocs in the output."""
-SKIPPED = shutil.ignore_patterns("*.py", "__pycache__", "*.yml")
+SKIPPED_FILES = shutil.ignore_patterns("*.py", "__pycache__", "*.yml")
 
 
 def copy_pages(to: Path) -> None:
     """Copy all pages and the pictures in them, at the same places as in the repository."""
-    shutil.copytree(ROOT / "docs", to / "docs", ignore=SKIPPED)
+    shutil.copytree(ROOT / "docs", to / "docs", ignore=SKIPPED_FILES)
     shutil.copyfile(ROOT / "docs" / "nav.yml", to / "nav.yml")
     for name in OUTSIDE:
         shutil.copyfile(ROOT / name, to / name)
@@ -57,7 +57,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
         shutil.copyfile(ROOT / "docs" / name, work / name)
     command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
-    subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET)
+    subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET_ENVIRONMENT)
     return well
 
 

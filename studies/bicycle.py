@@ -9,7 +9,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result, join_results
 from models.core.tables import write_table
-from models.drawing.figures import BLUE, COLOURS, LABELS, VERMILION, heading, panels, save
+from models.drawing.figures import COLOURS, DARK, LABELS, heading, panels, save
 from models.systems.bicycle.run import run as run_scene
 from models.systems.bicycle.scene import BicycleScene
 
@@ -74,16 +74,17 @@ def _line(engine: str, result: Result) -> str:
 def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: dict[str, Result], path: Path) -> Path:
     """Eigenvalues over speed, and lean and steer angle over time."""
     drawn, axes = panels(4, 2, 2.4)
-    for axis, part, colour in ((axes[0], values.real, BLUE), (axes[1], values.imag, VERMILION)):
-        axis.plot(speeds, part, ".", ms=2.0, color=colour)
+    for axis, part in ((axes[0], values.real), (axes[1], values.imag)):
+        axis.plot(speeds, part, ".", ms=2.0, color=DARK)
         axis.axhline(0.0, lw=0.6, color="k")
         axis.set_xlabel("speed [m/s]")
     axes[0].set(ylabel="real part [1/s]", title="Eigenvalues: what grows is above 0", ylim=(-12.0, 7.0))
     axes[1].set(ylabel="imaginary part [1/s]", title="Weave: frequency", ylim=(0.0, None))
     for axis, name in ((axes[2], "lean"), (axes[3], "steer")):
-        for engine, result in runs.items():
-            axis.plot(result.times, np.degrees(result[name]), color=COLOURS[engine], label=LABELS[engine])
-        axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} from upright")
+        for i, (engine, result) in enumerate(runs.items()):  # the later ones thinner: they lie on the first
+            width = max(2.6 - 1.5 * i, 0.6)
+            axis.plot(result.times, np.degrees(result[name]), color=COLOURS[engine], label=LABELS[engine], lw=width)
+        axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} angle")
     axes[2].legend()
     heading(drawn, scene.title, runs)
     return save(drawn, path)

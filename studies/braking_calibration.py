@@ -36,7 +36,7 @@ ROUNDS = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
 """What is told of every round of the fit, and its unit."""
 BLOCK = 2
 """Stops per block."""
-WANTED = {"deceleration": 1.36, "aside": 7.5}
+PUBLISHED_FIGURES = {"deceleration": 1.36, "aside": 7.5}
 
 
 class Options(Strict):
@@ -85,8 +85,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means(fitted(scene, options, scale, steer), options, options.runs, pool)
             steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
-            scale *= WANTED["deceleration"] / means["deceleration"].mean
-            steer *= WANTED["aside"] / means["aside"].mean
+            scale *= PUBLISHED_FIGURES["deceleration"] / means["deceleration"].mean
+            steer *= PUBLISHED_FIGURES["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
         last = fitted(scene, options, scale, steer)
         scatters = _means(last, options, options.last, pool, options.seed + 1)

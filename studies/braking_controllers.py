@@ -20,7 +20,7 @@ from models.systems.braking.stop_report import Stop
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
-SHOWN = {
+SHOWN_QUANTITIES = {
     "distance [m]": "stopping distance [m]",
     "v0^2/2d [m/s^2]": "v0^2/2d [m/s^2]",
     "y [m]": "y [m]",
@@ -110,7 +110,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             failed[name] = f"not stopped by {stop.times[-1]:g} s"
             continue
         values, estimated = stop.of_vehicle(), estimated or not alone.controller.true_speed
-        shown = {head: values[quantity] for head, quantity in SHOWN.items()}
+        shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
         answer.append(dict(zip(LABELS, labels, strict=True)) | shown | {LOCKED: float(stop.locks().time.max())})
     _save(scene, answer, folder, results)
     _figure(scene, answer, folder / "controllers.png", results)
@@ -120,7 +120,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
     """One line per run."""
-    heads = [*SHOWN, LOCKED]
+    heads = [*SHOWN_QUANTITIES, LOCKED]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for stop in stops:
         labels = f"  {stop['surface']:<10}{stop['procedure'].replace('_', ' '):<12}{stop['controller']:<32}"
@@ -130,7 +130,7 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
 
 def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
     """A stop per line, or along the axis of the result, which says what all of them say of themselves."""
-    heads = [*SHOWN, LOCKED] if stops else []
+    heads = [*SHOWN_QUANTITIES, LOCKED] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
     columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
     channels = {
@@ -148,12 +148,15 @@ PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "fi
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
-    from models.drawing.figures import WIDE, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
+    from studies.braking_figures import plain_name
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
     names, each = list(scene.procedures), len(options.controllers)
-    figure, axes = subplots(len(PANELS), max(len(surfaces), 1), figsize=(WIDE, 6.0), squeeze=False, sharey="row")
+    figure, axes = subplots(
+        len(PANELS), max(len(surfaces), 1), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharey="row"
+    )
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
         for row, (key, quantity) in enumerate(PANELS.items()):
@@ -169,18 +172,18 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                     np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width,
                     heights,
                     width * 0.95,
-                    label=kind.replace("_", " "),
+                    label=" + ".join(map(plain_name, kind.split(" + "))),
                     color=f"C{k % each}",
                     alpha=1.0 if k < each else 0.5,
                 )
-            axis.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names])
+            axis.set_xticks(range(len(names)), [plain_name(name).replace(" ", "\n") for name in names])
             axis.set(
                 title=f"{surface.capitalize()}; split: {options.surfaces[surface]} right" if row == 0 else "",
                 ylabel=quantity if column == 0 else "",
             )
     if stops:
-        legend_below(figure, axes[0, 0])
-    heading(figure, f"{scene.title}, each procedure from its speed to a stop", results)
+        legend_below(figure, axes[0, 0], columns=max(len(kinds) // each, 1))
+    heading(figure, scene.title, results)
     save(figure, file)
 
 

@@ -126,9 +126,9 @@ def _figure(
     results: Results,
     folder: Path,
 ) -> None:
-    from models.drawing.figures import DARK, WIDE, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, save, subplots
 
-    figure, (histogram, cloud) = subplots(1, 2, figsize=(WIDE, 4.0))
+    figure, (histogram, cloud) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
     for i, (arrays, figures) in enumerate(zip(ensembles, scatters, strict=True)):
         distance = figures["distance"]

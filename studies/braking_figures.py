@@ -6,34 +6,34 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from models.brake.plane_chain import ChainPoint, place_of
+from models.brake.plane_chain import ChainPoint, chain_point_place
 from models.brake.plane_vehicle import Plane
 from models.core.told import Results
 from models.drawing.figures import (
     BLUE,
+    COLUMN_WIDTH,
     DARK,
     GREEN,
     ORANGE,
     PINK,
     SKY,
-    SMALL,
+    SMALL_TEXT,
     VERMILION,
-    WIDE,
     heading,
     save,
     subplot_mosaic,
 )
 from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, sides, vehicle_of
-from models.systems.braking.plan import behind
+from models.systems.braking.plan import controller_text
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import SLOWEST, Stop, wheel_names
 
 COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
-OTHER = "#e8dcc8"
+OTHER_SURFACE = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
-OVERHANG, BESIDE = 1.2, 1.1
+OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 """m, of an outline beyond its axles, chosen, and half of its width."""
 
 
@@ -46,7 +46,7 @@ def stop_figure(
     aside, lean = _moves_aside(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
-    figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(WIDE, 2.3 * (len(rows) + 1) + 0.4))
+    figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(COLUMN_WIDTH, 2.3 * (len(rows) + 1) + 0.4))
     _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
     _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
@@ -63,14 +63,29 @@ def stop_figure(
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
-    ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
+    distance_text, time_text = f"{distance:.2f}\N{NO-BREAK SPACE}m", f"{time:.2f}\N{NO-BREAK SPACE}s"
+    ended = f"stands after {distance_text} and {time_text}" if stop.path.stands else f"still moves at {time_text}"
     heading(
         figure,
-        f"{scene.title}: {name.replace('_', ' ')} from {procedure.speed:g} m/s, "
-        f"{behind(scene).replace('{procedure}', name)}; {ended}",
+        f"{scene.title}: {plain_name(name)} from {procedure.speed:g} m/s, "
+        f"{SPELT.get(told := controller_text(scene).replace('{procedure}', name), told)}; {ended}",
         results,
     )
     return save(figure, file)
+
+
+SPELT = {
+    "j_turn": "J-turn",
+    "slip_bang_bang": "slip bang-bang",
+    "acceleration_phases": "acceleration phases",
+    "slip_pi": "slip PI",
+}
+"""Spellings of procedures and controllers for readers."""
+
+
+def plain_name(name: str) -> str:
+    """Name of a procedure or a controller as readers write it."""
+    return SPELT.get(name, name.replace("_", " "))
 
 
 STRAIGHT = 0.05
@@ -107,7 +122,7 @@ def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
     ):
         axis.plot(times, values, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
-    axis.legend(fontsize=SMALL)
+    axis.legend(fontsize=SMALL_TEXT)
 
 
 def _angles(axis: Axes, stop: Stop) -> None:
@@ -118,7 +133,7 @@ def _angles(axis: Axes, stop: Stop) -> None:
     if (hitch := stop.hitch) is not None:
         axis.plot(stop.times, np.degrees(hitch), color=PINK, label="hitch")
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Angles to the direction of travel")
-    axis.legend(fontsize=SMALL)
+    axis.legend(fontsize=SMALL_TEXT)
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
@@ -132,19 +147,21 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
         plane = plane_of(scene)
         for k in range(1, plane.masses.size):
             axles = plane.place[plane.unit == k, 0]
-            line = np.array([[-plane.reach[k, k], 0.0], [float(axles.max()) + OVERHANG, 0.0]])
+            line = np.array([[-plane.reach[k, k], 0.0], [float(axles.max()) + OUTLINE_OVERHANG, 0.0]])
             boxes += [(k, line), (k, _box(float(axles.max()), float(axles.min())))]
     return boxes
 
 
 def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
     """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
-    return np.array([place_of(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
+    return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
 def _box(front: float, rear: float) -> np.ndarray:
-    ahead, behind = front + OVERHANG, rear - OVERHANG
-    return np.array([[ahead, BESIDE], [ahead, -BESIDE], [behind, -BESIDE], [behind, BESIDE], [ahead, BESIDE]])
+    ahead, behind = front + OUTLINE_OVERHANG, rear - OUTLINE_OVERHANG
+    return np.array(
+        [[ahead, HALF_WIDTH], [ahead, -HALF_WIDTH], [behind, -HALF_WIDTH], [behind, HALF_WIDTH], [ahead, HALF_WIDTH]]
+    )
 
 
 def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
@@ -165,7 +182,7 @@ def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
                 [max(begin, first), min(end, last)],
                 bottom,
                 top,
-                color=GROUND.get(surface, OTHER),
+                color=GROUND.get(surface, OTHER_SURFACE),
                 lw=0,
                 label=None if surface in told else surface,
             )
@@ -184,4 +201,4 @@ def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
         aspect="equal",
     )
     axis.grid(False)
-    axis.legend(fontsize=SMALL, loc="upper left", ncols=4, frameon=True, facecolor="white", framealpha=1.0)
+    axis.legend(fontsize=SMALL_TEXT, loc="upper left", ncols=4, frameon=True, facecolor="white", framealpha=1.0)

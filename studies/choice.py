@@ -16,9 +16,9 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
 from models.ensemble.workers import Crew, places_of
-from studies.command.asked import ANY, load_scene, plan_of
+from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
 
-SYSTEM = ANY
+SYSTEM = ANY_SYSTEM
 ACTIVE, IDLE = 0.1, 1e-3
 """Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
 LOWEST, HIGHEST = 1e-3, 1e3
@@ -135,7 +135,7 @@ def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
     return usual if not engines or usual in engines else engines[0]
 
 
-def search(scene: Any) -> str:
+def search_text(scene: Any) -> str:
     """Text on the number of runs that a search for a scene's choice may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
@@ -171,9 +171,9 @@ def _linear(scene: Any) -> SceneChoice:
     """The choice for a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
-    from models.systems.ride.of_scene import told_by
+    from models.systems.ride.of_scene import scene_errors
 
-    with told_by(scene):
+    with scene_errors(scene):
         chooser = Linear.of(scene)
         linear = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
@@ -317,11 +317,13 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     """A panel per scene; one more for the activity of those that have it."""
-    from models.drawing.figures import WIDE, heading, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
     heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(choice.alone), 4)) for choice, active in shown]
-    figure, axes = subplots(len(shown), 1, figsize=(WIDE, sum(heights) + 0.5), squeeze=False, height_ratios=heights)
+    figure, axes = subplots(
+        len(shown), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.5), squeeze=False, height_ratios=heights
+    )
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _activity(axis, choice) if active else _changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
@@ -334,7 +336,7 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
-    from models.drawing.figures import BAD, DARK, PALE, SMALL
+    from models.drawing.figures import BAD, DARK, PALE, SMALL_TEXT
 
     shown = sorted(scene_choice.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
     y = np.arange(len(shown))
@@ -350,7 +352,7 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
         )
     for row, effect in zip(y, shown, strict=True):
         if not np.isfinite(effect.changes).all():
-            axis.text(HIGHEST, row, "cannot go alone", ha="right", va="center", fontsize=SMALL)
+            axis.text(HIGHEST, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
     barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.barred]
     if barred:
         place = np.full(len(barred), HIGHEST)
@@ -360,8 +362,9 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.set(
         xscale="log",
         xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        ylim=(-0.5, len(shown) - 0.5),
         yticks=y,
-        yticklabels=[_told_of(scene_choice, effect) for effect in shown],
+        yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
     before, _, after = scene_choice.choice.calls
@@ -369,10 +372,10 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
         f"{scene_choice.scene.system}: {before / after:.3g} times fewer calls "
         f"at {100 * scene_choice.scene.tolerance:g} %, without the effects named 'left out'"
     )
-    axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _told_of(choice_of: SceneChoice, effect: Alone) -> str:
+def _effect_and_whether_gone(choice_of: SceneChoice, effect: Alone) -> str:
     """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
     return effect.effect.replace("_", " ") + (
         " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"

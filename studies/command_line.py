@@ -143,9 +143,9 @@ def _say_user_code(scene: Any) -> None:
 
 def _search(scene: Any) -> list[str]:
     """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
-    from studies.choice import search
+    from studies.choice import search_text
 
-    return [] if scene.tolerance is None else [search(scene)]
+    return [] if scene.tolerance is None else [search_text(scene)]
 
 
 @app.command("run")
@@ -250,7 +250,7 @@ def compare(
     from studies.command.comparison import report
 
     if measured.against(first, second):
-        for run in measured.runs_of(first).values():
+        for run in measured.saved_results(first).values():
             measured.overlay(run, second, shift)  # before a folder is made
         folder = folder_of("compare", None, "", out, None)
         return finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
@@ -382,12 +382,12 @@ def validate(
     if blind_spots:
         return blind_spot_audit(quick or against is not None, only, out, resume)
     from models.ensemble.workers import Crew
-    from validation.common.changes import read
-    from validation.run import KEPT
+    from validation.common.changes import read_results
+    from validation.run import FINISHED_CASES
     from validation.run import validate as run_all
 
-    earlier = None if against is None else read(against)
-    folder = folder_of("validate-quick" if quick else "validate", KEPT, "", out, resume)
+    earlier = None if against is None else read_results(against)
+    folder = folder_of("validate-quick" if quick else "validate", FINISHED_CASES, "", out, resume)
     try:
         command = " ".join(["twinrig", *sys.argv[1:]])
         failed = run_all(folder, quick, command, earlier, resume is not None, Crew.given(**crew))

@@ -28,7 +28,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": conicity.answer(conicities),
+        "answer": conicity.conicity_numbers(conicities),
         "results": {"conicity": conicities},
         "table": conicity.lines(conicities.detail),
     }

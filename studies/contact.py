@@ -16,7 +16,7 @@ from models.core.result import Result
 from models.core.strict import Strict, read
 from models.machine.seconds import cost, duration
 from models.systems import run as run_scene
-from models.systems.contact.run import Rolls, built_of, cells_of, touches
+from models.systems.contact.run import Rolls, cells_of, scene_contact, touches
 from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
@@ -121,7 +121,7 @@ def _lines_of_touches(scene: ContactScene) -> list[str]:
     return [
         f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
         f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
-        for touch in touches(scene, built_of(scene))
+        for touch in touches(scene, scene_contact(scene))
     ]
 
 
@@ -159,18 +159,18 @@ def _pressure(body: Contact) -> str:
     return "pressure"
 
 
-CHECKED = 40
+CHECKING_CELLS = 40
 """Cells along each axis of the exact theory where it checks a sweep."""
 
 
 def _checks(scene: ContactScene, rolls: Rolls) -> dict[int, Any]:
     """The exact theory at a few motions of a sweep on an ellipse, by their numbers; it has constant friction."""
     body, points = rolls.contact, read(Options, scene.options, scene.file, "options").exact
-    if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or built_of(scene).falling is not None:
+    if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or scene_contact(scene).falling is not None:
         return {}
     exact = ExactOnEllipse(body.hertz, body.friction, body.pair)
     chosen = np.unique(np.linspace(0, len(rolls.motions) - 1, points).round().astype(int))
-    return {int(i): exact.roll(rolls.motions[i], CHECKED) for i in chosen}
+    return {int(i): exact.roll(rolls.motions[i], CHECKING_CELLS) for i in chosen}
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from models.contact.theories import Rolled
 from models.core.result import Result
 from models.drawing.figures import (
     BLUE,
+    COLUMN_WIDTH,
     DARK,
     GREEN,
     GREY,
@@ -22,7 +23,6 @@ from models.drawing.figures import (
     PINK,
     SKY,
     VERMILION,
-    WIDE,
     heading,
     legend_below,
     save,
@@ -45,7 +45,7 @@ def contact_figure(
     forces : the result whose last motion is shown.
     """
     length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
-    size = WIDE, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
+    size = COLUMN_WIDTH, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
     figure, axes = subplots(1, 2, figsize=size, sharex=True, sharey=True)
     _pressure(axes[0], patches, pressure)
     _tractions(axes[1], patches, friction, max(length, width) / ARROWS)
@@ -121,7 +121,7 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
 
     forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
     """
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
     limit = 1e-3 * body.friction * body.pressing.load
     stated, none = "error_of_cells" in forces.data, 0.0 * values
@@ -166,7 +166,7 @@ STYLES = {
 }
 
 
-TOP = 60.0
+LARGEST_ERROR = 60.0
 """Largest error (%) that the figure shows."""
 
 
@@ -176,7 +176,7 @@ def price_figure(price: Result, title: str) -> Figure:
     FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
     """
     widths = (1.3, 1.0, 1.0)
-    figure, axes = subplots(1, 3, figsize=(WIDE, 4.6), sharey=True, width_ratios=widths)
+    figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.6), sharey=True, width_ratios=widths)
     points: list[TheoryPoint] = price.detail
     for name in STYLES:
         line = [point for point in points if point.name == name]
@@ -195,7 +195,7 @@ def price_figure(price: Result, title: str) -> Figure:
             axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].yaxis.set_minor_locator(NullLocator())
-    axes[0].set(ylim=(0.1, TOP), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
+    axes[0].set(ylim=(0.1, LARGEST_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
     legend_below(figure, axes[0])
     heading(figure, title, {"price": price})
     return figure
@@ -205,7 +205,7 @@ def _priced(axis: Any, name: str, line: list[TheoryPoint], along: list[float], b
     """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
     colour, marker = STYLES[name]
     mean, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))
-    label = name if mean[0] < TOP else f"{name}: {mean[0]:.0f} %"
+    label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
     axis.plot(along, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if bar:
         axis.plot([along[-1]] * 2, [mean[-1], most[-1]], color=colour, linewidth=0.8)

@@ -227,9 +227,9 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, DARK, WIDE, heading, save, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, heading, save, subplots
 
-    figure, (fan, histogram) = subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
+    figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], statistics.fan[:, 1:])
     fan.axhline(
         options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"

@@ -31,7 +31,8 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
                 failed[f"{name}, {engine}"] = str(error)
         if runs:
             join_results(runs, "engine").save(folder / f"{name}.nc")
-            manoeuvre_figure(runs, name.replace("_", " "), folder / f"{name}.png")
+            title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
+            manoeuvre_figure(runs, title, folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
             answer[name] = _answer(runs)
             lines.append(_line(name, answer[name]))

@@ -14,6 +14,10 @@ TYRES, LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
 """Colours of four tyres, and lines of the first four, the next four (of what is towed) and so on."""
 
 
+CORNERS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+"""Names of tyres as readers know them; others keep theirs."""
+
+
 def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     """Panels over time, the path and the friction circle of the first run; one colour for each tyre."""
     drive: Drive = next(iter(runs.values())).detail
@@ -34,7 +38,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
         (moments, drive["mz"], "moment [N m]", "Aligning moments"),
     ):
         for i, tyre in enumerate(drive.handling.vehicle.tyres):
-            axis.plot(drive.run.times, values[:, i], label=tyre.name, **_tyre_style(i))
+            axis.plot(drive.run.times, values[:, i], label=CORNERS.get(tyre.name, tyre.name), **_tyre_style(i))
         axis.set(ylabel=label, title=name)
     for axis in over_time:
         axis.set_xlabel("time [s]")
@@ -57,6 +61,7 @@ def _path(axis: Axes, drive: Drive) -> None:
     arrows: dict[str, Any] = {"angles": "xy", "scale": 14, "width": 5e-3, "color": GREEN, "zorder": 3}
     axis.quiver(x, y_few, np.cos(yaw), np.sin(yaw), **arrows)
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path, and where the car points")
+    axis.margins(x=0.1)  # arrows are a fourteenth of the panel long
     low, high = y.min(), y.max()
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
 

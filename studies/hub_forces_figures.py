@@ -6,11 +6,11 @@ import numpy as np
 
 from models.drawing.figures import (
     BLUE,
+    COLUMN_WIDTH,
     DARK,
     GREEN,
     TRUTH,
     VERMILION,
-    WIDE,
     about_one,
     heading,
     legend_below,
@@ -34,7 +34,7 @@ def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
     """Roll, pitch, heading and position of every run, beside the true ones where these are known."""
-    figure, axes = subplots(2, 3, figsize=(WIDE, 5.0), sharex=True)
+    figure, axes = subplots(2, 3, figsize=(COLUMN_WIDTH, 5.0), sharex=True)
     panels = [(name, name, 1e3, "mrad") for name in ("roll", "pitch", "heading")]
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
     for axis, (name, channel, factor, unit) in zip(axes.flat, panels, strict=True):
@@ -54,7 +54,7 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
 
 def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     """Damage of every section force, divided by the true one's, or without a truth by that of the filter's run."""
-    figure, axis = subplots(figsize=(WIDE, 4.6))
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.6))
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
         ratios = comparison.damages(comparison.runs[run]["section_force"])

@@ -34,11 +34,11 @@ Progress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
 Minutes = Annotated[float, Field(ge=0.1, le=600)]
 
-SURE = 0.9
+KEEPING_SHARE = 0.9
 """Part of all units of one grade that must keep within the allowed error."""
-LARGEST = 0.5
+LARGEST_ANGLE_ERROR = 0.5
 """rad: an angle error beyond it is no tilt of a vehicle on any road."""
-KEPT = 0.01
+SAVED_SPACING = 0.01
 """Spacing (s) of the saved runs."""
 
 
@@ -96,7 +96,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         except RunFailed as error:
             failed[engine] = str(error)
             continue
-        result.every(KEPT).save(folder / f"{engine}.nc")
+        result.every(SAVED_SPACING).save(folder / f"{engine}.nc")
         results[engine] = result
         curves[engine] = damage_curve(result, reach, scene.file)
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
@@ -127,11 +127,11 @@ def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
 
 
 def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
-    """Largest angle error (rad) of each grade over the longest drive, and the damage error that SURE of its units keep,
-    with the standard error of that."""
+    """Largest angle error (rad) of each grade over the longest drive, and the damage error that KEEPING_SHARE of its
+    units keep, with the standard error of that."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
     worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
-    kept = [quantile(each, SURE) for each in worst]
+    kept = [quantile(each, KEEPING_SHARE) for each in worst]
     channels = {
         "angle_error": Channel("grade", [float(np.abs(each).max()) for each in angles], "rad", "largest angle error"),
         "damage_error": Channel("grade", [middle for middle, _, _ in kept], "", "damage error"),
@@ -139,7 +139,12 @@ def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline)
     units = labelled(scene, channels, {"grade": Channel("grade", options.grades, "deg/h")})
     says, remedy = "the angle errors are small ones", "take finer grades, or shorter drives"
     with_assumptions(
-        units, [Assumption("small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST)]
+        units,
+        [
+            Assumption(
+                "small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST_ANGLE_ERROR
+            )
+        ],
     )
     chances = {
         f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
@@ -168,13 +173,14 @@ def _row(
         "angle by law": float(angle_law(np.array(float(end)), options, grade)),
         "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
         "damage error": {
-            name: [float(np.quantile(errors, part)) for part in (0.5, SURE)] for name, errors in worst.items()
+            name: [float(np.quantile(errors, part)) for part in (0.5, KEEPING_SHARE)] for name, errors in worst.items()
         },
     }
 
 
 def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
-    """Duration in minutes -> coarsest grade (deg/h) of which SURE of all units keep the allowed damage error."""
+    """Duration in minutes -> coarsest grade (deg/h) of which KEEPING_SHARE of all units keep the allowed damage
+    error."""
     cheapest_grades: dict[str, float | None] = {}
     for minutes in options.durations:
         judged = (row for row in rows if row["minutes"] == minutes and row["damage error"])
@@ -199,11 +205,13 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
     ]
     return [
         f"  Damage: rainflow after ASTM E1049-85, the run repeated; slope {SLOPE:g}; worst of {', '.join(CHANNELS)}.",
-        f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {SURE:.0%} of all units.",
+        f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {KEEPING_SHARE:.0%} of all "
+        "units.",
         f"    grade      walk     time     angle error [deg]   {names}",
         "    deg/h  deg/rt(h)     min          law  measured",
         *lines,
-        f"  Coarsest grade of which {SURE:.0%} of all units keep the damage within {options.allowed_damage_error:.2g}:",
+        f"  Coarsest grade of which {KEEPING_SHARE:.0%} of all units keep the damage within "
+        f"{options.allowed_damage_error:.2g}:",
         *best,
     ]
 
@@ -214,9 +222,9 @@ def _percent(share: float) -> str:
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
     """Angle error and damage error over the length of the drive, a line per grade."""
-    from models.drawing.figures import DARK, WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, subplots
 
-    figure, axes = subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
         of_grade = [row for row in rows if row["grade"] == grade]
@@ -227,7 +235,9 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
         axes[1].loglog(minutes, error, "o-", color=f"C{i}", markersize=4, label=f"{grade:g} deg/h")
     axes[1].axhline(100 * options.allowed_damage_error, color=DARK, linestyle=":", label="allowed")
     axes[0].set(title="Angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")
-    axes[1].set(title=f"Damage error that {SURE:.0%} of all units keep [%]", xlabel="length of the drive [min]")
+    axes[1].set(
+        title=f"Damage error that {KEEPING_SHARE:.0%} of all units keep [%]", xlabel="length of the drive [min]"
+    )
     legend_below(figure, axes[1], columns=len(options.grades) + 1)
     heading(figure, "What the grade of a gyro does to angle and damage", results)
     return figure

@@ -98,9 +98,9 @@ def _save(name: str, result: Result, folder: Path) -> None:
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
     """A column for each wheel; the bars in the first row are the patches' widths."""
-    from models.drawing.figures import TURNS, WIDE, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, TURNS, heading, legend_below, save, subplots
 
-    drawn, axes = subplots(len(PANELS), 2, figsize=(WIDE, 9.6), sharex=True, sharey="row")
+    drawn, axes = subplots(len(PANELS), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")
     for column, wheel in enumerate(WHEELS[::-1]):
         for axis, (quantity, label) in zip(axes[:, column], PANELS.items(), strict=True):
             for k, (name, result) in enumerate(results.items()):

@@ -285,7 +285,7 @@ def _closing(options: Options) -> list[str]:
 
 def _figure(source: Source, results: Results, path: Path) -> None:
     """Pitch and heave of one source, what each way errs by where the truth is known, and the misfit of the readings."""
-    from models.drawing.figures import GREY, WIDE, heading, legend_below, save, subplot_mosaic
+    from models.drawing.figures import COLUMN_WIDTH, GREY, heading, legend_below, save, subplot_mosaic
 
     assert source.quality is not None
     times = source.period * np.arange(len(source.readings))
@@ -294,7 +294,9 @@ def _figure(source: Source, results: Results, path: Path) -> None:
         *([["pitch error", "heave error"]] if source.truth else []),
         ["misfit", "misfit"],
     ]
-    figure, axes = subplot_mosaic(rows, figsize=(WIDE, 2.0 * len(rows) + 0.8), sharex=True)
+    figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
+    for axis in axes.values():
+        axis.xaxis.set_tick_params(labelbottom=True)
     ways = {way: _values(motion) for way, motion in source.ways.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
         _motions(axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name)

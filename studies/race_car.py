@@ -39,23 +39,23 @@ class Options(Strict):
     blocks: int = Field(3, ge=2, le=10, description="parts of the measurement, each predicted from the others")
     parameters: list[str] = Field(
         [],
-        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: twelve of a measured race car, five of "
-        "the scene's own short drive, which determines no more",
+        description="keys that are identified, each KEY or KEY=LOW:HIGH; empty: fifteen of a measured race car, five "
+        "of the scene's own short drive, which determines no more",
     )
 
     def asked(self) -> list[str]:
         """Keys that are identified."""
-        return self.parameters or list(PARAMETERS if self.measurement else FEW)
+        return self.parameters or list(PARAMETERS if self.measurement else FITTED_PARAMETERS)
 
 
-FEW = (
+FITTED_PARAMETERS = (
     "vehicle.yaw_inertia=300:5000",
     "front.stiffness=5:50",
     "front.friction=0.3:3",
     "rear.stiffness=5:50",
     "rear.friction=0.3:3",
 )
-"""What half a minute of driving determines; with all twelve the search does not settle, and predicts badly."""
+"""What half a minute of driving determines; with all fifteen the search does not settle, and predicts badly."""
 SIMPLER: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
@@ -90,7 +90,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     answer["simpler vehicles"] = {
         name: dict(zip(AIMS, each.bands.relative(), strict=True)) for name, each in others.items()
     }
-    answer["residuals"] = where_wrong(chosen)
+    answer["residuals"] = residual_correlations(chosen)
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -107,10 +107,10 @@ def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[
         whole, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
         path = plain(_found(scene, options.measurement, "options.measurement"), folder / "measured.csv")
-        whole = _on(scene, path, RACE_CAR)
+        whole = _scene_with_car(scene, path, RACE_CAR)
     if options.prediction:
         other = plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
-        return whole, _on(scene, other, RACE_CAR)
+        return whole, _scene_with_car(scene, other, RACE_CAR)
     from models.measured.drive import read_drive
 
     times = read_drive(path).times
@@ -125,7 +125,7 @@ def _found(scene: SingleTrackScene, name: str, place: str) -> Path:
     return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
 
 
-def _on(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
+def _scene_with_car(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
     """The scene with the race car and a drive."""
     table = {"title": scene.title, "system": SYSTEM, **car, "drive": {"file": path.name, "low_pass": 10.0}}
     return build(table, scene.file, path.parent)
@@ -189,7 +189,7 @@ def _told(chosen: Identified, others: dict[str, Identified]) -> list[str]:
     return table
 
 
-def where_wrong(chosen: Identified) -> dict[str, dict[str, float]]:
+def residual_correlations(chosen: Identified) -> dict[str, dict[str, float]]:
     """Per channel: correlation of the residual's magnitude, and of itself, with what the car does."""
     problem = chosen.known.fit.problem
     model = problem.model.result(chosen.known.fit.values)  # type: ignore[attr-defined]

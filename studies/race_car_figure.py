@@ -29,7 +29,8 @@ def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path
         )
         axis.plot(times[shown], row[shown], color=VERMILION, linewidth=0.9, label="predicted")
         axis.plot(times[shown], channel.values[shown], color=DARK, linewidth=0.9, label="measured")
-        axis.set(title=channel.name, ylabel=f"[{channel.unit}]", xlabel="time [s]")
+        unit = channel.unit.replace("^2", "²")
+        axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
     vehicles = {"chosen": chosen, **others}
     for i, (name, each) in enumerate(vehicles.items()):

@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 
 from models.core.finding import Finding
-from models.drawing.figures import BLUE, MEASURED, PALE, TRUTH, TURNS, VERMILION, WIDE, YELLOW, heading, save, subplots
+from models.drawing.figures import (
+    BLUE,
+    COLUMN_WIDTH,
+    MEASURED,
+    PALE,
+    TRUTH,
+    TURNS,
+    VERMILION,
+    YELLOW,
+    heading,
+    save,
+    subplots,
+)
 from models.fatigue.counting import Counted
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
@@ -20,9 +32,9 @@ from models.systems.measured.sections import Answer
 from models.systems.measured.verdict import Compared, overlay
 from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
-AROUND, LONGEST, MOST = 0.6, 15.0, 20_000
+MARKED_SECONDS, UNMARKED_SECONDS, MOST_SAMPLES = 0.6, 15.0, 20_000
 """s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""
-SHOWN = 4
+SHOWN_SIGNALS = 4
 """Signals drawn at the most."""
 TITLE = 60
 """Letters of a place in a title."""
@@ -69,13 +81,13 @@ def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str =
 
 def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
     """Signals over time, what is meant marked."""
-    recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN]
-    begin = max(marked[0] - AROUND, 0.0) if marked else 0.0
-    end = min(marked[1] + AROUND if marked else LONGEST, recording.duration)
+    recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
+    begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
+    end = min(marked[1] + MARKED_SECONDS if marked else UNMARKED_SECONDS, recording.duration)
     first, last = round(begin / recording.period), round(end / recording.period) + 1
-    every = max((last - first) // MOST, 1)
+    every = max((last - first) // MOST_SAMPLES, 1)
     times = recording.period * np.arange(first, last)[::every]
-    drawn, axes = subplots(len(shown), 1, figsize=(WIDE, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
+    drawn, axes = subplots(len(shown), 1, figsize=(COLUMN_WIDTH, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
     for axis, signal in zip(axes[:, 0], shown, strict=True):
         values = recording.columns.read(signal.name, first, last - first)[::every]
         axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
@@ -100,7 +112,7 @@ def _means(evidence: Evidence, path: Path) -> Path:
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
     means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
-    drawn, axis = subplots(figsize=(WIDE, 3.4))
+    drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
     at = np.arange(len(hubs))
     axis.bar(at - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
     bars = axis.bar(at + 0.2, means, 0.38, color=LOUD, label="mean of the recording")
@@ -128,7 +140,7 @@ def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     told = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
     expected = factor * np.exp(-2j * np.pi * f * late)
     turned = -360 * f * late + (180.0 if factor < 0 else 0.0)
-    drawn, axes = subplots(2, 1, figsize=(WIDE, 4.6), sharex=True)
+    drawn, axes = subplots(2, 1, figsize=(COLUMN_WIDTH, 4.6), sharex=True)
     for axis, measured, said, level in (
         (axes[0], np.abs(ratio), np.abs(expected), 1.0),
         (axes[1], np.degrees(np.angle(ratio / expected)) + turned, turned, 0.0),
@@ -149,7 +161,7 @@ def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     agreement = evidence.agreement
     assert agreement is not None
     names = [s.name for s in agreement.outputs]
-    drawn, axis = subplots(figsize=(WIDE, 1.4 + 0.24 * len(names)))
+    drawn, axis = subplots(figsize=(COLUMN_WIDTH, 1.4 + 0.24 * len(names)))
     at = np.arange(len(names))
     axis.barh(at - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD, label="as mapped")
     axis.barh(at + 0.2, 100 * agreement.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
@@ -164,8 +176,8 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
     from scipy.signal import welch
 
     recording = evidence.recording
-    drawn, axis = subplots(figsize=(WIDE, 3.4))
-    for signal in signals[:SHOWN]:
+    drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
+    for signal in signals[:SHOWN_SIGNALS]:
         values = recording.samples(signal)
         f, density = welch(
             np.where(np.isfinite(values), values, np.nanmean(values)), 1 / recording.period, nperseg=2048
@@ -195,7 +207,7 @@ def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
     """A figure of rows over time."""
-    drawn, panels = subplots(rows, figsize=(WIDE, height), squeeze=False, **more)
+    drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **more)
     for panel in panels[-1] if more.get("sharex") else panels.flat:
         panel.set_xlabel("time [s]")
     return drawn, panels
@@ -270,7 +282,7 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
 
 def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     """Level crossings and range pairs of some loads."""
-    drawn, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
+    drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
         right.plot(np.maximum(counts.pairs, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)

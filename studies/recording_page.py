@@ -24,7 +24,7 @@ from studies import recording_figures as draw
 
 TEMPLATE = "recording.html.jinja"
 NAMES = {FREE: "Free run", "kalman": "Run held by the Kalman filter", "prescribed": "Run held to measured angles"}
-STILL = 1e-6
+NEGLIGIBLE_CHANGE = 1e-6
 """N, N m: what changes by less is rounding."""
 DRAWN = 6
 """Section forces drawn at the most; all of them are in the table and in the files."""
@@ -84,7 +84,9 @@ def _figures(exam: Examination, folder: Path) -> dict[str, Any]:
 
 def _forces(exam: Examination, outcome: Outcome, folder: Path) -> dict[str, Any]:
     """The page's section on section forces: those that change, how many do not, and figures of the first ones."""
-    moving = {answer: counts for answer, counts in exam.counted.items() if counts.greatest - counts.least > STILL}
+    moving = {
+        answer: counts for answer, counts in exam.counted.items() if counts.greatest - counts.least > NEGLIGIBLE_CHANGE
+    }
     first, inside = list(moving)[:DRAWN], set(exam.rig.places.connectors)
     return {
         "slope": SLOPE,

@@ -45,9 +45,9 @@ SIMPLER = {
 ISOTROPIC = "isotropic road"
 ROUNDING = 1e-13
 """Deviations below, in SI, are what rounding leaves of zero."""
-LEAST = 1e-6
+NEGLIGIBLE_OUTPUT = 1e-6
 """An output this much smaller than on another road is zero but for rounding: no change is given."""
-ALONG = 13
+POINTS_ALONG_BODY = 13
 """Points along the body at which its vertical acceleration is drawn."""
 OVERHANG = 0.2
 """How far (m) these points reach beyond the axles."""
@@ -128,7 +128,7 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     if not bodies or len(vehicle.axles) < 2:
         return None
     body = max(bodies, key=lambda body: body.mass)
-    places = np.linspace(vehicle.axles[-1] - OVERHANG, vehicle.axles[0] + OVERHANG, ALONG)
+    places = np.linspace(vehicle.axles[-1] - OVERHANG, vehicle.axles[0] + OVERHANG, POINTS_ALONG_BODY)
     points = [(float(x), 0.0, body.position[2]) for x in places]
     outputs = [PointOutput(f"x = {p[0]:.2f} m", "acceleration", body.name, p, (0.0, 0.0, 1.0)) for p in points]
     return replace(vehicle, outputs=tuple(outputs))
@@ -195,7 +195,7 @@ def _table(
 def _value_without_rounding(deviations: np.ndarray) -> float:
     """The scene's own of the deviations (cases,), 0 where symmetry leaves only rounding."""
     largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
-    return float(deviations[0]) if deviations[0] > max(LEAST * largest, ROUNDING) else 0.0
+    return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING) else 0.0
 
 
 def _text(value: float, unit: str, status: str) -> str:
@@ -206,7 +206,11 @@ def _text(value: float, unit: str, status: str) -> str:
 
 
 def _change(other: float, value: float) -> str:
-    return f"{100 * (other / value - 1):+.1f} %" if np.isfinite(other) and LEAST * other < value < np.inf else "-"
+    return (
+        f"{100 * (other / value - 1):+.1f} %"
+        if np.isfinite(other) and NEGLIGIBLE_OUTPUT * other < value < np.inf
+        else "-"
+    )
 
 
 def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free: float | None) -> list[str]:

@@ -18,7 +18,7 @@ from models.core.strict import read
 from models.core.told import inherited
 from models.core.whole_files import write_whole
 from models.systems import run as run_scene
-from models.systems.ride.of_scene import goes_in_time, told_by
+from models.systems.ride.of_scene import goes_in_time, scene_errors
 from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
 from models.systems.ride.scene import RideScene
 from studies.choice import save_choices
@@ -67,7 +67,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     if goes_in_time(scene):
         return save_choices([scene], engines, folder, progress)
     progress("screening", 0.1)
-    with told_by(scene):
+    with scene_errors(scene):
         chooser = Chooser.of(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
@@ -180,11 +180,11 @@ def choice_figure(
     path: Path,
 ) -> None:
     """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
-    from models.drawing.figures import DARK, WIDE, heading, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, save, subplots
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
     heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS
-    figure, (above, below) = subplots(2, 1, figsize=(WIDE, sum(heights) + 0.4), height_ratios=heights)
+    figure, (above, below) = subplots(2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights)
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from models.core.told import Results
 from models.drawing.figures import (
     BLUE,
+    COLUMN_WIDTH,
     DARK,
     GREY,
     LABELS,
     PINK,
     SKY,
-    SMALL,
+    SMALL_TEXT,
     VERMILION,
-    WIDE,
     heading,
     legend_below,
     panels,
@@ -55,7 +55,7 @@ def along_figure(
     places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, above: Heading, path: Path
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.0))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
     for i, case in enumerate(at.cases):
         left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
@@ -81,7 +81,7 @@ def _middle_acceleration(vehicle: SpatialVehicle) -> str:
     return min(points, key=lambda o: abs(o.point[0] - middle)).name if points else ""
 
 
-NONE = "\n(no finite variance)"
+NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
@@ -96,7 +96,9 @@ def outputs_figure(
         names = [name for name, unit_of in zip(swept.outputs, kinds, strict=True) if unit_of == (kind, si)]
         curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
-            axis.plot(swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
+            axis.plot(
+                swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE
+            )
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, swept.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
@@ -114,6 +116,11 @@ def _say_where_none(axis: Axes) -> None:
 
 def _unit_text(unit: str) -> str:
     return unit.replace("^2", "²")
+
+
+def _squared(unit: str) -> str:
+    """A unit's square: of one of several signs in brackets."""
+    return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
 
 
 def _shown_unit(unit: str) -> tuple[str, float]:
@@ -143,7 +150,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
     if not shown:
         return
-    figure, axes = subplots(1, len(shown), figsize=(WIDE, 4.2), squeeze=False)
+    figure, axes = subplots(1, len(shown), figsize=(COLUMN_WIDTH, 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
@@ -159,7 +166,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: Heading, path: Path) -> None:
     """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.0))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted is not None:
         spectra = fitted.spectra
         left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
@@ -184,23 +191,34 @@ def detail_figure(
     path: Path,
 ) -> None:
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
-    share = 0.66 * WIDE / len(errors)
-    heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL) for model, road in errors]
+    share = 0.66 * COLUMN_WIDTH / len(errors)
+    heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
-    figure, axis = subplots(figsize=(WIDE, 0.3 * len(names) + 2.2))
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
     for i, j in np.ndindex(values.shape):
         if np.isfinite(values[i, j]):
             dark = abs(values[i, j]) > 40
             axis.text(
-                j, i, f"{values[i, j]:+.0f}", ha="center", va="center", fontsize=SMALL, color="w" if dark else "k"
+                j,
+                i,
+                _signed(float(values[i, j])),
+                ha="center",
+                va="center",
+                fontsize=SMALL_TEXT,
+                color="w" if dark else "k",
             )
-    axis.set_xticks(range(len(heads)), heads, fontsize=SMALL)
+    axis.set_xticks(range(len(heads)), heads, fontsize=SMALL_TEXT)
     axis.set_yticks(range(len(names)), names)
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
-    what = "largest error of each standard deviation over the speeds [%], and the time of one covariance"
+    what = "largest error of each standard deviation [%], and the time of one covariance"
     _save(figure, above, f"\n{what.capitalize()}", path)
+
+
+def _signed(percent: float) -> str:
+    """A whole number with its sign; zero has none."""
+    return f"{percent:+.0f}" if round(percent) else "0"
 
 
 def drive_figure(
@@ -215,7 +233,7 @@ def drive_figure(
     groups = list(dict.fromkeys(kinds[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = subplots(
-        len(heights), 1, figsize=(WIDE, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
+        len(heights), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         columns = {name: varied.names.index(name) for name in drawn_outputs if kinds[name] == (kind, unit)}
@@ -223,7 +241,7 @@ def drive_figure(
         for label, both in _distinct(pairs).items():
             exact, quasi = np.split(both, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
-                axis.plot([], label=label + NONE)
+                axis.plot([], label=label + NO_FINITE_VARIANCE)
                 continue
             (line,) = axis.plot(varied.time, exact, label=label)
             axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
@@ -234,14 +252,14 @@ def drive_figure(
     _save(figure, above, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
-MOST = 12
+MOST_OUTPUTS = 12
 """Outputs that a figure shows."""
 
 
 def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
     """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
     outputs = answer.shown.vehicle.outputs
-    figure, axes = _few_panels(min(len(outputs), MOST))
+    figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
     left = answer.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
@@ -277,7 +295,7 @@ def engine_spectra_figure(
     frequency = np.geomspace(0.3, 40.0, 300)
     expected = one_sided(linear, road, speed, frequency)
     first = next(iter(runs.values()))
-    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST]
+    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
     figure, axes = _few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
         for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
@@ -286,7 +304,7 @@ def engine_spectra_figure(
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
         output, top = linear.outputs[i], expected[:, i].max()
-        unit = f"one-sided density [({_unit_text(output.unit)})²/Hz]"
+        unit = f"one-sided density [{_squared(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
     _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
@@ -301,7 +319,7 @@ def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
 
 def _name_below(axis: Axes, drop: float = 0.18) -> None:
     """The legend below a panel, by a share of its height that leaves room for what is written there."""
-    axis.legend(fontsize=SMALL, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
+    axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 
 def _save(figure: Figure, above: Heading, text: str, path: Path) -> None:

@@ -74,7 +74,7 @@ def same_times(first: Result, other: Result) -> bool:
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
-    from models.drawing.figures import COLOURS, LABELS, WIDE, heading, legend_below, save, subplots
+    from models.drawing.figures import COLOURS, COLUMN_WIDTH, LABELS, heading, legend_below, save, subplots
 
     panels = [
         ("z3", "Heave of the chassis, down [m]", 1.0),
@@ -84,7 +84,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
     if all("enforced_moment" in result.data for result in results.values()):
         panels.append(("enforced_moment", "Enforced moment [N m]", 1.0))
     rows = len(panels) + (1 if len(results) > 1 else 0)
-    figure, axes = subplots(rows, 1, figsize=(WIDE, 1.7 * rows + 0.7), sharex=True)
+    figure, axes = subplots(rows, 1, figsize=(COLUMN_WIDTH, 1.7 * rows + 0.7), sharex=True)
     for axis, (channel, label, scale) in zip(axes, panels, strict=False):
         for i, (engine, result) in enumerate(results.items()):
             style = {"color": COLOURS[engine], "label": LABELS[engine], "linewidth": 2.4 - 0.8 * i, "alpha": 0.9}

@@ -1,18 +1,22 @@
 """A car of two axles along a measured drive: what its sensors would show, beside what they did where a file says it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from models.core.result import Result
+from models.measured.curve import curve
+from models.measured.formats import open_source
 from models.systems.single_track.run import run as run_scene
 from models.systems.single_track.scene import SingleTrackScene
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
-SHOWN = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
+SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
+TITLES = {"wheels steer": "Steer angle of the wheels"}
+"""Titles of panels whose channel's name is none."""
 
 
 def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -20,8 +24,10 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
     driven.save(folder / "drive.nc")
-    figure(driven, scene.title, folder / "drive.png")
-    answer = {f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN.items()}
+    figure(driven, measured(scene, driven), scene.title, folder / "drive.png")
+    answer = {
+        f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
+    }
     answer |= {f"largest slip angle {axle} [rad]": float(np.abs(driven[f"slip angle {axle}"]).max()) for axle in AXLES}
     return {
         "scene": scene.title,
@@ -36,20 +42,36 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 AXLES = ("front", "rear")
 
 
-def figure(driven: Result, title: str, path: Path) -> Path:
-    """Steer, the three channels over time, and the side force of each axle by its load over its slip angle."""
-    from models.drawing.figures import BLUE, DARK, VERMILION, heading, legend_below, panels, save
+def measured(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
+    """Values (n,) at the times of the drive of those channels that the file of the drive has too, in their units."""
+    source = open_source(scene.path(scene.drive.file, "drive.file"))
+    known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
+    curves = {name: curve(source, name, driven.data[name].attrs["units"]) for name in known}
+    return {name: np.interp(driven.times, *every) for name, every in curves.items()}
 
-    drawing, axes = panels(5, 2, 2.15)
-    curves = {"wheels steer": "rad", **SHOWN}
+
+def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
+    """Steer, the three channels over time, and of each axle its slip angle and the side force / load over it.
+
+    beside : values (n,) that were measured, drawn beside the channels of their names.
+    """
+    from models.drawing.figures import BLUE, DARK, MEASURED, VERMILION, heading, legend_below, panels, save
+
+    drawing, axes = panels(6, 2, 2.15)
+    curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
-        axis.plot(driven.times, driven[name], color=DARK, linewidth=0.8)
-        axis.set(ylabel=f"{name} [{unit}]", title=name, xlabel="time [s]")
-    for axle, colour in zip(AXLES, (BLUE, VERMILION), strict=True):
-        used = driven[f"side force {axle}"] / driven[f"load {axle}"]
-        axes[4].plot(driven[f"slip angle {axle}"], used, ".", color=colour, markersize=1.5, label=axle)
-    axes[4].set(xlabel="slip angle [rad]", ylabel="side force by load [-]", title="Axles")
-    legend_below(drawing, axes[4])
+        if name in beside:
+            axis.plot(driven.times, beside[name], color=MEASURED, linewidth=2.0, label="measured")
+        axis.plot(driven.times, driven[name], color=DARK, linewidth=0.8, label="computed")
+        axis.set(ylabel=f"[{unit}]", title=TITLES.get(name, name.capitalize()), xlabel="time [s]")
+    used = {axle: driven[f"side force {axle}"] / driven[f"load {axle}"] for axle in AXLES}
+    for axle, colour, size in zip(AXLES, (BLUE, VERMILION), (4.0, 1.5), strict=True):
+        axes[4].plot(driven[f"slip angle {axle}"], used[axle], ".", color=colour, markersize=size, label=axle)
+        axes[5].plot(driven.times, driven[f"slip angle {axle}"], color=colour, linewidth=0.8)
+    axes[4].set(xlabel="slip angle [rad]", ylabel="[-]", title="Side force / load of each axle")
+    axes[5].set(xlabel="time [s]", ylabel="[rad]", title="Slip angle of each axle")
+    axes[4].legend(markerscale=3.0)
+    legend_below(drawing, *axes[:4])
     heading(drawing, title, {"drive": driven})
     return save(drawing, path)
 

@@ -19,7 +19,7 @@ from models.systems.pitch_plane.six_runs import DRIFT, Options, error, followed,
 
 Progress = Callable[[str, float], None]
 
-KEPT = 0.01
+SAVED_SPACING = 0.01
 """Spacing (s) of the saved runs; the table is made from every step."""
 check = options_of
 
@@ -39,7 +39,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         except RunFailed as failure:
             failed[f"{engine}, {name}"] = str(failure)
             continue
-        runs[engine][name].every(KEPT).save(folder / f"{engine} {name}.nc")
+        runs[engine][name].every(SAVED_SPACING).save(folder / f"{engine} {name}.nc")
     rows = [row(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()]
     table = text(rows, engines, options, deviation)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
@@ -123,9 +123,9 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
 
 
 def _figure_measurement(measured: Result) -> Any:
-    from models.drawing.figures import WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
-    figure, axes = subplots(2, 2, figsize=(WIDE, 4.6), sharex="col", width_ratios=(2, 1))
+    figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 4.6), sharex="col", width_ratios=(2, 1))
     middle = round(float(measured.times[-1]) / 2, 1)
     detail = (measured.times >= middle) & (measured.times <= middle + 1)
     panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))
@@ -134,7 +134,7 @@ def _figure_measurement(measured: Result) -> Any:
             whole.plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
             part.plot(measured.times[detail], scale * measured[channel][detail], label=name)
         whole.set_title(label)
-        part.set_title("Detail, " + label[label.index("[") :])
+        part.set_title("Detail " + label[label.index("[") :])
     legend_below(figure, axes[0, 0])
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
@@ -144,9 +144,9 @@ def _figure_measurement(measured: Result) -> Any:
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
     """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
-    from models.drawing.figures import TRUTH, WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, TRUTH, heading, legend_below, subplots
 
-    figure, (heave, pitch) = subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (heave, pitch) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     (name, measured), *runs = results.items()
     pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
@@ -160,9 +160,9 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
 
 
 def _figure_moment(result: Result) -> Any:
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, (inertia, moment) = subplots(1, 2, figsize=(WIDE, 3.2))
+    figure, (inertia, moment) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.2))
     inertia.plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
     inertia.set(title="Inertia term I β'' [kN m]", xlabel="time [s]")
     moment.plot(result.times, result["enforced_moment"], linewidth=0.5)

@@ -266,10 +266,10 @@ def _figure(
     path: Path,
 ) -> None:
     """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
-    from models.drawing.figures import BLUE, DARK, GREEN, GREY, VERMILION, WIDE, heading, save, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, heading, save, subplots
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}
-    figure, axis = subplots(figsize=(WIDE, 4.8))
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.8))
     axis.semilogy(spread["times"], spread["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
     middle = np.median(spread["errors"], axis=0)
     axis.semilogy(spread["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")

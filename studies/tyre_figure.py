@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from models.core.told import Results
-from models.drawing.figures import WIDE, heading, legend_below, save, subplots
+from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
 from models.tyre.tyre_table import TyreTable
 
 SLIPS = np.linspace(0.0, 1.0, 1001)
@@ -19,7 +19,7 @@ def tyre_figure(
 ) -> None:
     """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
     angles, load = at
-    figure, axes = subplots(len(tables), 3, figsize=(WIDE, 2.9 * len(tables) + 0.5), squeeze=False)
+    figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), SLIPS, load)
         top = 1.08 * max(x.max(), y.max())

@@ -57,7 +57,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer(wheelset, linear, paths) | (conicity.answer(conicities) if conicities else {}),
+        "answer": _answer(wheelset, linear, paths) | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
             **_results(paths),
             **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},

@@ -8,7 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from models.core.result import Result
-from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, save, subplots
+from models.drawing.figures import (
+    BLUE,
+    COLOURS,
+    COLUMN_WIDTH,
+    LABELS,
+    SMALL_TEXT,
+    VERMILION,
+    heading,
+    legend_below,
+    save,
+    subplots,
+)
 from models.rail.equations import YAW, Y
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.limit_cycle import Orbit
@@ -19,7 +30,7 @@ from models.systems.wheelset.run import Linear, at_speeds
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""
-SHOWN = 1.0
+SHOWN_SECONDS = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
@@ -38,7 +49,7 @@ def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
-    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), MARKS[engine], **style)
@@ -53,16 +64,26 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         left.axvline(first.critical, color="0.6", linestyle=":")
         _note(left, f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8))
     middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL)
+    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL_TEXT)
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
             place = at.real, at.imag / (2.0 * np.pi)
-            _note(right, f"{first.speeds[i]:g} m/s", place, (-6, 0), va="center", fontsize=SMALL)
+            clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+            _note(
+                right,
+                f"{first.speeds[i]:g} m/s",
+                place,
+                (-8, 0),
+                va="center",
+                fontsize=SMALL_TEXT,
+                bbox=clear,
+                zorder=1,
+            )
     left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
     right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting")
-    right.margins(x=0.5)
+    right.margins(x=0.6)
     middle.margins(y=0.2)
     legend_below(figure, left)
     heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
@@ -76,7 +97,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     }
     name, first = next(iter(paths.items()))
     rows = (2, 1) if len(paths) > 1 else (2,)
-    size = WIDE, 1.1 + 1.3 * sum(rows)
+    size = COLUMN_WIDTH, 1.1 + 1.3 * sum(rows)
     figure, axes = subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
     for column, (speed, path_then) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
@@ -99,9 +120,9 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
     """Creep forces on each wheel and their power in the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
-    figure, axes = subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
+    figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
-        last = course.times >= course.times[-1] - SHOWN
+        last = course.times >= course.times[-1] - SHOWN_SECONDS
         for side, colour, sums in _wheels(course.contacts[last], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
                 axis.plot(course.times[last], values, color=colour, label=side)
@@ -119,7 +140,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
     orbits: Sequence[Orbit] = branch.detail
-    figure, (left, middle, right) = subplots(1, 3, figsize=(WIDE, 3.8))
+    figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
     )
@@ -137,7 +158,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL)
+    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL_TEXT)
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
     left.set_title("Amplitude")
@@ -150,7 +171,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
@@ -167,23 +188,23 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
-    heading(figure, title, results)
+    heading(figure, f"{title}: one cycle, the same in every implementation", results)
     save(figure, path)
 
 
 def conicity_figure(run: Result, title: str, path: Path) -> None:
     """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
     conicities: Conicities = run.detail
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.6))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows
-    left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="difference of the rolling radii")
+    left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="right less left")
     for row in rows:
         if np.isfinite(row.centre):
             swing = row.centre + np.array([-row.amplitude, 0.0, row.amplitude])
             heights = 1e3 * np.interp(swing, table.displacements, table.differences)
-            left.plot(1e3 * swing, heights, "|-", color="0.7", linewidth=0.7, zorder=1)
-            left.plot(1e3 * swing[1], heights[1], "o", color=VERMILION, markersize=4)
-    left.set(xlabel="lateral displacement [mm]", ylabel="right less left [mm]", title="Rolling radii, centres of waves")
+            left.plot(1e3 * swing, heights, "|-", color="0.7", linewidth=0.7, zorder=1, label="swing of a wave")
+            left.plot(1e3 * swing[1], heights[1], "o", color=VERMILION, markersize=4, label="its centre")
+    left.set(xlabel="lateral displacement [mm]", ylabel="right less left [mm]", title="Difference of the rolling radii")
     amplitudes = [1e3 * row.amplitude for row in rows]
     right.plot(amplitudes, [row.equivalent for row in rows], "o-", color=BLUE, label="EN 15302")
     right.plot(amplitudes, [row.harmonic for row in rows], "s--", color=VERMILION, label="first harmonic")
@@ -194,5 +215,8 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
         ylim=(0, None),
     )
     right.legend()
+    handles, labels = left.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))  # every wave by one entry
+    left.legend(list(named.values()), list(named))
     heading(figure, title, {"conicity": run})
     save(figure, path)

@@ -12,26 +12,24 @@ import models  # noqa: F401  before any test imports numpy: it sets the threads 
 def figure_rules():
     """Hold every figure that a test saves, or puts into a page, to the rules of figures."""
     from figure_rules import faults
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
 
-    save, vectors = Figure.savefig, FigureCanvasSVG.print_svg
+    def held(canvas_type, method):
+        written = getattr(canvas_type, method)
 
-    def checked(figure, *args, **options):
-        broken = faults(figure)
-        assert not broken, "\n".join(broken)
-        return save(figure, *args, **options)
+        def checked(canvas, *args, **options):
+            with pytest.MonkeyPatch.context() as within:  # the rules draw the figure, which asks for the same once more
+                within.setattr(canvas_type, method, written)
+                broken = faults(canvas.figure)
+            assert not broken, "\n".join(broken)
+            return written(canvas, *args, **options)
 
-    def paged(canvas, *args, **options):
-        with pytest.MonkeyPatch.context() as within:  # the rules draw the figure, which asks for the same once more
-            within.setattr(FigureCanvasSVG, "print_svg", vectors)
-            broken = faults(canvas.figure)
-        assert not broken, "\n".join(broken)
-        return vectors(canvas, *args, **options)
+        return checked
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "savefig", checked)
-        patch.setattr(FigureCanvasSVG, "print_svg", paged)
+        for canvas_type, method in ((FigureCanvasAgg, "print_png"), (FigureCanvasSVG, "print_svg")):
+            patch.setattr(canvas_type, method, held(canvas_type, method))
         yield
 
 

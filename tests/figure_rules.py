@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from models.drawing.figures import LEAST, WIDE
+from models.drawing.figures import COLUMN_WIDTH, SMALLEST_TEXT
 
 TOUCH = 1.5
 """Pixels by which boxes of letters may lie on one another: a box is larger than what stands in it."""
@@ -49,10 +49,14 @@ def _visible(artist) -> bool:
 
 def _sizes(figure: Figure, texts: list[Text]) -> list[str]:
     """Letters that are too small where the figure is shown."""
-    shown = min(1.0, WIDE / figure.get_figwidth())
+    shown = min(1.0, COLUMN_WIDTH / figure.get_figwidth())
     sizes = {shown * text.get_fontsize(): text.get_text() for text in texts}
-    least = min(sizes, default=LEAST)
-    return [f"{sizes[least]!r} is read in {least:.1f} points, below {LEAST:g}"] if least < LEAST - 1e-9 else []
+    least = min(sizes, default=SMALLEST_TEXT)
+    return (
+        [f"{sizes[least]!r} is read in {least:.1f} points, below {SMALLEST_TEXT:g}"]
+        if least < SMALLEST_TEXT - 1e-9
+        else []
+    )
 
 
 def _panels(figure: Figure) -> list[str]:

@@ -10,7 +10,7 @@ import pytest
 
 import models
 from models.core.scene_effects import module_of, names_of
-from models.core.systems import DEFAULT
+from models.core.systems import DEFAULT_SYSTEM
 from models.systems.pitch_plane.scene import assemble
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
@@ -29,7 +29,7 @@ from validation.cases.effect_prices import hand_built
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}
-ROAD = module_of(DEFAULT, "road").EXAMPLE
+ROAD = module_of(DEFAULT_SYSTEM, "road").EXAMPLE
 EFFECT_FILES = "systems/pitch_plane/effects"
 
 
@@ -101,7 +101,7 @@ def test_no_callback_before_during_and_after(folder):
 def test_user_functions_are_counted(folder):
     """Positive control, over Exudyn's own items: two loads per wheel on a road; two offsets of the constraint."""
     assert user_functions(model(scene({"road": ROAD}, 50, folder), "exudyn")) == 4
-    guided = {**added_to("prescribed_pitch"), "prescribed_pitch": module_of(DEFAULT, "prescribed_pitch").EXAMPLE}
+    guided = {**added_to("prescribed_pitch"), "prescribed_pitch": module_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE}
     built = model(scene(guided, 50, folder, guided=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
     built = model(scene(FORCES, 50, folder), "exudyn")
@@ -142,7 +142,7 @@ def test_the_same_numbers_with_the_other_effects_files_removed(kept, bare, force
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy)
     shutil.rmtree(copy / "road")
-    for name in {*names_of(DEFAULT)} - {*kept}:
+    for name in {*names_of(DEFAULT_SYSTEM)} - {*kept}:
         (copy / EFFECT_FILES / f"{name}.py").unlink()
     for name in ("mujoco_callback", "mujoco_layout"):
         (copy / "engines" / f"{name}.py").unlink()

@@ -10,20 +10,28 @@ from models.core.scene_effects import (
     check,
     listing,
     module_of,
-    named,
+    named_effects,
     names_of,
     own_table,
     rebuilt,
     with_effects,
     without,
 )
-from models.core.systems import DEFAULT, SYSTEMS, load
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, load
 from models.systems.braking.effects import TABLE
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
 from studies.command.asked import SCENES, plan_of
 from validation.absence import of_systems
-from validation.absence.of_systems import FILES, added, bare, controlled, counts_and_paths, declared, file_of
+from validation.absence.of_systems import (
+    FILES,
+    added_counts,
+    bare_scene,
+    controlled,
+    counts_and_paths,
+    declared,
+    file_of,
+)
 
 CHEAP = [(system, name) for system in ("contact", "braking") for name in controlled(system)]
 ALL = [(system, name) for system in FILES for name in controlled(system)]
@@ -31,14 +39,14 @@ ALL = [(system, name) for system in FILES for name in controlled(system)]
 
 @pytest.mark.parametrize(("system", "effect"), CHEAP)
 def test_an_effect_adds_what_its_file_says(system, effect):
-    found = added(system, effect, quick=True)
+    found = added_counts(system, effect, quick=True)
     assert found and found == declared(system, effect, found)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize(("system", "effect"), ALL)
 def test_an_effect_adds_what_its_file_says_in_every_engine(system, effect):
-    found = added(system, effect)
+    found = added_counts(system, effect)
     assert found and found == declared(system, effect, found)
 
 
@@ -49,13 +57,13 @@ def test_no_file_of_an_effect_is_needed_where_it_is_not_named():
 
 def test_a_bare_scene_names_nothing():
     for system in ("contact", "braking", "handling"):
-        assert named(bare(system)) == () and absent_effects(bare(system)) == names_of(system)
+        assert named_effects(bare_scene(system)) == () and absent_effects(bare_scene(system)) == names_of(system)
 
 
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
     """Positive control of the comparison: a file that declares too little is found out."""
     monkeypatch.setitem(TABLE, "load_transfer", replace(TABLE["load_transfer"], counts={}))
-    found = added("braking", "load_transfer", quick=True)
+    found = added_counts("braking", "load_transfer", quick=True)
     assert found == {"reference": {"moving loads": 4}} != declared("braking", "load_transfer", found)
 
 
@@ -63,20 +71,24 @@ def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
 def test_a_scene_is_the_same_from_its_own_table_and_can_do_without_what_it_names(name):
     scene = load(SCENES / f"{name}.toml")
     assert rebuilt(own_table(scene), scene) == scene
-    for effect in named(scene):
+    for effect in named_effects(scene):
         try:
-            assert effect not in named(without(scene, effect))
+            assert effect not in named_effects(without(scene, effect))
         except InputError as error:  # what cannot be left out says why and what to do
             assert error.file == scene.file and ":" in error.allowed
 
 
 def test_what_needs_another_leaves_before_it():
-    full = with_effects(bare("braking"), "pressure_dynamics", "valve_delay", "port", "teeth")
-    assert named(without(full, "pressure_dynamics", "valve_delay", "teeth", "port")) == ()
+    full = with_effects(bare_scene("braking"), "pressure_dynamics", "valve_delay", "port", "teeth")
+    assert named_effects(without(full, "pressure_dynamics", "valve_delay", "teeth", "port")) == ()
 
 
 def test_effects_that_cannot_be_together_are_told_with_the_remedy():
-    on_springs = {**file_of("braking").BARE, "vehicle": {"file": "r19_free", "spin_inertia": 1.7}, "load_transfer": {}}
+    on_springs = {
+        **file_of("braking").BARE_SCENE,
+        "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
+        "load_transfer": {},
+    }
     with pytest.raises(
         InputError,
         match=r"load_transfer: cannot stand beside 'suspension', whose springs carry the "
@@ -84,9 +96,9 @@ def test_effects_that_cannot_be_together_are_told_with_the_remedy():
     ):
         build(on_springs, "s.toml")
     with pytest.raises(InputError, match="falling_friction: needs the effect 'saturation': name it too"):
-        without(with_effects(bare("contact"), "saturation", "falling_friction"), "saturation")
+        without(with_effects(bare_scene("contact"), "saturation", "falling_friction"), "saturation")
     with pytest.raises(InputError, match=r"effects.trailer: has another place in a scene: trailer"):
-        build({**file_of("braking").BARE, "effects": {"trailer": {}}}, "s.toml")
+        build({**file_of("braking").BARE_SCENE, "effects": {"trailer": {}}}, "s.toml")
 
 
 def test_a_remedy_that_would_break_another_law_says_so():
@@ -104,7 +116,7 @@ def test_what_cannot_be_put_in_is_refused():
     with pytest.raises(InputError, match="'delay' cannot be in this scene"):
         with_effects(load(SCENES / "ride_nonlinear.toml"), "delay")
     with pytest.raises(InputError, match="there are no usual values"):
-        with_effects(bare("braking"), "measured_pressures")
+        with_effects(bare_scene("braking"), "measured_pressures")
 
 
 @pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if own.effects])
@@ -115,7 +127,9 @@ def test_every_effect_of_every_system_can_be_listed_and_judged(system):
         assert {*module.NEEDS, *module.EXCLUDES} <= {*names_of(system)} - {name} and module.COST
         assert {*module.COUNTS} <= {"all", *SYSTEMS[system].engines}
         assert hasattr(module, "extend") != hasattr(module, "leave_out")
-        assert system == DEFAULT or not module.COUNTS or name in controlled(system), "nobody checks what it declares"
+        assert system == DEFAULT_SYSTEM or not module.COUNTS or name in controlled(system), (
+            "nobody checks what it declares"
+        )
 
 
 def test_a_plan_lists_effects_and_what_is_absent():
@@ -126,7 +140,7 @@ def test_a_plan_lists_effects_and_what_is_absent():
 
 
 def test_a_path_is_the_same_whatever_ran_before():
-    scene = bare("contact")
+    scene = bare_scene("contact")
     before = counts_and_paths("contact", scene)
     counts_and_paths("contact", with_effects(scene, "saturation", "falling_friction"))
     assert counts_and_paths("contact", scene) == before

@@ -38,12 +38,14 @@ def still(pitch, places=((1.0, 0.0, 0.2),)):
     return readings(np.array(places), np.array([pitch]), none, none, none, 9.81)[0]
 
 
+@pytest.mark.grounds("closed form")
 def test_at_rest_they_read_gravity():
     assert still(0.0)[0] == pytest.approx([0.0, 0.0, -9.81])
     # nose up: the reaction to gravity points up, so forward along the chassis
     assert still(0.1)[0] == pytest.approx([9.81 * np.sin(0.1), 0.0, -9.81 * np.cos(0.1)])
 
 
+@pytest.mark.grounds("closed form")
 def test_a_pitch_acceleration_lifts_the_front_and_a_rate_pulls_inwards():
     one, none = np.ones(1), np.zeros(1)
     places = np.array([[2.0, 0.0, -0.5]])
@@ -160,7 +162,7 @@ def outcome(name, folder):
 
 def test_without_the_check_of_the_arrangement_a_plane_is_silent(monkeypatch, tmp_path):
     monkeypatch.setattr(sensor_array, "PLANE", 0.0)
-    monkeypatch.setattr(sensor_array, "FLAT", 0.0)
+    monkeypatch.setattr(sensor_array, "FLAT_SPREAD_RATIO", 0.0)
     assert outcome("accelerometers nearly in a plane", tmp_path) == "SILENT"
 
 

@@ -98,6 +98,13 @@ def test_what_does_not_fit_is_told(run, tmp_path):
     assert "is the unit of another quantity: the channel is in N" in told(f"time [s],f1 [m]\n{rows}\n")
 
 
+def test_what_does_not_move_has_no_relative_error(run, tmp_path):
+    rows = "\n".join(f"{0.1 * i},4000" for i in range(20))
+    (tmp_path / "m.csv").write_text(f"time [s],f1 [N]\n{rows}\n")
+    (line,) = [line for line in overlay(run, tmp_path / "m.csv").lines() if line.startswith("  f1")]
+    assert "inf" not in line and line.split()[3] == "-"
+
+
 def test_command_and_library_say_the_same(run, tmp_path, twinrig, capsys):
     folder = tmp_path / "run"
     folder.mkdir()

@@ -11,15 +11,30 @@ from numba import njit
 
 import validation.blind_spots.compiled_spoiling  # noqa: F401  makes numba know what is spoiled
 from docs import not_covered
-from models.core.errors import InputError
+from models.core.errors import InputError, RunFailed
+from models.core.systems import DEFAULT, SYSTEMS
 from models.machine.records import record
 from studies.command_line import validate
-from validation.blind_spots import memory
-from validation.blind_spots.audit import FUNCTIONS, TRACE, Asked, Probes, Traced, audit_of, environment, prepare
+from validation.blind_spots import memory, probe
+from validation.blind_spots.audit import (
+    FUNCTIONS,
+    TRACE,
+    Asked,
+    Job,
+    Probes,
+    Traced,
+    audit_of,
+    environment,
+    jobs,
+    lines_of,
+    prepare,
+)
+from validation.blind_spots.probe import Told
 from validation.blind_spots.rewriting import ROOT, NoSuchFunction, function_of, rewritten, root_of, roots, text
 from validation.blind_spots.shared import candidates, compiled_functions, definitions, shared_functions, shared_modules
+from validation.blind_spots.sides import prepared, runs, sides
 from validation.blind_spots.spoiling import scaled, spoiled
-from validation.blind_spots.table import WHY_HARMLESS, Line, harmless, merged, read, uncovered, write
+from validation.blind_spots.table import WHY_HARMLESS, Line, harmless, kind_of, merged, read, uncovered, write
 from validation.report.blind_spots import blind_spots
 
 PLACE = 3
@@ -155,6 +170,47 @@ def test_shared_by_rule_are_the_laws_and_not_what_only_one_engine_has():
     assert "models.tyre.bristles:tyre_forces" in compiled and len(compiled) > 200
     python = "models.tyre.bristles:shape_factor"
     assert python not in compiled and python in shared_functions([python, "models.core.errors:InputError"])
+    assert python not in shared_functions([])
+
+
+def test_a_function_of_python_is_shared_where_several_engines_call_it_in_one_scene():
+    traced = [
+        {"run": ["a.toml", "exudyn"], "numbers": {"models.a:both", "models.a:first", "models.a:apart"}},
+        {"run": ["a.toml", "mujoco"], "numbers": {"models.a:both"}},
+        {"run": ["b.toml", "mujoco"], "numbers": {"models.a:apart", "models.a:both"}},
+        {"run": ["b.toml", "reference"], "numbers": {"models.a:both"}},
+    ]
+    traced += [
+        {"run": ["a.toml", engine], "numbers": {"models.a.assumptions:judge"}} for engine in ("mujoco", "exudyn")
+    ]
+    engines = sides(traced)
+    assert engines == {"models.a:both": ("exudyn", "mujoco", "reference")}
+    assert kind_of("models.a:both", engines) == "Python exudyn mujoco reference"
+    assert kind_of("models.tyre.bristles:tyre_forces", engines) == "compiled"
+
+
+def test_sides_are_runs_of_scenes_of_every_system_that_has_several_engines():
+    systems = {getattr(prepared(scene), "system", DEFAULT) for scene, _ in runs()}
+    assert systems == {name for name, system in SYSTEMS.items() if len(system.engines) > 1}
+    traces = [job.trace for job in (*jobs(False), *(Job([], [], [run]) for run in runs()))]
+    assert len({*traces}) == len(traces), "a trace of its own for each"
+
+
+def test_a_side_has_what_runs_after_its_scene_is_read_and_nothing_of_a_run_that_fails(tmp_path, monkeypatch):
+    def mark(place, value):
+        memory.NUMBERS[place] = 1.0
+        if value == "none":
+            raise RunFailed("none", "stopped", 0.0)
+        return value
+
+    told = Told({"out": tmp_path / "told.jsonl", "sound": [], "budgets": [9.0, 9.0]})
+    monkeypatch.setattr(probe, "prepared", lambda scene: mark(1, scene))
+    monkeypatch.setattr("models.systems.run", lambda scene, engine: mark(2, engine))
+    for engine in ("exudyn", "none"):
+        probe.run_scene("a.toml", engine, told)
+    (line,) = lines_of(tmp_path / "told.jsonl")
+    assert (line["run"], line["numbers"]) == (["a.toml", "exudyn"], [2])
+    memory.forget()
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +248,7 @@ def line_of(probes, name, **case):
     """What is told of a function that one case runs, which has independent rows."""
     rows = [{"id": "contact_hertz.p0", "status": "passed", "independence": "closed form"}]
     item = {"case": "contact_hertz", "rows": rows, "seconds": 1.0, "ran": {name}, "numbers": {name}}
-    return Asked(probes, Traced(candidates(), {"contact_hertz": item | case}), judges=True).line_of(name)
+    return Asked(probes, Traced(candidates(), {"contact_hertz": item | case}), True, {}).line_of(name)
 
 
 def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
@@ -288,7 +344,10 @@ def test_a_function_that_hands_on_views_has_no_number_of_its_own(name):
 
 def test_lines_of_some_functions_take_the_place_of_the_kept_ones_and_lines_of_none_go():
     kept, new = [line("models.a:f"), line("models.a:g"), line("models.a:gone")], line("models.a:g", rows="x.y")
-    assert merged(kept, [new], ["models.a:f", "models.a:g", "models.a:h"]) == [kept[0], new]
+    functions = ["models.a:f", "models.a:g", "models.a:h"]
+    assert merged(kept, [new], functions) == [kept[0], new]
+    unknown = [line(name, ended="not audited") for name in ("models.a:h", "models.a:f")]
+    assert merged(kept, unknown, functions) == [kept[0], kept[1], unknown[0]]
 
 
 def test_an_audit_of_functions_that_there_are_none_of_is_refused(tmp_path):

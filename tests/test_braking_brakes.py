@@ -5,7 +5,7 @@ import pytest
 
 from models.brake.brake import Brake, of_wheels, torque
 from models.brake.controller import APPLY, HOLD, RELEASE, SAMPLE
-from models.brake.pressure import Air, Chambers, by_pressures, by_valves, still
+from models.brake.pressure import Air, Chambers, by_pressures, by_valves, resting_chambers
 from models.core.errors import InputError
 
 BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
@@ -67,7 +67,7 @@ def chambers(**more):
 
 def test_valves_are_exact_whatever_the_steps():
     for steps in (1, 7):
-        own, air = chambers(), still(chambers(), SAMPLE)
+        own, air = chambers(), resting_chambers(chambers(), SAMPLE)
         torques = np.zeros((steps + 1, 1))
         for valve in (APPLY, APPLY, HOLD, RELEASE):
             by_valves(np.array([valve]), SAMPLE, air, own, BRAKES, torques)
@@ -78,7 +78,7 @@ def test_valves_are_exact_whatever_the_steps():
 def test_delay_between_samples_turns_pressure_within_a_step():
     """Delay of 1.4 samples: the torque goes through the top of the pressure, not from end to end."""
     own = chambers(delay=1.4 * SAMPLE)
-    air, torques = still(own, SAMPLE), np.zeros((2, 1))
+    air, torques = resting_chambers(own, SAMPLE), np.zeros((2, 1))
     air.pressure[0] = 3.0
     air.torque[0] = torque(0, 3.0, 0.0, BRAKES)
     air.commands[:] = APPLY
@@ -93,7 +93,7 @@ def test_delay_between_samples_turns_pressure_within_a_step():
 def test_strokes_from_a_reservoir():
     """A supply cut off: every full stroke leaves V / (V + v) of its pressure; all that is taken is in the chambers."""
     own = chambers(volumes=np.array([1.2]), reservoir=30.0)
-    air, torques = still(own, SAMPLE), np.zeros((5, 1))
+    air, torques = resting_chambers(own, SAMPLE), np.zeros((5, 1))
     for stroke in range(1, 5):
         for _ in range(600):
             by_valves(np.array([APPLY]), SAMPLE, air, own, BRAKES, torques)
@@ -105,7 +105,7 @@ def test_strokes_from_a_reservoir():
 
 def test_reservoir_asks_for_volumes():
     with pytest.raises(InputError, match="volumes"):
-        still(chambers(reservoir=30.0), SAMPLE)
+        resting_chambers(chambers(reservoir=30.0), SAMPLE)
 
 
 def test_commanded_pressures_are_there_at_once():

@@ -7,7 +7,7 @@ from models.brake.brake import Brake
 from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.acceleration_phases import AccelerationPhases
-from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
 from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
 from models.brake.controllers.per_wheel import SpeedEstimate
 from models.brake.controllers.slip import SlipBangBang, SlipPI
@@ -132,11 +132,12 @@ def frozen(**changes):
 
 
 def exact(wheel, controller=PHASES):
-    phases = [(1500.0 * rate(k, controller), *end_of(k, controller)) for k in range(6)]
+    phases = [(1500.0 * rate(k, controller), *end_of_phase(k, controller)) for k in range(6)]
     forces = wheel.load * wheel.tyre.mu_x[0, 0]
     return cycle(Wheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12)
 
 
+@pytest.mark.grounds("closed form")
 def test_limit_cycle_is_that_of_the_closed_form():
     own = limit_cycle(frozen(), PHASES, 1e-4)
     period, utilisation = exact(frozen())

@@ -6,7 +6,7 @@ import pytest
 from models.brake.controller import SLOW, Command, Sample
 from models.brake.plane_step import share_out
 from models.brake.plane_vehicle import PAPER, truck
-from models.brake.port.ask import WITH_SLOW, ControllerFailed, checked
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, checked_answer
 from models.brake.quarter import Quarter
 from models.brake.trailer import CHOSEN, train
 from models.core.errors import InputError, RunFailed
@@ -72,8 +72,8 @@ def test_rows_of_limits_hold():
 
 def test_valves_apply_slowly_only_where_the_scene_has_them():
     with pytest.raises(ControllerFailed, match=r"2 is none of -1, 0, 1$|2 is none of -1, 0, 1 "):
-        checked(Command(valves=np.full(4, SLOW)), GIVEN)
-    assert (checked(Command(valves=np.full(4, SLOW)), GIVEN, WITH_SLOW).valves == SLOW).all()
+        checked_answer(Command(valves=np.full(4, SLOW)), GIVEN)
+    assert (checked_answer(Command(valves=np.full(4, SLOW)), GIVEN, STATES_WITH_SLOW_APPLY).valves == SLOW).all()
     phases = {"kind": "acceleration_phases", "parameters": {"slow": True}}
     with pytest.raises(InputError, match=r"controller.parameters.slow.*pressure.slow"):
         run(scene(controller=phases))
@@ -95,9 +95,9 @@ def test_valves_apply_slowly_only_where_the_scene_has_them():
 
 def test_what_cannot_be_is_refused_with_its_value():
     with pytest.raises(ControllerFailed, match="too high: a pressure of 299 bar, above the 6 bar"):
-        checked(Command(pressures=np.full(4, 299.0)), GIVEN, most=6.0)
+        checked_answer(Command(pressures=np.full(4, 299.0)), GIVEN, most=6.0)
     with pytest.raises(ControllerFailed, match="wrong frame: complex"):
-        checked(Command(pressures=np.full(4, 1j)), GIVEN)
+        checked_answer(Command(pressures=np.full(4, 1j)), GIVEN)
     with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):
         ready(scene(vehicle={"override": {"mass": 0.1}}), "stop")
     with pytest.raises(InputError, match=r"mass = 200.0: must be above"):

@@ -16,7 +16,7 @@ from validation.braking.braked_truck import (
     transfer_errors,
     truck_on,
 )
-from validation.braking.truck_equations import turned
+from validation.braking.truck_equations import braked_turn
 
 LOCKING, ROLLING = np.full(4, 1e5), np.array([900.0, 900.0, 600.0, 600.0])
 
@@ -94,7 +94,7 @@ def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
 
 @pytest.mark.full
 def test_the_truck_written_out_turns_as_the_compiled_one():
-    where = turned(PAPER, ICE, 0.03, (900.0, 600.0), 11.11, 6.0)
+    where = braked_turn(PAPER, ICE, 0.03, (900.0, 600.0), 11.11, 6.0)
     state = Moving(truck_on(), 11.11, steer=0.03).braked(ROLLING, 1e-3, duration=where.time).state
     assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
 

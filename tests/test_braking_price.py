@@ -9,7 +9,7 @@ from models.systems.braking.march import Braked
 from models.tyre.tyre_table import stacked
 from validation.braking.quarter_stops import FRONT
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, BrakingStop, Played
+from validation.price.problems.braking_stop import EULER, FULL_STEPS, LITERAL, OURS, QUICK, RK4, BrakingStop, Played
 
 
 @pytest.fixture(scope="module")
@@ -57,4 +57,4 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):
     assert short.setting("reference", OURS, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
-    assert all(set(QUICK[method]) <= set(FULL[method]) for method in FULL)
+    assert all(set(QUICK[method]) <= set(FULL_STEPS[method]) for method in FULL_STEPS)

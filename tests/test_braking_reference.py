@@ -29,7 +29,7 @@ from validation.cases import braking_reference as case
 @pytest.mark.grounds("plain counterpart")
 def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
     both, bound, _ = case.LAWS[name]
-    assert laws.largest(*both(60, seed=5)) < bound
+    assert laws.largest_difference(*both(60, seed=5)) < bound
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e-3, 9.999e-3, 1.0001e-2, 0.3, 3.0])
@@ -80,7 +80,7 @@ def test_loads_at_rest_are_those_of_levers():
 @pytest.mark.parametrize(("name", "engine"), [("twin", "mujoco"), ("bent", "mujoco"), ("twin", "exudyn")])
 def test_accelerations_are_those_of_the_engine(name, engine):
     compiled = whole.accelerations(whole.VEHICLES[name](), engine, 5)
-    assert whole.apart(compiled, whole.plain_accelerations(name, 5)) < 1e-12
+    assert whole.relative_difference(compiled, whole.plain_accelerations(name, 5)) < 1e-12
 
 
 def test_a_piece_of_a_stop_is_that_of_the_engine():

@@ -8,7 +8,7 @@ from models.brake.relaxation import by_lagging_steps
 from models.brake.samples import by_steps
 from models.core.errors import InputError
 from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.quarter_stops import LITERAL, exact, stopped
+from validation.braking.quarter_stops import LITERAL, exact_distance, stopped
 from validation.cases import braking_stop as case
 
 
@@ -19,16 +19,22 @@ def test_all_rows_pass(tmp_path):
 
 
 def test_the_literal_scheme_would_fail():
-    tyre, _ = case.met("dry")
-    torque = case.steady(case.FRONT, tyre, 0.06)[1]
-    error = stopped(LITERAL, case.FRONT, tyre, torque, 22.22, case.STEP)[0] / exact(case.FRONT, tyre, torque, 22.22) - 1
+    tyre, _ = case.friction_table("dry")
+    torque = case.steady_torque(case.FRONT, tyre, 0.06)[1]
+    error = (
+        stopped(LITERAL, case.FRONT, tyre, torque, 22.22, case.STEP)[0]
+        / exact_distance(case.FRONT, tyre, torque, 22.22)
+        - 1
+    )
     assert 0.05 < error < 0.08  # 6.4 %: force of the start of the step on the vehicle
 
 
 def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
-    tyre, _ = case.met("ice")
+    tyre, _ = case.friction_table("ice")
     slide = 11.11**2 / (2.0 * case.GRAVITY * float(tyre.mu_x[0, 0, -1]))
-    assert exact(case.FRONT, tyre, 1e7, 11.11) == pytest.approx(slide, rel=1e-4)  # it locks within a millisecond
+    assert exact_distance(case.FRONT, tyre, 1e7, 11.11) == pytest.approx(
+        slide, rel=1e-4
+    )  # it locks within a millisecond
 
 
 @pytest.mark.parametrize(
@@ -56,7 +62,9 @@ def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
 
 def test_a_torque_that_drives_is_refused():
     with pytest.raises(InputError, match="brake opposes"):
-        case.braked(case.FRONT, case.met("ice")[1], case.EVEN, np.array([0.0, -1.0]), case.STEP, 10.0)
+        case.braked(
+            case.FRONT, case.friction_table("ice")[1], case.UNIFORM_ROAD, np.array([0.0, -1.0]), case.STEP, 10.0
+        )
 
 
 def test_compiled_samples_are_kept_on_disk_for_other_processes():
@@ -71,5 +79,5 @@ def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one()
     quarter, tables = Quarter(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked([rising])
     locking = 0.9 * quarter.mass * case.GRAVITY * quarter.radius
     for step in (1e-3, 1.3e-2):
-        stop = case.braked(quarter, tables, case.EVEN, np.full(int(2.2 / step), locking), step, 17.3)
+        stop = case.braked(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)
         assert stop.rest > 0 and stop.distance == pytest.approx(17.3**2 / (2.0 * 0.9 * case.GRAVITY), rel=1e-3)

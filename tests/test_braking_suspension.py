@@ -17,9 +17,9 @@ from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady
+from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady_torques
 
-TORQUES = steady(600.0, 600.0, 200.0, 200.0)
+TORQUES = steady_torques(600.0, 600.0, 200.0, 200.0)
 
 
 def scene(**tables):
@@ -41,7 +41,7 @@ def scene(**tables):
 def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
     mu, speed = 0.05, 1.5
     vehicle = braked(box(), constant(mu))
-    path = vehicle.run(steady(*4 * (LOCKS,)), speed)
+    path = vehicle.run(steady_torques(*4 * (LOCKS,)), speed)
     pitch, transfer = pitch_and_transfer(mu * GRAVITY)
     late = -len(path.times) // 8
     assert path.states[late, 0, PITCH] == pytest.approx(pitch, rel=2e-3)  # to first order in 1.6 mrad
@@ -54,7 +54,7 @@ def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
 
 def test_static_loads_are_those_of_levers():
     for own in (box(), car()):
-        path = braked(own, constant(0.1)).run(steady(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
+        path = braked(own, constant(0.1)).run(steady_torques(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
         assert path.reports.load[-1] == pytest.approx(truck(own.plane).static, rel=1e-9)  # no drag, no brakes
 
 
@@ -82,7 +82,7 @@ def test_a_run_repeats_to_the_last_bit():
 def test_a_car_that_turns_over_is_told():
     grip = surface("dry").scaled(2.0)
     with pytest.raises(RunFailed, match="turns over") as told:
-        braked(car(), grip, steer=0.3).run(steady(0.0, 0.0, 0.0, 0.0), 25.0, 5.0)
+        braked(car(), grip, steer=0.3).run(steady_torques(0.0, 0.0, 0.0, 0.0), 25.0, 5.0)
     assert len(told.value.partial.times) > 10
 
 
@@ -95,7 +95,7 @@ def test_a_step_that_stiff_springs_cannot_take_is_refused_before_the_run():
 def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_body():
     own = scene()
     vehicle, start = ready(own, "turn")
-    path = vehicle.run(steady(0.0, 0.0, 0.0, 0.0), start, 0.1)
+    path = vehicle.run(steady_torques(0.0, 0.0, 0.0, 0.0), start, 0.1)
     assert np.abs(path.states[-1, 0, 3:] - start.state[0, 3:]).max() < 1e-5  # springs are settled; drag slows it down
     assert start.state[0, ROLL] > 5e-3
     stop = Stop(drive(own, procedure="straight").detail)

@@ -9,7 +9,7 @@ import pytest
 from models.brake.plane_vehicle import truck
 from models.brake.sprung import sprung
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named, without
+from models.core.scene_effects import named_effects, without
 from models.engines.braking_sprung import driven
 from models.engines.free_vehicle import built_share
 from models.multibody.forces import PARTS
@@ -25,7 +25,7 @@ from models.vehicles.spatial import hitch_of
 from models.vehicles.vehicle_file import SHIPPED
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as closed
-from validation.braking.sprung_box import braked, car, stays, steady
+from validation.braking.sprung_box import braked, car, stays, steady_torques
 from validation.spatial.towing import keep_to_the_car, levers
 from validation.spatial.trains import caravan, train
 
@@ -62,7 +62,7 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
 def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hold_on_to_the_car_are_seen():
     errors = closed.errors()
     assert max(abs(error) for error in (errors.deceleration, errors.load, errors.pull)) < 1e-3
-    wrong = closed.beside(closed.pulled(closed.hold_on_to_the_car, 2.5), closed.pulled_by_levers())
+    wrong = closed.relative_difference(closed.pulled(closed.hold_on_to_the_car, 2.5), closed.pulled_by_levers())
     assert abs(wrong.load) > 5e-3
 
 
@@ -71,10 +71,10 @@ def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hol
 def test_accelerations_are_those_of_plain_code_and_wheels_that_keep_to_the_car_are_seen(name):
     plain = whole.plain_accelerations(name, 5)
     for engine in ("mujoco", "exudyn"):
-        assert whole.apart(whole.accelerations(whole.TRAINS[name](), engine, 5), plain) < 1e-12
+        assert whole.relative_difference(whole.accelerations(whole.TRAINS[name](), engine, 5), plain) < 1e-12
     wrong = whole.TRAINS[name].__wrapped__()
     keep_to_the_car(wrong.handling)
-    assert whole.apart(whole.accelerations(wrong, "exudyn", 5), plain) > 1e-6
+    assert whole.relative_difference(whole.accelerations(wrong, "exudyn", 5), plain) > 1e-6
 
 
 @pytest.mark.parametrize(("name", "lags"), [("train", False), ("caravan", True)])
@@ -100,7 +100,7 @@ def test_a_vehicle_that_tows_nothing_has_the_units_and_wheels_of_before():
 
 
 def test_mirrored_steering_gives_a_mirrored_stop_of_a_controlled_train_that_stays():
-    torques, wet = steady(500.0, 500.0, 200.0, 200.0, 300.0, 300.0), surface("wet")
+    torques, wet = steady_torques(500.0, 500.0, 200.0, 200.0, 300.0, 300.0), surface("wet")
     left, right = (braked(whole.towing(), wet, steer=steer).run(torques, 4.0) for steer in (0.1, -0.1))
     names = list(left.coordinates)
     same = [names.index(name) for name in ("carrier x", "sway z", "sway ry", "caravan hitch ry")]
@@ -117,12 +117,12 @@ def test_a_train_whose_car_alone_brakes_jackknifes_and_says_so():
     start = vehicle.rolling(15.0)
     start.state[0, whole.towing().turns] = 0.3
     with pytest.raises(RunFailed, match=r"jackknifes: a hitch yaws by more than 1\.57 rad"):
-        vehicle.run(steady(3e3, 3e3, 3e3, 3e3, 0.0, 0.0), Start(*start), 20.0)
+        vehicle.run(steady_torques(3e3, 3e3, 3e3, 3e3, 0.0, 0.0), Start(*start), 20.0)
 
 
 def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
     towing = scene(controller={"kind": "slip_bang_bang"}, run={"duration": 0.2})
-    assert {"towed", "suspension"} <= set(named(towing)) and plane_of(towing).wheels == 6
+    assert {"towed", "suspension"} <= set(named_effects(towing)) and plane_of(towing).wheels == 6
     result = drive(towing, procedure="straight")
     assert result.data["wheel"].values.tolist() == list(wheel_names(6))
     assert (result["torque"][-1, 4:] > 0.0).all()
@@ -136,14 +136,18 @@ def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
 
 def test_a_steady_circle_tows_the_caravan_inwards():
     vehicle, start = ready(scene(), "turn")
-    path = vehicle.run(steady(*6 * (0.0,)), start, 0.1)
+    path = vehicle.run(steady_torques(*6 * (0.0,)), start, 0.1)
     yaw = vehicle.sprung.turns[0]
     assert start.state[0, yaw] < -0.05 and abs(path.states[-1, 0, yaw] - start.state[0, yaw]) < 1e-5
 
 
 def test_what_is_left_out_is_the_trailer_alone():
     alone = without(scene(), "towed")
-    assert alone.vehicle.file == "r19_free" and "towed" not in named(alone) and "suspension" in named(alone)
+    assert (
+        alone.vehicle.file == "r19_free"
+        and "towed" not in named_effects(alone)
+        and "suspension" in named_effects(alone)
+    )
 
 
 def test_a_train_that_cannot_brake_is_told(tmp_path):

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from models.core.errors import InputError
-from validation.common.changes import KINDS, against, changes, lines, read
+from validation.common.changes import KINDS, against, changes, lines, read_results
 from validation.common.rows import Observed, behaves
 from validation.report.page import write
 
@@ -67,7 +67,9 @@ def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
     )
     rows = [*changed(VALUE, value=2.25).values()]
     found = against(
-        read(tmp_path / "old.json"), rows, {"quick": False, "versions": {"numpy": "2", "scipy": "1"}, "python": "3.12"}
+        read_results(tmp_path / "old.json"),
+        rows,
+        {"quick": False, "versions": {"numpy": "2", "scipy": "1"}, "python": "3.12"},
     )
     assert found["note"] == (
         "the earlier report is the quick one and this the full one; version of numpy 1 -> 2; python 3.11 -> 3.12"
@@ -82,8 +84,9 @@ def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
 def test_what_is_no_report_is_refused(tmp_path, content):
     if content is not None:
         (tmp_path / "results.json").write_text(content)
-    with pytest.raises(InputError, match="--against"):
-        read(tmp_path)
+    with pytest.raises(InputError, match="--against") as told:
+        read_results(tmp_path)
+    assert "Error" not in str(told.value)
 
 
 @pytest.mark.parametrize(
@@ -95,4 +98,4 @@ def test_a_doctored_report_is_refused_before_anything_runs(tmp_path, rows, prove
     content = {"rows": [row.as_dict() for row in rows], "provenance": provenance}
     (tmp_path / "results.json").write_text(json.dumps(content))
     with pytest.raises(InputError, match="--against"):
-        read(tmp_path)
+        read_results(tmp_path)

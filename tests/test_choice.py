@@ -16,7 +16,7 @@ from models.advice.price.effects import price_list
 from models.advice.price.effects_text import as_dict, lines
 from models.core.errors import InputError
 from studies import choice as study
-from studies.command.asked import KNOWN, checked_study
+from studies.command.asked import KNOWN_SYSTEMS, checked_study
 from validation.choice.drawn_scenes import draw_scene
 
 ROAD = {"source": "study", "speed": 20.0}
@@ -259,7 +259,7 @@ def test_unknown_quantities_and_systems_without_runs_are_refused():
         Chooser(scene, "reference", scene.quantities, scene.tolerance)
     with pytest.raises(InputError, match="pictures"):
         Variants(type("Other", (), {"system": "pictures", "file": "t"}), "reference")
-    assert "pictures" in KNOWN
+    assert "pictures" in KNOWN_SYSTEMS
 
 
 def test_prices_name_costs_and_changes_and_why_there_is_none():

@@ -123,6 +123,8 @@ def test_what_is_no_pair_of_results_is_refused(run, tmp_path, twinrig, capsys):
     for other, said in (("b.nc", "not a saved result"), ("empty", "is a folder"), ("c.nc", "no such file")):
         assert twinrig("compare", "a.nc", other) == 2
         assert said in capsys.readouterr().err
+    assert twinrig("compare", "empty", "empty") == 2
+    assert "empty: holds no results (.nc or .csv): name the folder of a run" in capsys.readouterr().err
     assert not (tmp_path / "results").exists()
     assert twinrig("compare", "a.nc", "a.nc", "--out", "out") == 0
     assert "the same to the last bit" in capsys.readouterr().out

@@ -42,7 +42,7 @@ def test_every_kernel_is_compiled_that_way():
     own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
     assert own == {"compiled.py"}
     nested = [name for name, text in sources.items() if re.search(r"^ +@(register_jitable|njit)", text, re.MULTILINE)]
-    assert not nested, "closures take a name of their own by models.machine.compiled.named"
+    assert not nested, "closures take a name of their own by models.machine.compiled.named_closure"
 
 
 FACTORY = """

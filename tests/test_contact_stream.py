@@ -1,9 +1,10 @@
 """Tables of contacts are answered as a stream: a longer one takes no more memory."""
 
-import resource
-
+import numpy as np
 import pytest
 
+from models.ensemble.workers import processes
+from validation.common.peak_memory import peak_memory
 from validation.price.contact_stream import answered, in_fresh_process
 
 
@@ -12,7 +13,7 @@ def kept_whole(folder, rows):
     taken = answered(folder, rows)
     lines = (folder / "forces.csv").read_text().splitlines()
     assert len(lines) == rows + 1
-    return taken._replace(memory=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return taken._replace(memory=peak_memory())
 
 
 def test_all_rows_are_answered(tmp_path):
@@ -20,6 +21,13 @@ def test_all_rows_are_answered(tmp_path):
     rows = (tmp_path / "forces.csv").read_text().splitlines()
     assert len(rows) == 2001 and rows[1].endswith(",ok") and rows[1001].split(",")[1:] == rows[1].split(",")[1:]
     assert taken.memory > 1e7 and taken.seconds > 0.0
+
+
+def test_the_memory_of_a_process_does_not_count_that_of_its_parent():
+    """300 MB are held here while the other process starts."""
+    large = np.ones(300_000_000 // 8)
+    with processes(1) as executor:
+        assert executor.submit(peak_memory).result() < large.nbytes < peak_memory()
 
 
 @pytest.mark.full

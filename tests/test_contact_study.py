@@ -18,13 +18,13 @@ from models.core.errors import InputError
 from models.core.tables import NEWTONS, SHARES, blocks, read_table
 from models.ensemble.store import Store
 from models.systems.contact import cases_table
-from models.systems.contact.cases_table import BY_AXES, HEADER, answer
+from models.systems.contact.cases_table import BY_AXES, HEADER, answer_table
 from models.systems.contact.run import Built, contact
 from models.systems.contact.scene import Method, build
 from models.systems.contact.work_precision import TheoryPoint, cheapest, with_exact_forces
 from studies.contact_table import summary_lines
 from validation.cases import contact_price
-from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
+from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read_contacts, read_drawn
 from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
@@ -41,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 def answered(text, name="cases.csv", **method):
     """Counts and rows that a table is answered with."""
     Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    counts = answer(Path(name), Path("out.csv"), partial(Built, Pair()), Method(**method))
+    counts = answer_table(Path(name), Path("out.csv"), partial(Built, Pair()), Method(**method))
     with open("out.csv", newline="") as file:
         return counts, list(csv.DictReader(file))
 
@@ -256,7 +256,7 @@ def test_a_table_that_was_cut_off_says_so():
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
-        answer(Path("cases.csv"), Path("out.csv"), partial(Built, Pair()), Method())
+        answer_table(Path("cases.csv"), Path("out.csv"), partial(Built, Pair()), Method())
     assert words in str(found.value) and not Path("out.csv").exists()
 
 
@@ -307,7 +307,7 @@ def test_the_cheapest_is_the_fastest_that_meets_the_target():
 
 def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
     """Against the second grid, its own error taken out: 1 % of mu N."""
-    cases, unseen = read(), read_drawn(JUDGED)
+    cases, unseen = read_contacts(), read_drawn(JUDGED)
     assert len(cases) == 520 and max(case.error for case in cases) < 0.005
     assert len(unseen) == 300 and max(case.error for case in unseen) < 0.006
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
@@ -341,8 +341,8 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
     path, built = tmp_path / "cases.csv", partial(Built, Pair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))
-    assert answer(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
-    answer(path, shared, built, Method(), executor=Counting())
+    assert answer_table(path, alone, built, Method()) == {"rows": 9, "wrong": 1}
+    answer_table(path, shared, built, Method(), executor=Counting())
     assert shared.read_bytes() == alone.read_bytes()
 
     def stop(rows):
@@ -351,7 +351,7 @@ def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monk
 
     store, again = Store(tmp_path), Counting()
     with pytest.raises(KeyboardInterrupt):
-        answer(path, resumed, built, Method(), stop, store=store)
+        answer_table(path, resumed, built, Method(), stop, store=store)
     assert not resumed.exists() and store.has(1)
-    answer(path, resumed, built, Method(), executor=again, store=store)
+    answer_table(path, resumed, built, Method(), executor=again, store=store)
     assert resumed.read_bytes() == alone.read_bytes() and again.count == 3

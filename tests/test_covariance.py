@@ -11,7 +11,7 @@ from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
 from models.ride.marginal import Unstable, split_marginal
-from models.ride.sweep import ASKED, sweep
+from models.ride.sweep import ASKED_FOR, sweep
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
 from models.road.two_track import CASES, excitation, road_of_level
@@ -273,7 +273,7 @@ def test_the_fast_route_equals_the_direct_one(truck):
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles
     quick = sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
     slow = sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
-    assert quick.direct == {} and slow.direct == {ASKED: 10}
+    assert quick.direct == {} and slow.direct == {ASKED_FOR: 10}
     assert quick.outputs[-1] == "frame centre Wd" and (quick.status == slow.status).all()
     told = slow.variance > 1e-20  # below, an output is zero by symmetry
     np.testing.assert_allclose(quick.variance[told], slow.variance[told], rtol=1e-10)

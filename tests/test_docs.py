@@ -13,9 +13,9 @@ import twinrig
 from docs import scene_keys, validation_cases
 from docs.pages import ROOT, blocks, pages
 from models.core.errors import InputError
-from models.core.systems import DEFAULT, SYSTEMS, of_table
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from models.vehicles.vehicle_file import build_vehicle
-from studies.command.asked import KNOWN, SCENES, engines_of, plan_of
+from studies.command.asked import KNOWN_SYSTEMS, SCENES, engines_of, plan_of
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 each_page = pytest.mark.parametrize("name", PAGES)
@@ -82,7 +82,7 @@ def test_every_scene_key_has_a_meaning():
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SCENES.glob("*.toml")))
 def test_every_key_of_a_scene_that_comes_with_twinrig_is_in_the_reference(scene):
     table = tomllib.loads((SCENES / f"{scene}.toml").read_text())
-    system = table.get("system", DEFAULT)
+    system = table.get("system", DEFAULT_SYSTEM)
     if system in SYSTEMS:
         section = scene_keys.PAGE.read_text().partition(f"\n## {system}\n")[2].partition("\n## ")[0]
         known = set(re.findall(r"^\| `([\w.\[\]-]+)` \|", section, re.MULTILINE))
@@ -107,7 +107,7 @@ def test_every_scene_and_vehicle_of_the_pages_is_valid(name, text, empty_folder)
         build_vehicle(table, name)
     elif "title" in table:
         try:
-            scene = of_table(table, name, empty_folder, KNOWN)
+            scene = of_table(table, name, empty_folder, KNOWN_SYSTEMS)
             plan_of(scene).check(scene, engines_of(None, scene.system)[:1])
         except InputError as refused:
             assert "no such file" in str(refused)

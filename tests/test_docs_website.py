@@ -46,10 +46,7 @@ def test_the_rows_are_those_of_the_newest_report(tmp_path):
 def entries(nav):
     """All paths and patterns of a navigation."""
     for entry in nav:
-        values = (
-            [entry] if isinstance(entry, str) else [value for key, value in entry.items() if key != "ignore_no_matches"]
-        )
-        for value in values:
+        for value in [entry] if isinstance(entry, str) else entry.values():
             yield from [value] if isinstance(value, str) else entries(value)
 
 

@@ -129,7 +129,7 @@ def test_a_dask_cluster_changes_nothing(folder, expected):
     ],
 )
 def test_a_cluster_that_is_not_there_is_named(address, said, monkeypatch):
-    monkeypatch.setattr(workers, "PATIENCE", "0.2s")
+    monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", "0.2s")
     with pytest.raises(InputError, match=said), cluster(address):
         pass
 
@@ -242,7 +242,9 @@ def _full_after(writes):
 def test_two_processes_never_work_in_one_folder(folder, tmp_path):
     with store.locked(tmp_path), pytest.raises(InputError, match="another process is at work"):
         run_paths(job(folder), 2, tmp_path)
-    (tmp_path / whole_files.PART.format("block 000000.npz", ended(), ".npz")).touch()  # of a process that was killed
+    (
+        tmp_path / whole_files.PARTIAL_NAME.format("block 000000.npz", ended(), ".npz")
+    ).touch()  # of a process that was killed
     run_paths(job(folder), 2, tmp_path)
     assert not list(tmp_path.glob("*.part*")) and not list(tmp_path.glob(".*.part*"))
 

@@ -10,8 +10,8 @@ import pytest
 
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import build as hub_model
-from models.engines.export import Subject, of_free
-from models.engines.exudyn_system import mass_and_force, start
+from models.engines.export import Subject, export_free_vehicle
+from models.engines.exudyn_system import mass_and_force, set_start
 from models.engines.free_vehicle_exudyn import FreeExudyn
 from models.engines.free_vehicle_mujoco import compiled_model
 from models.engines.mujoco_inertia import realisable
@@ -98,7 +98,7 @@ def bare_exudyn(mbs):
                 mbs.SetObjectParameter(i, key, 0)
 
     def accelerate(q, v):
-        start(mbs, q, v)
+        set_start(mbs, q, v)
         return np.linalg.solve(*mass_and_force(mbs))
 
     return accelerate
@@ -207,7 +207,7 @@ def test_a_rotor_keeps_its_motion_with_a_tensor_that_mujoco_takes(tmp_path):
     tensor = ((300.0, 0.0, -10.0), (0.0, 1400.0, 0.0), (-10.0, 0.0, 1600.0))
     bodies = tuple(replace(body, inertia=tensor) if body.name == "body" else body for body in driven.vehicle.bodies)
     driven = replace(driven, vehicle=replace(driven.vehicle, bodies=bodies))
-    answer = of_free("mujoco", driven, Subject("", "", ""), [])
+    answer = export_free_vehicle("mujoco", driven, Subject("", "", ""), [])
     assert answer.left_out == ()
     assert error(answer.text, "mujoco", bare_exudyn(FreeExudyn(driven).mbs), driven.size, tmp_path) < 1e-9
 

@@ -7,7 +7,18 @@ import pytest
 from figure_rules import faults
 from matplotlib.figure import Figure
 
-from models.drawing.figures import SMALL, TURNS, WIDE, about_one, heading, legend_below, panels, subplots, wrapped
+from models.drawing.figures import (
+    COLUMN_WIDTH,
+    SMALL_TEXT,
+    TURNS,
+    about_one,
+    heading,
+    legend_below,
+    panels,
+    save,
+    subplots,
+    wrapped,
+)
 
 
 @pytest.fixture
@@ -32,7 +43,7 @@ def small_letters(figure, axes):
 
 
 def large_letters_of_a_wide_figure(figure, axes):
-    figure.set_size_inches(1.5 * WIDE, 5.0)
+    figure.set_size_inches(1.5 * COLUMN_WIDTH, 5.0)
 
 
 def no_curve(figure, axes):
@@ -103,8 +114,10 @@ def _turned(fault: str) -> str:
 def test_figures_that_tests_save_are_held_to_the_rules(usual, tmp_path):
     figure, axes = usual
     small_letters(figure, axes)
-    with pytest.raises(AssertionError, match=r"6\.9 points"):
-        figure.savefig(tmp_path / "small.png")
+    for file in ("small.png", "small.svg"):
+        with pytest.raises(AssertionError, match=r"6\.9 points"):
+            save(figure, tmp_path / file)
+        assert not (tmp_path / file).exists()
 
 
 def test_pages_of_drawings_use_the_palette():
@@ -126,11 +139,13 @@ def test_ratios_near_one_and_far_away_are_both_told():
 
 def test_places_without_a_panel_are_taken_away():
     figure, axes = panels(3, 2, 2.0, sharex=True)
-    assert len(axes) == 3 == len(figure.axes) and figure.get_figwidth() == WIDE
+    assert len(axes) == 3 == len(figure.axes) and figure.get_figwidth() == COLUMN_WIDTH
 
 
 def test_lines_are_broken_where_a_figure_ends():
     figure = Figure(figsize=(4.0, 1.0))
-    text = figure.text(0.0, 0.5, wrapped("every one of these words is short " * 6, 4.0, SMALL), fontsize=SMALL)
+    text = figure.text(
+        0.0, 0.5, wrapped("every one of these words is short " * 6, 4.0, SMALL_TEXT), fontsize=SMALL_TEXT
+    )
     figure.draw_without_rendering()
     assert "\n" in text.get_text() and text.get_window_extent().width < figure.bbox.width

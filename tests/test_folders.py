@@ -9,7 +9,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.result_folders import COMMAND, drop_if_empty, new_folder, resumed_folder
-from models.core.whole_files import PART
+from models.core.whole_files import PARTIAL_NAME
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies.single_run import difference
@@ -39,11 +39,13 @@ def test_one_named_folder_goes_to_one_run_alone(tmp_path):
 def test_a_resumed_folder_keeps_no_part_of_a_killed_process_and_those_of_living_ones(tmp_path):
     (tmp_path / "points").mkdir()
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
-        files = [folder / PART.format("sweep.png", child.pid, ".png") for folder in (tmp_path, tmp_path / "points")]
+        files = [
+            folder / PARTIAL_NAME.format("sweep.png", child.pid, ".png") for folder in (tmp_path, tmp_path / "points")
+        ]
         files.append(tmp_path / "notes.part.png")
         for file in files:
             file.touch()
-        files.append(tmp_path / PART.format("0003", child.pid, ""))
+        files.append(tmp_path / PARTIAL_NAME.format("0003", child.pid, ""))
         (files[-1] / "within").mkdir(parents=True)
         assert resumed_folder(tmp_path, "points") == tmp_path and all(file.exists() for file in files)
         child.communicate(b"\n")

@@ -102,7 +102,7 @@ def test_the_refusal_names_limit_and_pole():
 def test_a_free_vehicle_may_run_for_an_hour(engine):
     """Its double zero eigenvalues must not be taken for growth."""
     base = setups.vehicle()
-    free = setups.driven(base, setups.static_forces(base, 10, 1.0))
+    free = setups.driven_by_forces(base, setups.static_forces(base, 10, 1.0))
     stability.check_step(engine, free, setups.settings(engine, 1e-3, 3600.0))
 
 
@@ -191,7 +191,7 @@ def test_an_interrupt_in_exudyn_is_an_interrupt(monkeypatch):
         return read
 
     monkeypatch.setattr(exudyn_engine.Clock, "reader", reader)
-    model = build("exudyn", setups.driven(base, forces), Settings("RK44", 1e-3, 0.1))
+    model = build("exudyn", setups.driven_by_forces(base, forces), Settings("RK44", 1e-3, 0.1))
     with pytest.raises(KeyboardInterrupt):
         model.run()
 

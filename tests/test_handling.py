@@ -11,9 +11,9 @@ from models.core.errors import InputError, RunFailed
 from models.multibody import forces
 from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import Drive, driven
+from models.systems.handling.run import Drive, drive_run
 from models.systems.handling.scene import build
-from models.tyre.bristles import SLOW, brush
+from models.tyre.bristles import FADING_SPEED, brush
 from models.vehicles.free_vehicle import SWAY, free_vehicle
 from models.vehicles.spatial_linear import mass
 from models.vehicles.vehicle_file import load_vehicle
@@ -65,7 +65,7 @@ def test_locked_wheel_is_opposed_by_mu_n() -> None:
 def test_rolling_backwards_is_the_mirror_image() -> None:
     """x and the turning change their signs with the speed; and nothing jumps where it passes 0."""
     assert np.allclose(tyre(0.1, 0.2, 0.3, -20.0), tyre(-0.1, 0.2, -0.3, 20.0) * [-1, 1, -1], rtol=1e-12)
-    speeds = np.linspace(-2.0 * SLOW, 2.0 * SLOW, 2001)
+    speeds = np.linspace(-2.0 * FADING_SPEED, 2.0 * FADING_SPEED, 2001)
     slides = np.column_stack([np.tile([0.002, 0.003, 0.01], (2001, 1)), speeds])
     found = brush(LOAD, MU, A, B, K, slides)
     assert np.abs(np.diff(found[:, :2], axis=0)).max() < 2e-2 * np.abs(found[:, :2]).max()  # by 1/1000 of the way
@@ -76,6 +76,7 @@ def test_without_load_there_is_no_force() -> None:
     assert not tyre(1.0, 1.0, 1.0, 5.0, load=0.0).any()
 
 
+@pytest.mark.grounds("closed form")
 def test_free_vehicle_has_all_of_the_mass() -> None:
     """Sideways and in yaw, too; the ride vehicle's wheels and occupants have none there."""
     free = free_vehicle(R19, spin_inertia=1.7)
@@ -84,6 +85,7 @@ def test_free_vehicle_has_all_of_the_mass() -> None:
     assert mass(free)[:2, :2] == pytest.approx(total * np.eye(2), rel=1e-9)
 
 
+@pytest.mark.grounds("closed form")
 def test_the_chassis_feels_the_inertia_of_the_whole_vehicle_in_roll_and_pitch() -> None:
     """m_total h about the ground; wheels and occupants were left out once, a sixth of it."""
     free = free_vehicle(R19, spin_inertia=1.7)
@@ -96,7 +98,7 @@ def test_the_chassis_feels_the_inertia_of_the_whole_vehicle_in_roll_and_pitch() 
 def test_loads_balance_the_inertia_of_the_whole_vehicle() -> None:
     """Between the sides of a box on springs that turns gently; 1 % of it is still to come after 1 s."""
     own = turning(box().handling.given, 2e-3)
-    assert abs(turning_error(driven("mujoco", own, 20.0, 1.0))) < 2e-2
+    assert abs(turning_error(drive_run("mujoco", own, 20.0, 1.0))) < 2e-2
 
 
 def test_a_vehicle_without_cornering_is_refused() -> None:
@@ -149,7 +151,7 @@ def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
     """Off a kerb-like road at full lock, brakes on: rounding alone, and no contact gains energy."""
     controls = Controls(steer=((0.0, 0.0), (0.2, 0.4)), brake=((0.0, 0.0), (0.1, 4000.0)))
     wild = Handling(R19, controls=controls, waves=plane_waves(2e-4, 24, 2))
-    one, two = (driven(engine, wild, 20.0, 0.4) for engine in ("mujoco", "exudyn"))
+    one, two = (drive_run(engine, wild, 20.0, 0.4) for engine in ("mujoco", "exudyn"))
     assert np.abs(one.run.positions - two.run.positions).max() < 1e-10
     assert one["load"].min() == 0.0
     assert one["power"].max() <= 0.0
@@ -159,7 +161,7 @@ def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
 def braked_turn() -> Drive:
     """800 N m of braking, 7 parts of 10 in front, while the car begins to turn left, 0.2 s."""
     controls = Controls(steer=((0.0, 0.0), (0.1, 0.03)), brake=((0.0, 0.0), (0.1, 800.0)), front_brake=0.7)
-    return driven("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
+    return drive_run("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
 
 
 def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
@@ -186,7 +188,7 @@ def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn
 @pytest.mark.full
 def test_a_step_that_cannot_follow_slow_tyres_is_told() -> None:
     with pytest.raises(RunFailed, match=r"damps its wheel faster than steps of 0\.001 s"):
-        driven("mujoco", Handling(R19, Tyres(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
+        drive_run("mujoco", Handling(R19, Tyres(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
 
 
 def test_car_that_turns_over_is_no_result() -> None:
@@ -194,4 +196,4 @@ def test_car_that_turns_over_is_no_result() -> None:
     controls = Controls(steer=((0.1, 0.0), (0.3, 0.3)))
     handling = Handling(R19, replace(Tyres(), friction=1.5), controls)
     with pytest.raises(RunFailed, match=r"turns over.*t = "):
-        driven("mujoco", handling, 60.0, 1.5, 1e-3)
+        drive_run("mujoco", handling, 60.0, 1.5, 1e-3)

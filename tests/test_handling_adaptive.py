@@ -14,7 +14,7 @@ from models.engines import free_vehicle_adaptive
 from models.engines.assembly import Settings
 from models.multibody.numbers import Controls, Handling
 from models.systems.handling.plan import describe
-from models.systems.handling.run import driven, driven_adaptively, run
+from models.systems.handling.run import drive_run, driven_adaptively, run
 from models.systems.handling.scene import build
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -35,7 +35,7 @@ def end(tolerance: float) -> np.ndarray:
 
 
 def test_it_is_the_motion_of_short_fixed_steps_and_reads_the_controls_at_their_time() -> None:
-    truth = driven("exudyn", STEERED, 20.0, 0.1, 5e-4).run.states[-1]
+    truth = drive_run("exudyn", STEERED, 20.0, 0.1, 5e-4).run.states[-1]
     assert np.abs(end(1e-9) - truth).max() < 2e-6
     options = free_vehicle_adaptive._options
     with patch.object(free_vehicle_adaptive, "_options", lambda begin, own: options(0.0, own)):
@@ -48,7 +48,7 @@ def test_it_is_the_motion_of_short_fixed_steps_and_reads_the_controls_at_their_t
 
 def test_a_car_at_walking_pace_needs_no_shorter_step_to_be_named() -> None:
     with pytest.raises(RunFailed, match="damps its wheel faster"):
-        driven("exudyn", Handling(R19), 0.1, 0.02, 2e-3)
+        drive_run("exudyn", Handling(R19), 0.1, 0.02, 2e-3)
     slow = driven_adaptively("exudyn", Handling(R19), 0.1, Settings("DOPRI5", 2e-3, 0.02, 1e-6))
     assert np.abs(slow.run.rates[-1] - slow.run.rates[0]).max() < 1e-3 and slow.run.counts["steps"] > 10
 

@@ -196,7 +196,7 @@ def test_the_quick_share_has_cases_of_every_family():
     known = cases_by_family()
     own = hard_cases.quick_cases(known)
     assert {family for family, _ in own} == set(FAMILIES) and all(pair in known for pair in own)
-    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.EVERY
+    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.QUICK_SPACING
 
 
 def test_every_number_of_the_catalogue_has_its_cases():
@@ -207,7 +207,7 @@ def test_every_number_of_the_catalogue_has_its_cases():
 
 
 def test_there_are_eighty_cases_without_the_measurement_files():
-    assert sum(family not in hard_cases.FILES for family, _ in cases_by_family()) >= hard_cases.LEAST
+    assert sum(family not in hard_cases.FILES for family, _ in cases_by_family()) >= hard_cases.FEWEST_CASES
 
 
 def test_a_refusal_that_is_wanted_passes_its_row_also_where_no_implementation_has_a_part():

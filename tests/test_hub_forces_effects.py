@@ -8,7 +8,7 @@ import pytest
 
 from models.advice.choice.systems.hub_forces import computed_quantities
 from models.core.errors import InputError
-from models.core.scene_effects import legal, named, with_effects, without
+from models.core.scene_effects import legal, named_effects, with_effects, without
 from models.systems.hub_forces.comparison import planned_runs
 from models.systems.hub_forces.measurement import recorded
 from models.systems.hub_forces.run import measure
@@ -115,7 +115,7 @@ def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one()
     names = {method: list(planned_runs(scene(stabilise={"method": method}), engines)) for method in ("none", "kalman")}
     assert names["none"] == ["free, exudyn", "free, mujoco", "filter", "prescribed"]
     assert names["kalman"] == ["free, mujoco", "filter, exudyn", "filter", "prescribed"]
-    assert named(scene(stabilise={"method": "kalman"})) == (
+    assert named_effects(scene(stabilise={"method": "kalman"})) == (
         "angle_noise",
         "force_noise",
         "kalman_filter",

@@ -16,9 +16,9 @@ from models.systems.hub_forces.measurement import HubForces
 from models.systems.hub_forces.plan import check, describe
 from models.systems.hub_forces.run import measure, run
 from models.systems.hub_forces.scene import build
-from validation.absence.hub_forces import BARE, write
+from validation.absence.hub_forces import BARE_SCENE, write
 from validation.spatial.cars import r19, shaken, static
-from validation.spatial.hub_inputs import TIGHT, centre_gap, instants_gap, path_gap, samples, settings
+from validation.spatial.hub_inputs import SOLVER_TOLERANCE, centre_gap, instants_gap, path_gap, samples, settings
 
 ON_ROAD = {"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "road": {}, "run": {"duration": 0.04}}
 OWN_STEPS = {"engines": {"exudyn": {"integrator": "DOPRI5", "tolerance": 1e-9}}}
@@ -127,12 +127,15 @@ def shaken_rows() -> HubInputs:
     """Forces that change at every half step of ``settings``."""
     rows = 2 * settings().steps + 1
     rest, one = static(r19(), rows), shaken(r19(), "hub", guide=False)
-    return replace(rest, hubs=rest.hubs + np.arange(rows)[:, None] * (one.hubs[0] - rest.hubs[0]) * TIGHT)
+    return replace(rest, hubs=rest.hubs + np.arange(rows)[:, None] * (one.hubs[0] - rest.hubs[0]) * SOLVER_TOLERANCE)
 
 
 def test_samples_of_a_file_must_be_held_over_whole_steps(tmp_path):
     write(tmp_path)
-    table = BARE | {"forces": BARE["forces"] | {"interpolation": "held"}, "run": {"duration": 0.018, "step": 1.5e-3}}
+    table = BARE_SCENE | {
+        "forces": BARE_SCENE["forces"] | {"interpolation": "held"},
+        "run": {"duration": 0.018, "step": 1.5e-3},
+    }
     own = build(table, "s.toml", tmp_path)
     with pytest.raises(InputError, match=r"run\.step .* must divide the period of 0.002 s over which samples are held"):
         own.measured(own.cut_vehicle())

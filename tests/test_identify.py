@@ -163,7 +163,8 @@ def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
     ("text", "said"),
     [
         ("front.frictoin", "is no key of the scene"),
-        ("front", "holds no number"),
+        ("front", "holds no number: a parameter is a number of the scene$"),
+        ("options.scale", "is not in the scene: --set options.scale=VALUE gives it a value to start from"),
         ("vehicle.centre_height", "must start between its bounds"),
         ("front.friction=2:3", "must start between its bounds"),
         ("front.friction=2", "LOW:HIGH"),

@@ -8,7 +8,7 @@ import pytest
 
 from models.core.errors import RunFailed
 from models.core.result import load
-from validation.contact.manchester_references import contact_of, searched
+from validation.contact.manchester_references import contact_of, first_touch
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -63,7 +63,7 @@ def test_search_finds_the_places():
     contact = contact_of("A-1")
     placed = contact.at(6.5e-3, 0.0156)  # the yaw moves the flange's place 17 mm ahead
     for sign, (place,) in ((1.0, placed.right), (-1.0, placed.left)):
-        y, u, angle = searched(contact.side, placed, sign, place.wheel_y + 1e-3)
+        y, u, angle = first_touch(contact.side, placed, sign, place.wheel_y + 1e-3)
         # Straight pieces of 0.1 mm and the last grid of 0.05 mm leave some hundredths.
         assert (y, u) == pytest.approx((place.touch_y, place.wheel_y), abs=1e-4)
         assert angle == pytest.approx(place.angle, abs=0.02)

@@ -32,7 +32,7 @@ def test_the_disk_is_the_bottleneck_where_it_is_slow(monkeypatch):
 def test_a_block_that_comes_late_holds_up_the_others(monkeypatch):
     """No block is begun further before the first that is missing than there may be under way."""
     alike = Ensemble(50, 1000)
-    monkeypatch.setattr(many_workers, "AHEAD", 0)  # two blocks a worker
+    monkeypatch.setattr(many_workers, "BLOCKS_AHEAD", 0)  # two blocks a worker
     calm = simulated(alike, 20, 400)
     monkeypatch.setattr(many_workers, "SCATTER", 0.4)
     assert simulated(alike, 20, 400).workers < calm.workers - 0.01

@@ -11,7 +11,7 @@ from models.core.finding import Finding, gathered, queries
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import SensorResponse
-from models.measured.checks.spectra import mean
+from models.measured.checks.spectra import windowed_means
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import probable_mistake
@@ -301,7 +301,7 @@ def test_the_mean_of_a_windowed_record_is_as_good_as_it_says():
     rng, off = np.random.default_rng(2), []
     for _ in range(200):
         values = rng.normal(size=500)
-        centre, spread = mean([partial(np.asarray, values)])
+        centre, spread = windowed_means([partial(np.asarray, values)])
         off.append(float(centre[0] ** 2 / spread[0, 0]))
     assert 0.7 < np.mean(off) < 2.0  # F(1, 6) has the mean 1.5; three neighbouring lines are not quite independent
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.core.csv_header import find_head, heading, split
+from models.core.csv_header import find_head, heading, split_cells
 from models.core.errors import InputError
 from models.measured.formats import csv_layout, csv_rows, open_source
 from models.measured.formats.csv_layout import clock_heading, is_clock, is_other_clock
 from validation.cases import measured_formats as case
 from validation.measured.measured_files.csv_forms import (
-    BARE,
+    BARE_HEADINGS,
     FILES,
     HEADINGS,
     KEYS,
@@ -173,7 +173,11 @@ def test_a_unit_in_parentheses_is_known_and_stays_in_the_name(tmp_path):
 
 
 def test_units_beneath_the_headings_reach_the_channels(tmp_path):
-    for headings, row in ((BARE, "s,[kN],N m"), (("time [s]", "Fz", "Fx"), "-,kN,N m"), (BARE, "s;kN;N m")):
+    for headings, row in (
+        (BARE_HEADINGS, "s,[kN],N m"),
+        (("time [s]", "Fz", "Fx"), "-,kN,N m"),
+        (BARE_HEADINGS, "s;kN;N m"),
+    ):
         form = Form(headings, between=(row,), separator=";" if ";" in row else ",")
         assert [one.unit for one in open_source(form.make(tmp_path)).channels] == ["kN", "N m"]
 
@@ -184,12 +188,14 @@ def test_groups_above_the_headings_are_known_where_names_differ(tmp_path):
 
 
 def test_titles_and_comments_are_the_comment_of_the_file(tmp_path):
-    form = Form(BARE, above=("# comment: by hand", '"Run; 7",,', "# samples: 40"), between=("ms,N,N",), times=MILLI)
+    form = Form(
+        BARE_HEADINGS, above=("# comment: by hand", '"Run; 7",,', "# samples: 40"), between=("ms,N,N",), times=MILLI
+    )
     source = open_source(form.make(tmp_path))
     assert source.comment == "by hand\nRun; 7"
 
 
 def test_lines_that_are_no_table_have_no_head():
     lines = [csv_layout.Line(1, "time;date", 0, 10), csv_layout.Line(2, "Meier;today", 10, 22)]
-    assert find_head(lines, is_clock, ",;\t") == [] and split('"a;b";c', ";") == ["a;b", "c"]
+    assert find_head(lines, is_clock, ",;\t") == [] and split_cells('"a;b";c', ";") == ["a;b", "c"]
     assert heading("Fz [N]") == ("Fz", "N")

@@ -10,29 +10,29 @@ from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
 from models.core.result import load as load_result
-from models.core.scene_effects import absent_effects, named, with_effects, without
+from models.core.scene_effects import absent_effects, named_effects, with_effects, without
 from models.core.systems import load
 from models.measured.columns import Columns
 from models.systems import run
 from models.systems.measured.scene import build
 from studies.command.asked import SCENES
 from validation.absence.measured import FAULTS, write
-from validation.absence.of_systems import bare
+from validation.absence.of_systems import bare_scene
 
 
 def test_each_fault_of_transducers_comes_and_goes_alone():
     scene = load(SCENES / "recording.toml")
-    assert "sensor_noise" in named(scene) and {*FAULTS} - {"sensor_noise"} <= {*absent_effects(scene)}
+    assert "sensor_noise" in named_effects(scene) and {*FAULTS} - {"sensor_noise"} <= {*absent_effects(scene)}
     full = with_effects(scene, *(name for name in FAULTS if name != "sensor_noise"))
     for name in FAULTS:
-        assert {*named(full)} - {*named(without(full, name))} == {name}
+        assert {*named_effects(full)} - {*named_effects(without(full, name))} == {name}
     assert without(full, *FAULTS).virtual.faults == type(full.virtual.faults)()  # nothing of any is left
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_files_have_the_faults_that_they_have(name):
     with pytest.raises(InputError, match=r"virtual.faults.* needs a table \[virtual\], for files have the faults"):
-        with_effects(bare("measured"), name)
+        with_effects(bare_scene("measured"), name)
 
 
 def short(**more):
@@ -76,7 +76,7 @@ def test_a_recording_is_run_as_every_scene_is_and_its_result_says_where_its_samp
 def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch):
     monkeypatch.setattr("validation.absence.measured.SAMPLES", 201)
     write(tmp_path)
-    of_files = build(bare("measured").table() | {"stabilise": {"method": "none"}}, "s.toml", tmp_path)
+    of_files = build(bare_scene("measured").table() | {"stabilise": {"method": "none"}}, "s.toml", tmp_path)
     for own, steps in ((short(), 180), (of_files, 200)):
         whole = Variants(own, "mujoco")
         part = whole.window(20)
@@ -92,7 +92,7 @@ def test_the_pitch_plane_is_told_what_has_a_price():
             "title": "t",
             "system": "measured",
             "vehicle": {"parameters": "itwm_drift"},
-            "files": bare("measured").table()["files"],
+            "files": bare_scene("measured").table()["files"],
         },
         "s.toml",
     )

@@ -11,7 +11,7 @@ from models.core.result import load as load_result
 from models.measured.channel import Channel
 from models.measured.formats import open_source
 from models.measured.gaps import without_absurd
-from models.measured.resampling import onto
+from models.measured.resampling import resample_to
 from models.measured.signal import Places, Signal
 from models.measured.timing import timing
 from models.measured.units import conversion
@@ -252,7 +252,7 @@ def test_jitter_is_measured(tmp_path):
 
 def test_resampling_knows_nothing_outside():
     t = np.arange(50) * 0.1
-    out = onto(t, t, 0.1, np.arange(-10, 60) * 0.1)
+    out = resample_to(t, t, 0.1, np.arange(-10, 60) * 0.1)
     assert np.isnan(out[:10]).all() and np.isnan(out[60:]).all() and np.isfinite(out[10:60]).all()
 
 

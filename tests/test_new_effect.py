@@ -7,11 +7,11 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.scene_effects import extended, names_of, own_table, rebuilt, with_effects
-from models.core.systems import DEFAULT, SYSTEMS
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
 from studies.command_line import list_scenes
-from validation.absence.of_systems import added, bare, declared
+from validation.absence.of_systems import added_counts, bare_scene, declared
 from validation.cases import absent
 
 ANCHOR = '''"""A rope that draws the chassis level."""
@@ -63,8 +63,8 @@ def extend(vehicle, p):
 
 
 def test_a_new_effect_of_the_pitch_plane(new_file, tmp_path, capsys):
-    new_file(DEFAULT, "anchor", ANCHOR)
-    assert "anchor" in names_of(DEFAULT)
+    new_file(DEFAULT_SYSTEM, "anchor", ANCHOR)
+    assert "anchor" in names_of(DEFAULT_SYSTEM)
     list_scenes()
     assert "A rope that draws the chassis level" in capsys.readouterr().out
     scene = with_effects(absent.scene({}, 20, tmp_path), "anchor")
@@ -80,9 +80,9 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     new_file("braking", "slow_chambers", SLOW)
     list_scenes()
     assert "Chambers that are clogged" in capsys.readouterr().out
-    found = added("braking", "slow_chambers", quick=True)
+    found = added_counts("braking", "slow_chambers", quick=True)
     assert found == declared("braking", "slow_chambers", ["reference"])
-    scene = with_effects(bare("braking"), "slow_chambers")
+    scene = with_effects(bare_scene("braking"), "slow_chambers")
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)
 
 
@@ -101,13 +101,13 @@ def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
     new_file("braking", "slow_chambers", text)
     list_scenes()
     assert "slow_chambers" in capsys.readouterr().out
-    table = {**own_table(bare("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
+    table = {**own_table(bare_scene("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
     with pytest.raises(InputError, match=told) as found:
-        scene = rebuilt(table, bare("braking"))
+        scene = rebuilt(table, bare_scene("braking"))
         extended("what a system built", scene)
     assert ".py" in found.value.file
 
 
 def test_the_file_is_all_that_made_it():
     """Control of the fixture: nothing of both is left."""
-    assert "anchor" not in names_of(DEFAULT) and "slow_chambers" not in names_of("braking")
+    assert "anchor" not in names_of(DEFAULT_SYSTEM) and "slow_chambers" not in names_of("braking")

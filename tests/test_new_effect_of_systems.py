@@ -16,12 +16,12 @@ from models.core.scene_effects import listing, own_table, rebuilt, with_effects,
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
-from models.systems.contact.cases_table import answer
+from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built, contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
 from models.systems.handling.energy import unaccounted
-from models.systems.handling.run import driven
+from models.systems.handling.run import drive_run
 from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.omissions import effects_of
@@ -31,8 +31,8 @@ from models.systems.ride.scene import build as build_ride
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies.command.asked import SCENES
-from validation.absence.contact import BARE as CONTACT
-from validation.absence.of_systems import added, bare, counts_and_paths, declared
+from validation.absence.contact import BARE_SCENE as CONTACT
+from validation.absence.of_systems import added_counts, bare_scene, counts_and_paths, declared
 
 
 @dataclass(frozen=True)
@@ -164,13 +164,13 @@ NEW = {
 
 @pytest.mark.parametrize("system", NEW)
 def test_a_new_effect_is_one_file(system, new_file):
-    new, scene = NEW[system], bare(system)
+    new, scene = NEW[system], bare_scene(system)
     before, table = counts_and_paths(system, scene), own_table(scene) | {"effects": {NEW[system].name: {}}}
     with pytest.raises(InputError, match="no such effect"):
         rebuilt(table, scene)
     new_file(system, new.name, new.text)
     assert listing(system)[new.name] == f"New: {new.name}"
-    assert added(system, new.name, quick=True) == declared(system, new.name, [next(iter(before))])
+    assert added_counts(system, new.name, quick=True) == declared(system, new.name, [next(iter(before))])
     own = with_effects(scene, new.name)
     assert f" {new.name}: what {new.name} costs" in import_module(SYSTEMS[system].plan).describe(own)
     _judged(before, counts_and_paths(system, own), new.apart)
@@ -198,7 +198,7 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
     handling = Handling(load_vehicle("r19_free")).changed(
         pushes=(Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),)
     )
-    drive = driven("mujoco", handling, 25.0, 0.5)
+    drive = drive_run("mujoco", handling, 25.0, 0.5)
     assert np.abs(unaccounted(drive)).max() < 1e-6
     assert drive.path[-1, 1] > 0.04  # m, to the left
     with pytest.raises(InputError, match="no such body"):
@@ -306,7 +306,7 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
         folder=tmp_path,
     )
     run_contact(scene, answers=tmp_path / "a.csv")
-    answer(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
+    answer_table(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
     assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
 
 
@@ -355,7 +355,7 @@ def test_a_new_effect_cannot_stand_beside_what_it_excludes(system, new_file):
     new = NEW[system]
     new_file(system, new.name, new.text)
     with pytest.raises(InputError, match=f"cannot stand beside '{new.excludes}', which it would be twice: drop one"):
-        with_effects(bare(system), *new.beside, new.excludes, new.name)
+        with_effects(bare_scene(system), *new.beside, new.excludes, new.name)
 
 
 @pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if not own.effects])
@@ -368,7 +368,7 @@ def test_a_system_without_effects_says_where_there_are_some(system):
 def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     """Of the runs that it times, at the usual values of both."""
     new_file(system, NEW[system].name, NEW[system].text)
-    scene = bare(system)
+    scene = bare_scene(system)
     runs = system_of(scene)
     less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, with_effects(scene, NEW[system].name)))
     assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
@@ -377,7 +377,7 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
 def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
     monkeypatch.setattr(effects, "ROUNDS", 3)
     new_file("contact", NEW["contact"].name, NEW["contact"].text)
-    for scene in (bare("contact"), with_effects(bare("contact"), "soft_bodies")):
+    for scene in (bare_scene("contact"), with_effects(bare_scene("contact"), "soft_bodies")):
         price = next(price for price in price_list(scene).prices if price.name == "soft_bodies")
         assert (price.why, price.there) == ("", bool(scene.effects)) and np.isfinite(price.micros[0])
         assert 0.1 < price.changes[0].relative < 1.1  # half the modulus halves the forces on a given ellipse

@@ -203,7 +203,7 @@ def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
     monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
     monkeypatch.setattr(outside, "CEILING", 1e9)
-    assert len(wrong_engines.passed()) == len(wrong_engines.WRONG)
+    assert len(wrong_engines.passed()) == len(wrong_engines.WRONG_ENGINES)
 
 
 def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_path):

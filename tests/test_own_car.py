@@ -23,7 +23,7 @@ from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.energy import unaccounted
 from models.systems.handling.export import of_handling
-from models.systems.handling.run import REFERENCE, build, driven
+from models.systems.handling.run import REFERENCE, build, drive_run
 from models.systems.ride.run import run as run_ride
 from models.tyre.magic_formula import surface
 from models.vehicles.cut_vehicle import cut
@@ -31,7 +31,7 @@ from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial import JointElement, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import build_vehicle, load_vehicle
-from validation.braking.sprung_box import braked, steady
+from validation.braking.sprung_box import braked, steady_torques
 from validation.own_model.car_energy import energies_apart
 from validation.own_model.cars import SALOON
 
@@ -53,7 +53,7 @@ def saloon(tmp_path_factory: pytest.TempPathFactory) -> SpatialVehicle:
 @pytest.fixture(scope="module")
 def drives(saloon):
     handling = Handling(saloon, controls=LANE_CHANGE)
-    return {engine: driven(engine, handling, 22.0, 1.5) for engine in ("exudyn", "mujoco")}
+    return {engine: drive_run(engine, handling, 22.0, 1.5) for engine in ("exudyn", "mujoco")}
 
 
 def test_parts_of_the_file_are_those_of_the_vehicle(saloon):
@@ -321,7 +321,7 @@ def test_it_brakes_in_both_engines_as_the_plain_equations_do(saloon):
     """To rounding where the wheels' forces are held over the same steps; its wheels spin with the file's inertia."""
     own = sprung(saloon, 0.0)
     assert (own.plane.front.spin_inertia, own.plane.rear.spin_inertia) == (1.1, 1.2)
-    torques = steady(500.0, 500.0, 200.0, 200.0)
+    torques = steady_torques(500.0, 500.0, 200.0, 200.0)
     in_engines = [braked(own, surface("wet"), engine, 0.05, 1e-3) for engine in ("exudyn", "mujoco")]
     cars = (*in_engines, replace(in_engines[0], engine=PlainOnSprings(own)))
     exudyn, mujoco, plain = (each.run(torques, 6.0, 0.1).states[-1] for each in cars)

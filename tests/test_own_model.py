@@ -1,25 +1,45 @@
 """A user's own model: read, built, certified, compared and refused as it should be."""
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from models.advice.own_model_price import priced
-from models.core.errors import InputError
+from models.core.errors import InputError, RunFailed
+from models.engines.free_vehicle import free_model
 from models.own_model import certificate as certifying
-from models.own_model.builds import as_parsed, equations, sliding
+from models.own_model.builds import BUILDS, as_parsed, equations, largest_gap, sliding
 from models.own_model.certificate import agreement, certificate, moved_at, softness, states_of
 from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
+from models.own_model.limits import limits_struck
+from models.own_model.path import _model as march_of
 from models.own_model.path import paths
+from models.own_model.reading import described
 from models.own_model.states import random_states
 from models.own_model.urdf import misread
-from validation.own_model.files import ARM_URDF, CART, GEARED, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.files import (
+    ARM_URDF,
+    CART,
+    GEARED,
+    HELD,
+    HUNG,
+    JOINTED,
+    LINKED,
+    LOOP,
+    PLANTED,
+    TIED,
+    chain,
+    changed,
+    tree,
+)
 from validation.own_model.soft_couplings import softly_coupled
 
 
@@ -54,7 +74,7 @@ def geared(tmp_path_factory):
 
 def as_drawn(twin):
     """20 random states, of which dry friction sticks at some."""
-    return list(zip(*random_states(twin.model, 20), strict=True))
+    return list(zip(*random_states(twin, 20), strict=True))
 
 
 def test_dry_friction_and_couplings_are_those_of_the_file(geared):
@@ -79,6 +99,94 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
     assert agreement("", moved_at(softly_coupled(other), states), soft, geared).acceleration > 1e-4
+
+
+SPRUNG = changed(
+    changed(JOINTED, "ball", 'pos=".1 .2 .3"', 'pos=".1 .2 .3" stiffness="4" damping=".3"'),
+    "free",
+    '<freejoint name="root"/>',
+    '<joint name="root" type="free" stiffness="6" damping=".7"/>',
+)
+"""A spring and a damper of a ball joint, and of a free one."""
+
+
+def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
+    """To rounding, with a rest that is not the design position; the fault: 1 % of a stiffness, of a damping."""
+    as_read, model = _read(tmp_path, SPRUNG).twin, _read(tmp_path, SPRUNG, "turned.xml").twin.model
+    at = int(model.joint("ball").qposadr[0])
+    model.qpos_spring[at : at + 4] = np.array((0.9, 0.1, -0.3, 0.2)) / np.linalg.norm((0.9, 0.1, -0.3, 0.2))
+    for twin in (as_read, described(model, "turned")):
+        assert all(max(row.force, row.acceleration) < 1e-11 for row in certificate(twin, 20))
+        for i, change in ((0, "stiffness"), (1, "damping")):
+            springs = list(twin.driven.turning_springs)
+            springs[i] = replace(springs[i], **{change: 1.01 * getattr(springs[i], change)})
+            wrong = replace(twin.driven, turning_springs=tuple(springs))
+            assert all(row.acceleration > 1e-6 for row in certificate(replace(twin, driven=wrong), 20))
+    assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
+
+
+@pytest.mark.parametrize("text", [LINKED, HELD, HUNG], ids=["linked", "held", "hung"])
+def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
+    """To rounding, rigid in two builds; what gives way in MuJoCo is its law; ends that are 1 mm off are seen in all."""
+    twin = _read(tmp_path, text).twin
+    states = states_of(twin, 5)
+    for row in certificate(twin, 5):
+        assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
+    soft = moved_at(as_parsed(twin), states)
+    assert softness(twin, 5) > 1e-3
+    assert agreement("", moved_at(softly_coupled(twin), states), soft, twin).acceleration < 1e-8
+    ties = twin.driven.connections
+    for i, tie in enumerate(ties):
+        body, (x, y, z) = tie.ends[0]
+        moved = replace(tie, ends=((body, (x + 1e-3, y, z)), tie.ends[1]))
+        wrong = replace(twin, driven=replace(twin.driven, connections=(*ties[:i], moved, *ties[i + 1 :])))
+        assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
+        other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
+        yielding = replace(twin, driven=replace(twin.driven, connections=other))
+        assert agreement("", moved_at(softly_coupled(yielding), states), soft, twin).acceleration > 1e-5
+
+
+def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
+    """Rigid bodies that lie wrong to each other have the right accelerations all the same: their gap tells."""
+    twin = _read(tmp_path, LINKED).twin
+    loop, grip = twin.driven.connections
+    turned = replace(grip, axes=(grip.axes[0] @ Rotation.from_rotvec((0.0, 0.02, 0.0)).as_matrix(), grip.axes[1]))
+    wrong = replace(twin.driven, connections=(loop, turned))
+    assert all(largest_gap(twin, build, states_of(twin, 5)) < 1e-11 for build in BUILDS)
+    assert all(largest_gap(replace(twin, driven=wrong), build, states_of(twin, 5)) > 1e-3 for build in BUILDS)
+    monkeypatch.setattr("models.own_model.builds.free_model", lambda build, driven: free_model(build, wrong))
+    assert [row.alike for row in certificate(twin, 5)] == [False, False, True]
+
+
+def test_inertia_of_rotors_is_in_what_gives_way(tmp_path):
+    twin = _read(tmp_path, changed(GEARED, "turn", 'axis="0 1 .3"', 'axis="0 1 .3" armature=".3"')).twin
+    assert all(row.acceleration < 1e-11 for row in certificate(twin, 5))
+
+
+def test_a_path_of_a_body_hung_by_a_point_and_of_a_loop_of_bars(tmp_path):
+    """The step is coarse, since Exudyn's constraints are asked four times in each."""
+    report = paths(_read(tmp_path, HUNG).twin, 0.02)
+    assert report.alike and report.soft and not report.failed and report.distances["mujoco"] > 1e-6
+    assert report.energy < 1e-3  # of the largest, by steps of 20 ms
+
+
+def test_constraints_that_contradict_each_other_are_told(tmp_path):
+    far = LINKED.replace("<worldbody>", '<worldbody><site name="far" pos="0 0 9"/>')
+    twin = _read(tmp_path, far.replace(LOOP, f'<connect site1="tip" site2="far"/>{LOOP}')).twin
+    with pytest.raises(RunFailed, match="cannot be satisfied all at once"):
+        certificate(twin, 2)
+
+
+def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
+    first = _read(tmp_path, LINKED).twin
+    second = _read(tmp_path, changed(LINKED, "loop", '"rod"', '"crank"'), "b.xml").twin
+    other = _read(tmp_path, changed(LINKED, "grip", 'solimp=".92', 'solimp=".93'), "c.xml").twin
+    moved = _read(tmp_path, LINKED.replace('name="tip" pos="0 .3 .1"', 'name="tip" pos="0 .3 .11"'), "d.xml").twin
+    assert not compare(first, second, 3).alike
+    comparison = compare(first, moved, 3)
+    assert [(each.kind, each.owner) for each in comparison.influential] == [("joint", "equality 'grip'")]
+    soft = compare(first, other, 3)
+    assert soft.alike and [each.owner for each in soft.not_compared] == ["equality 'grip'"]
 
 
 def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
@@ -225,6 +333,62 @@ def test_paths_of_all_builds_agree_and_the_ledger_closes(tmp_path):
     assert report.energy < 1e-9  # Simpson's rule at steps of 2 ms
 
 
+def test_a_build_with_another_path_is_told(tmp_path, monkeypatch):
+    """The fault: gravity is 1e-6 off in MuJoCo; the disturbance that ends a comparison is one of the first build."""
+    honest = march_of
+
+    def heavier(twin, build):
+        driven = replace(twin.driven, gravity=(1.0 + 1e-6) * twin.driven.gravity)
+        return honest(replace(twin, driven=driven) if build == "mujoco" else twin, build)
+
+    monkeypatch.setattr("models.own_model.path._model", heavier)
+    report = paths(_read(tmp_path, CART).twin)
+    assert not report.alike and report.horizon > 0.9 and report.distances["mujoco"] > 1e-7
+
+
+LIMITED = changed(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
+    "<worldbody>", '<compiler autolimits="true"/><worldbody>'
+)
+
+
+def test_inside_their_ranges_limits_do_nothing(tmp_path):
+    """The file's own model with its limits accelerates as without; the fault: states that reach beyond."""
+    twin = _read(tmp_path, LIMITED).twin
+    states, struck = states_of(twin, 30), limits_struck(twin)
+    with_limits = copy(twin.model)
+    with_limits.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+
+    def apart(states):
+        moved = [moved_at(as_parsed(replace(twin, model=model)), states) for model in (twin.model, with_limits)]
+        return agreement("", *moved, twin).acceleration
+
+    assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
+    beyond = [(1.2 * q, v) for q, v in states]
+    assert apart(beyond) > 1e-3 and {name for q, _ in beyond for name in struck(q)} == {"joint 'tilt'"}
+
+
+def test_a_path_that_strikes_a_limit_is_compared_up_to_there(tmp_path):
+    report = paths(_read(tmp_path, LIMITED).twin)
+    assert report.alike and report.struck == "joint 'tilt'" and 0.0 < report.horizon < 1.0
+    assert any("joint 'tilt' strikes its limit, which is not built" in line for line in report.lines())
+
+
+def test_what_a_limit_adds_is_no_stop_of_springs(tmp_path):
+    """1 / (1 - d) of the inertia, and d of MuJoCo's spring and damper: what ``limits`` says of a joint that presses."""
+    twin = _read(tmp_path, LIMITED).twin
+    impedance, (time, ratio) = 0.93, (0.05, 0.7)
+    model = copy(twin.model)
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_DIAGEXACT)
+    model.jnt_solimp[:], model.jnt_solref[:] = (impedance, impedance, 1e-3, 0.5, 2.0), (time, ratio)
+    q, v = np.array((0.1, 0.4)), np.array((0.2, 0.3))
+    (free,), (seen,) = (moved_at(as_parsed(replace(twin, model=each)), [(q, v)]) for each in (twin.model, model))
+    depth = q[1] - (twin.model.jnt_range[1, 1] - twin.model.jnt_margin[1])
+    stiffness, damping = 1.0 / (impedance * time**2 * ratio**2), 2.0 / (impedance * time)
+    law = (1.0 - impedance) * free.acceleration[1] - impedance * (stiffness * depth + damping * v[1])
+    assert abs(seen.acceleration[1] - law) < 1e-8 * abs(law)
+
+
 def test_path_with_quaternions_differs_by_the_error_of_the_step(tmp_path):
     twin = _read(tmp_path, JOINTED).twin
     coarse, fine = (paths(twin, step).distances["the file's own model"] for step in (4e-3, 2e-3))
@@ -238,7 +402,7 @@ def test_thirty_joints_are_certified(tmp_path):
 REFUSED = [
     ("contact", '<geom name="box" type="box" size=".1 .1 .1"/>', "geom 'box' (a.xml:2)"),
     ("friction_loss", '<joint name="rub" type="ball" frictionloss="2"/>', "friction_loss: joint 'rub' (a.xml:2)"),
-    ("turning_law", '<joint name="soft" type="ball" damping="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
+    ("turning_law", '<joint name="soft" type="ball" armature="1"/>', "turning_law: joint 'soft' (a.xml:2)"),
 ]
 
 

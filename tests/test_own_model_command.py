@@ -77,4 +77,4 @@ def test_mistakes_are_one_message(asked, words, said):
 def test_rows_of_the_quick_case_pass(tmp_path):
     rows, _ = twin_files.measure(True, tmp_path)
     assert [row.id for row in rows if row.status != "passed"] == []
-    assert len(rows) == 9
+    assert len(rows) == 12

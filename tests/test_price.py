@@ -231,7 +231,7 @@ def test_an_interval_needs_rounds():
     points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in measured_of(PlantedProblem()).points]
     one = with_points(points).loss(1e-3, "seconds", "exudyn first")
     assert one.factor > 1 and math.isnan(one.low) and math.isnan(one.high)
-    five = [replace(p, seconds=p.seconds * cost.FEWEST) for p in points]
+    five = [replace(p, seconds=p.seconds * cost.FEWEST_ROUNDS) for p in points]
     assert with_points(five).loss(1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
 
 
@@ -272,11 +272,11 @@ def test_rounds_are_for_settings_that_decide_something():
 
 def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
     """Three rounds, of which a slow setting is in the first: that is the run that has been."""
-    monkeypatch.setattr(cost, "SLOW", 0.0)
-    points = cost.measure(PlantedProblem(), True, cost.FEWEST - 2, 0.0).points
+    monkeypatch.setattr(cost, "SLOW_RUN_SECONDS", 0.0)
+    points = cost.measure(PlantedProblem(), True, cost.FEWEST_ROUNDS - 2, 0.0).points
     assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
-    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST - 1, 0.0).points
-    assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST}
+    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST_ROUNDS - 1, 0.0).points
+    assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST_ROUNDS}
 
 
 def test_no_interval_from_one_run():
@@ -367,14 +367,14 @@ def test_force_calls_seen_from_outside():
 
 def test_every_integrator_of_the_catalogue_is_tried():
     from models.engines.catalogue import CATALOGUE
-    from validation.price.problems.road_excited import DEFAULTS, FULL, QUICK
+    from validation.price.problems.road_excited import DEFAULTS, FULL_STEPS, QUICK
 
-    tried = {(engine, method.split()[0]) for engine, method in FULL}
+    tried = {(engine, method.split()[0]) for engine, method in FULL_STEPS}
     assert tried == {(engine, name) for engine, names in CATALOGUE.items() for name in names}
     for engine, method, value in DEFAULTS:
-        assert value in FULL[engine, method], "a default is left out of the full sweep"
+        assert value in FULL_STEPS[engine, method], "a default is left out of the full sweep"
         assert value in QUICK[engine, method], "a default is left out of the quick one"
-    assert all(set(values) <= set(FULL[curve]) for curve, values in QUICK.items())
+    assert all(set(values) <= set(FULL_STEPS[curve]) for curve, values in QUICK.items())
 
 
 def test_defaults_are_those_of_the_installed_engines():

@@ -12,7 +12,7 @@ from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import priced_scene
 from models.advice.price.text import as_dict, lines
-from models.advice.price.truth import at
+from models.advice.price.truth import values_at
 from models.core.assumptions import Assumption, with_assumptions
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
@@ -146,7 +146,9 @@ def test_values_between_rows_do_not_reach_across_a_kink():
     times = np.linspace(0.0, 1.0, 41)
     kinked = Answer(times, np.abs(times - 0.5)[:, None] ** 3, {})
     between = np.linspace(0.0, 1.0, 333)
-    off = {cell: np.abs(at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)}
+    off = {
+        cell: np.abs(values_at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)
+    }
     assert off[0.5] < 1e-12 < 1e-7 < off[0.0]
 
 
@@ -176,6 +178,14 @@ def test_a_recommendation_holds_beside_another_solver():
 def test_what_cannot_be_asked_is_one_message(tolerance, quantity, message):
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         price(build(RELEASE), tolerance, quantity, ("reference",))
+
+
+@pytest.mark.parametrize("step", [1e-3, 2.5e-4])
+def test_the_first_part_of_a_run_need_not_be_steps_of_the_scene(step):
+    """Of 5 s the first third is searched, which 1 ms and 0.25 ms do not divide."""
+    road = {"road": {"source": "iso8608", "road_class": "A", "speed": 15.0}}
+    scene = priced_scene(build(RELEASE | {"run": {"duration": 5.0, "step": step}, "effects": road}), None, ("mujoco",))
+    assert scene.unit == "N" and scene.first == pytest.approx(5.0 / 3.0)
 
 
 def test_a_tolerance_below_rounding_is_refused():

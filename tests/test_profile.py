@@ -26,7 +26,7 @@ def stack(*calls):
         ([("run", "models/engines/exudyn.py"), ("_SolveDynamic", "exudyn/solver.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("force", "models/engines/exudyn.py")], "forces asked for by exudyn"),
         ([("__init__", "models/engines/free_vehicle_mujoco.py")], "building in mujoco"),
-        ([("run", "models/systems/braking/march.py")], profile.BESIDE),
+        ([("run", "models/systems/braking/march.py")], profile.BESIDE_ENGINES),
         ([("run", "models/systems/braking/march.py"), ("_moved", "models/engines/exudyn.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS),
         ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS),
@@ -35,7 +35,7 @@ def stack(*calls):
     ],
 )
 def test_the_innermost_call_that_tells_decides(calls, part):
-    assert profile.part_of(stack(*calls)) == part
+    assert profile.part_of_run(stack(*calls)) == part
 
 
 def test_all_the_time_of_the_work_is_told_and_no_more():

@@ -71,8 +71,8 @@ def test_the_constraints_are_plain_pins():
 
 
 def test_the_effect_of_the_pages_is_one_file(new_file):
-    from validation.absence.of_systems import added, declared
+    from validation.absence.of_systems import added_counts, declared
 
     new_file("handling", "side_wind", of_page("how-to/own_effect.md", "python", "def extend"))
-    assert added("handling", "side_wind", quick=True) == declared("handling", "side_wind", ["mujoco"])
+    assert added_counts("handling", "side_wind", quick=True) == declared("handling", "side_wind", ["mujoco"])
     assert declared("handling", "side_wind", ["mujoco"]) == {"mujoco": {"pushes": 1}}

@@ -14,7 +14,7 @@ from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import truth
 from models.core.errors import InputError, RunFailed
 from validation.cases import recommendation as case
-from validation.faults.advice import LOOSE, Swing
+from validation.faults.advice import LOOSE_TOLERANCE, Swing
 from validation.price.unseen import Verdict, slower
 
 GOOD = Verdict("a scene", "mujoco RK4", "2 ms", 1.0, 0.5, 0.5, 0.01, False)
@@ -41,7 +41,7 @@ class Torn(Whole):
 
 
 def test_an_engine_that_fails_is_named_and_the_other_one_recommended():
-    found = recommend(Torn(), LOOSE)
+    found = recommend(Torn(), LOOSE_TOLERANCE)
     assert {one.tried.setting.engine for one in found.winners.values()} == {"mujoco"}
     text = "\n".join(lines(found))
     assert "Exudyn RK4" in text and "the solver gave up" in text
@@ -71,7 +71,7 @@ def test_a_refused_scene_is_drawn_anew_and_told(refusing, tmp_path):
 
 
 def test_one_that_is_refused_again_and_again_is_not_held(refusing, tmp_path, monkeypatch):
-    monkeypatch.setattr(case, "SPARE", 1)
+    monkeypatch.setattr(case, "REDRAWS", 1)
     found, refused = case.judged("pitch-plane", 5, tmp_path)
     rows = {row.id: row for row in case._rows([found, *[[GOOD]] * 9], refused)}
     assert found == [] and rows["recommendation.met"].value == 0.9
@@ -100,12 +100,12 @@ def test_a_recommendation_that_is_slow_by_the_clock_misses_an_aim_and_fails_no_r
 
 
 def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
-    real = recommendation._timed
-    whole = recommend(Whole(), LOOSE)
+    real = recommendation._timed_settings
+    whole = recommend(Whole(), LOOSE_TOLERANCE)
     monkeypatch.setattr(
-        recommendation, "_timed", lambda search: [one for one in real(search) if not one.tried.setting.default]
+        recommendation, "_timed_settings", lambda search: [one for one in real(search) if not one.tried.setting.default]
     )
-    forgot = recommend(Whole(), LOOSE)
+    forgot = recommend(Whole(), LOOSE_TOLERANCE)
     said = [
         any(slower(own, key, one) for key, one in own.winners.items() if key[1] == "calls") for own in (whole, forgot)
     ]
@@ -115,8 +115,8 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
 def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
     own = Whole()
     quick = Tried(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
-    search = Search(own, truth(own, LOOSE, own.whole), LOOSE, own.whole, [quick])
-    rough = Tried(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE, 10, 8.0)
+    search = Search(own, truth(own, LOOSE_TOLERANCE, own.whole), LOOSE_TOLERANCE, own.whole, [quick])
+    rough = Tried(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
     ladder = own.ladders()[2]
     assert not search._too_long(ladder, 0, rough)  # 8 s
     assert search._too_long(ladder, 2, rough)  # 24 s

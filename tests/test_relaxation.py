@@ -10,9 +10,9 @@ import pytest
 from models.brake.controller import AllApplied
 from models.brake.plane_vehicle import PAPER, truck
 from models.brake.relaxation import DAMPING, Lag, lag_on, longest_step, taken_up
-from models.brake.surfaces import EVEN, OnRoad
+from models.brake.surfaces import UNIFORM_ROAD, OnRoad
 from models.systems.braking.procedures import ready
-from models.systems.braking.run import carried
+from models.systems.braking.run import marched_by
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
@@ -45,7 +45,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
     vehicle, start = ready(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
-    return carried(vehicle, engine).run(AllApplied(4), start, duration)
+    return marched_by(vehicle, engine).run(AllApplied(4), start, duration)
 
 
 def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():
@@ -68,7 +68,7 @@ def test_it_damps_at_rest():
     # a wheel's share of a mass on its tyre alone, at rest along it and pushed aside at 0.3 m/s
     plane, slope, step = truck(PAPER), surface("ice").cornering, 5.5e-3
     lag, lagging, state = Lag(np.full(4, 0.3), np.zeros(4)), np.zeros(4), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
-    vehicle, way = OnRoad(plane, np.zeros(4, dtype=int), slope, stacked([surface("ice")]), EVEN), 0.0
+    vehicle, way = OnRoad(plane, np.zeros(4, dtype=int), slope, stacked([surface("ice")]), UNIFORM_ROAD), 0.0
     for _ in range(round(2.0 / step)):
         for half in (True, False):
             lag_on(state, 0.5 * step, np.zeros(4), vehicle, lag, lagging)

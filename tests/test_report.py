@@ -15,7 +15,7 @@ import pytest
 from models.core.errors import InputError
 from validation.cases import point_mass
 from validation.common.changes import changes
-from validation.common.changes import read as read_earlier
+from validation.common.changes import read_results as read_earlier
 from validation.common.rows import STATUSES, Observed, Row, behaves, not_run
 from validation.report import page as report
 from validation.report import shares
@@ -163,7 +163,7 @@ def test_drawn_again_elsewhere_by_a_new_process_from_saved_files_it_is_the_same_
 def test_a_quick_report_tells_its_share_of_the_last_full_one(folder, tmp_path, monkeypatch):
     kept = tmp_path / "full_report.json"
     kept.write_text('{"order": {"rows": {"pitch-plane": 7}, "seconds": 30.0, "commit": "abc"}}')
-    monkeypatch.setattr(shares, "KEPT", kept)
+    monkeypatch.setattr(shares, "KEPT_REPORT", kept)
     with pytest.raises(InputError, match="full report"):
         shares.keep(folder)
     results = report.read(folder / "results.json")

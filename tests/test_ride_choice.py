@@ -12,7 +12,7 @@ from models.advice.ride_choice.march import March
 from models.advice.ride_choice.marched import confirms, marched
 from models.advice.ride_choice.modes import stable_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
-from models.advice.ride_choice.parameters import changed
+from models.advice.ride_choice.parameters import scaled_vehicle
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.errors import InputError
@@ -278,7 +278,7 @@ def test_spectra_near_a_scene_are_those_of_the_exact_solve():
     for factors in ({}, corner):
         found = near.changes(rest, factors)
         for i in (0, len(near.speeds) // 2):
-            full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (drew.scene, rest))
+            full, left = (replace(one, vehicle=scaled_vehicle(one.vehicle, factors)) for one in (drew.scene, rest))
             whole = FullScene(full, float(near.speeds[i]))
             exact = np.sqrt(confirmed(whole.reduced(left), rows) / confirmed(whole.full, rows)) - 1
             assert found[i] == pytest.approx(exact, abs=2e-4)  # what the panels leave

@@ -14,9 +14,9 @@ from models.advice.choice.variants import Variants
 from models.advice.price import effects
 from models.advice.price.effects import price_list
 from models.advice.price.effects_text import lines
-from models.advice.ride_choice.in_time import FEWEST, left
+from models.advice.ride_choice.in_time import FEWEST_COPIES, reduced_vehicle
 from models.core.errors import InputError
-from models.ride.statistical_linearisation import bent
+from models.ride.statistical_linearisation import nonlinear_springs
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
@@ -72,9 +72,9 @@ def test_longer_steps_meet_the_same_roads():
 def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     whole = opened(quarter_car())
     rest = whole.without(LAWS)
-    (spring,) = bent(whole.vehicle(whole.paces[0]))
+    (spring,) = nonlinear_springs(whole.vehicle(whole.paces[0]))
     (gains,) = rest.vehicle(rest.paces[0]).springs
-    assert not bent(rest.vehicle(rest.paces[0])) and rest.named == ("body z",)
+    assert not nonlinear_springs(rest.vehicle(rest.paces[0])) and rest.named == ("body z",)
     k, c = whole.paces[0].springs[spring.name].gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
@@ -85,7 +85,7 @@ def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
     vehicle = load_vehicle("r19_ride")
     names = frozenset(spring.name for spring in vehicle.springs if spring.first_body == "engine")
     scene = quarter_car(vehicle={"file": "r19_ride"}, quantities=["body centre"])
-    found = left(ReducedScene(scene, vehicle, rigid=names), {})
+    found = reduced_vehicle(ReducedScene(scene, vehicle, rigid=names), {})
     assert len(found.coordinates()) == len(vehicle.coordinates()) - 6
     before, after = (linearise(own) for own in (vehicle, found))
     mass = sum(body.mass for body in vehicle.bodies if body.name in ("engine", "body"))
@@ -121,7 +121,7 @@ def test_what_a_search_may_take_is_shown_beforehand(twinrig, capsys):
 def test_a_choice_that_chance_alone_could_break_is_refused():
     asked = drawn_bent(4)
     with pytest.raises(InputError, match="times as many samples would tell"):
-        Chooser(asked.opened(FEWEST), "reference", list(asked.quantities), 0.005).choose()
+        Chooser(asked.opened(FEWEST_COPIES), "reference", list(asked.quantities), 0.005).choose()
 
 
 def test_a_quantity_that_one_sample_makes_up_is_refused():

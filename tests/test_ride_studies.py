@@ -286,7 +286,7 @@ def test_engines_follow_springs_where_they_are_steep(monkeypatch):
         steps.append(path.step)
         raise Ridden
 
-    monkeypatch.setattr(nonlinear, "driven", driven)
+    monkeypatch.setattr(nonlinear, "ride_over", driven)
     for vehicle in (own, steep):
         with pytest.raises(Ridden):
             nonlinear.in_engine(scene, "mujoco", vehicle, nonlinear.Sampling(speed=20.0))

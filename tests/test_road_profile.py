@@ -35,6 +35,7 @@ def written_out(s, gd):
     return -(10 * x**3 - 15 * x**4 + 6 * x**5) * total
 
 
+@pytest.mark.grounds("written equations")
 @pytest.mark.parametrize("gd", [STUDY_GD, 6e-4])
 def test_study_road_is_its_definition(gd):
     stations = [-2.0, 0.0, 0.3, 7.0, 39.9, 40.0, 41.0, 200.0, 1199.0]
@@ -216,6 +217,7 @@ def test_profiles_cannot_be_changed():
         road.amplitude[0] = 1.0
 
 
+@pytest.mark.grounds("published")
 @pytest.mark.parametrize(("level", "factor"), [("one-sided", 1.0), ("two-sided", 2.0)])
 def test_power_of_a_class_is_the_integral_of_its_density(level, factor):
     road = iso8608_road("C", 3, n_min=0.05, n_max=1.5, waves=40, level=level)

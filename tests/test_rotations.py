@@ -23,6 +23,7 @@ def tight(end):
     return solve_ivp(slope, (0, end), [1.0, 0, 0, 0], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
 
 
+@pytest.mark.grounds("written equations")
 def test_matrix_is_the_papers_equation_21():
     for q in SOME[:20]:
         a, b, c, d = q
@@ -34,12 +35,14 @@ def test_matrix_is_the_papers_equation_21():
         assert np.abs(r.matrix(q) - wanted).max() < 1e-15
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_matrix_agrees_with_scipy_and_comes_back():
     assert np.abs(r.matrix(SOME) - Rotation.from_quat(SOME, scalar_first=True).as_matrix()).max() < 2e-15
     back = r.from_matrix(r.matrix(SOME))
     assert np.abs(back * np.sign(SOME[:, :1]) - SOME).max() < 2e-15
 
 
+@pytest.mark.grounds("closed form")
 def test_product_logarithm_and_conjugate():
     p, q = SOME[:100], SOME[100:]
     assert np.abs(r.matrix(r.product(p, q)) - r.matrix(p) @ r.matrix(q)).max() < 3e-15
@@ -49,6 +52,7 @@ def test_product_logarithm_and_conjugate():
         assert np.abs(r.logarithm(-r.exponential(turn)) - turn).max() < 4e-16 * max(size, 1e-12) * 10
 
 
+@pytest.mark.grounds("closed form")
 def test_skew_is_the_vector_product():
     v, x = RANDOM.normal(size=(2, 7, 3))
     assert np.allclose(np.einsum("nij,nj->ni", r.skew(v), x), np.cross(v, x), rtol=0, atol=1e-15)
@@ -79,6 +83,7 @@ def test_several_bodies_at_once_are_the_same_as_one():
     assert np.array_equal(together, np.stack(alone, axis=1))
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_cardan_angles_go_there_and_back():
     angles = RANDOM.uniform([-3.1, -1.5, -3.1], [3.1, 1.5, 3.1], (500, 3))
     assert np.abs(r.cardan(r.from_cardan(*angles.T)) - angles).max() < 1e-13  # cos(pitch) > 0.07

@@ -10,11 +10,11 @@ from models.advice.choice.choose import Choice, Chooser
 from models.advice.choice.variants import Variants
 from models.advice.price import Answer, Ladder
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import SettingChoice, _over_all, recommend
+from models.advice.price.recommendation import SettingChoice, _valid_over_run, recommend
 from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 from models.ensemble.workers import processes
 from models.identification.fit import fit
 from models.identification.problem import FAILED, Clock, Parameter, Problem, measured_channel
@@ -44,12 +44,12 @@ def halved(number):
 
 @CREWS
 def test_errors_of_workers_are_those_of_this_process(pool):
-    assert each_of(halved, range(0, 40, 2), pool) == list(range(20)) and each_of(halved, [], pool) == []
+    assert block_results(halved, range(0, 40, 2), pool) == list(range(20)) and block_results(halved, [], pool) == []
     for numbers, kind in (([2, 3, 7, 5], InputError), ([2, 4, 7, 3], RunFailed)):
         told = []
         for executor in (None, pool):
             with pytest.raises(kind) as error:
-                each_of(halved, numbers, executor)
+                block_results(halved, numbers, executor)
             told.append((str(error.value), vars(error.value)))
         assert told[0] == told[1] and ("= 3" in told[0][0] or "seven" in told[0][0])
 
@@ -190,7 +190,7 @@ def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
     for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
         tried = Tried(ladder.setting(i), "ok", seconds=0.5, calls=10)
         blocks.append((ladder, SettingChoice(tried, 0.0, 10, 0.5, False, (0.4, 0.5, 0.6))))
-    here, there = (each_of(partial(_over_all, over), blocks, executor) for executor in (None, pool))
+    here, there = (block_results(partial(_valid_over_run, over), blocks, executor) for executor in (None, pool))
     assert here == there and all(each.choice.confirmed and each.choice.error < 1e-2 for each in here)
     assert here[0].choice.seconds == 0.5 * STEPS[2] / here[0].choice.tried.setting.value > 0.5
 

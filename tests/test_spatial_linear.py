@@ -175,6 +175,7 @@ def loaded():
     return vehicle, np.array(forces), linearise(vehicle)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_stiffness_is_the_curvature_of_the_energy(loaded):
     vehicle, held, linear = loaded
     n = len(linear.mass)
@@ -186,12 +187,14 @@ def test_stiffness_is_the_curvature_of_the_energy(loaded):
     assert np.abs(turning).max() > 100.0
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_design_position_is_the_equilibrium(loaded):
     vehicle, held, linear = loaded
     slope = gradient(lambda q: held_energy(vehicle, held, q), len(linear.mass))
     assert np.abs(slope).max() < 1e-7  # of 7 kN: rounding of 5 kJ over 1e-3 leaves 1e-9
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_damping_is_that_of_the_rates(loaded):
     vehicle, _, linear = loaded
     rows = gradient(lambda q: deformations(vehicle, q), len(linear.mass))
@@ -199,6 +202,7 @@ def test_damping_is_that_of_the_rates(loaded):
     np.testing.assert_allclose(linear.damping, expected, atol=1e-10 * np.abs(expected).max(), rtol=0)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_mass_is_that_of_the_kinetic_energy(loaded):
     vehicle, _, linear = loaded
     n, expected = len(linear.mass), 0.0
@@ -210,6 +214,7 @@ def test_mass_is_that_of_the_kinetic_energy(loaded):
     np.testing.assert_allclose(linear.mass, expected, atol=1e-10 * np.abs(expected).max(), rtol=0)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_outputs_and_road(loaded):
     vehicle, _, linear = loaded
     n = len(linear.mass)
@@ -237,6 +242,7 @@ def test_outputs_and_road(loaded):
     assert (moment.unit, force.unit, roll.unit, s.unit) == ("N m", "N", "rad/s^2", "m")
 
 
+@pytest.mark.grounds("closed form")
 def test_wheel_loads_carry_the_weight():
     held = preloads(replace(load_vehicle("three_axle_truck"), gravity=9.81))
     vehicle = load_vehicle("three_axle_truck")
@@ -246,6 +252,7 @@ def test_wheel_loads_carry_the_weight():
     assert moment == pytest.approx(9.81 * sum(b.mass * b.position[0] for b in vehicle.bodies), rel=1e-11)
 
 
+@pytest.mark.grounds("closed form")
 def test_side_force_and_drag():
     """A body of six freedoms on one tyre: rows written out by hand, F = C (steer + yaw - y' / v)."""
     body = Body("body", 10.0, (0.2, 0.0, 0.5), FREEDOMS, ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)))

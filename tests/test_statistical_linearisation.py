@@ -13,7 +13,7 @@ from models.ride.frequency import standard_errors
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time, laws_of
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import GRADES, bent, promised, statistically_linear
+from models.ride.statistical_linearisation import GRADES, nonlinear_springs, promised, statistically_linear
 from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
 from models.systems.ride.nonlinear import ridden
 from models.vehicles.spatial import Curve
@@ -104,7 +104,7 @@ def test_sentences_say_when_the_covariance_is_no_longer_good():
 
 
 def test_no_fixed_point_is_told(monkeypatch):
-    monkeypatch.setattr("models.ride.statistical_linearisation.MOST", 3)
+    monkeypatch.setattr("models.ride.statistical_linearisation.MOST_ROUNDS", 3)
     with pytest.raises(RunFailed, match="no one way to move"):
         statistically_linear(*ride(NONLINEAR), SPEED)
 
@@ -176,7 +176,7 @@ def test_a_copy_goes_where_an_engine_goes():
     vehicle, excitation_ = ride(NONLINEAR, 16.0)
     road = road_path(excitation_, SPEED, 1e-3)
     run, table = ridden("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
-    springs = bent(vehicle)
+    springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, x = laws_of(vehicle, plain, springs, SPEED), np.zeros((4, 1))
     sums, force, rate = np.zeros((4, len(plain.outputs), 1)), np.empty((1, 1)), np.empty((4, 1))
@@ -194,7 +194,7 @@ def test_copies_side_by_side_go_where_each_goes_alone():
     """As many as two and a bit of the blocks that are stepped together, by bits: all do the same sums."""
     vehicle, excitation_ = ride(NONLINEAR, 16.0)
     road, copies = road_path(excitation_, SPEED, 1e-3), 2 * TOGETHER + 3
-    springs = bent(vehicle)
+    springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, roads = laws_of(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
     x, sums = np.zeros((4, copies)), np.zeros((4, len(plain.outputs), copies))

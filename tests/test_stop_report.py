@@ -6,6 +6,7 @@ import pytest
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.stop_report import Stop
 
+pytestmark = pytest.mark.grounds("closed form")
 SPEED, RADIUS, SLIP, STEP = 15.0, 60.0, 0.04, 1e-3
 
 

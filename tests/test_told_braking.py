@@ -10,7 +10,7 @@ from models.core.assumptions import broken_of
 from models.core.discretisation import errors_of
 from models.core.scene_file import parse
 from models.systems.braking import errors
-from models.systems.braking.errors import observed, whole
+from models.systems.braking.errors import motion_and_distance, observed
 from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import describe
 from models.systems.braking.run import run
@@ -100,7 +100,7 @@ def test_the_error_is_that_against_a_hundred_times_finer_steps(name):
     told = run(odd, error=True)
     steps = odd.run.model_copy(update={"substeps": 100 * odd.run.substeps})
     truth = run(odd.model_copy(update={"run": steps})).detail
-    fine, exact = whole(told.detail, told.times), whole(truth, told.times)
+    fine, exact = motion_and_distance(told.detail, told.times), motion_and_distance(truth, told.times)
     for channel in ("x", "speed"):
         true = float(np.sqrt(np.mean((fine[channel] - exact[channel]) ** 2)))
         assert true <= 3.0 * errors_of(told)[channel].error, channel
@@ -117,8 +117,8 @@ def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
     cycling = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 2})})
     finer = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 64})})
     assert errors_of(run(cycling, error=True)) == {}
-    monkeypatch.setattr(errors, "alike", lambda path, other: True)
-    monkeypatch.setattr(errors, "near", lambda *given: False)
+    monkeypatch.setattr(errors, "same_commands", lambda path, other: True)
+    monkeypatch.setattr(errors, "other_command_nearby", lambda *given: False)
     told, truth = run(cycling, error=True), run(finer).detail
     true = abs(float(Stop(told.detail).way[-1] - Stop(truth).way[-1]))
     assert true > 10.0 * errors_of(told)["stopping distance"].error

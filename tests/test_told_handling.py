@@ -91,7 +91,7 @@ def test_an_estimate_without_the_net_would_be_caught(monkeypatch):
     """Planted fault: steps alone tell a thousandth of what the net errs by."""
     own = scene(1e-3, 7, steer=[[0.05, 0.0], [0.4, 0.05]], duration=0.4)
     whole = errors_of(run(own, "mujoco", error=True))["fy"]
-    monkeypatch.setattr(module, "summed", lambda step, net: step)
+    monkeypatch.setattr(module, "summed_error", lambda step, net: step)
     assert errors_of(run(own, "mujoco", error=True))["fy"].error < 0.01 * whole.error
 
 
@@ -106,8 +106,8 @@ def test_few_cells_are_a_warning_with_those_to_use():
 
 def test_no_error_costs_no_run(monkeypatch):
     calls = []
-    march = module.driven
-    monkeypatch.setattr(module, "driven", lambda *told: calls.append(told) or march(*told))
+    march = module.drive_run
+    monkeypatch.setattr(module, "drive_run", lambda *told: calls.append(told) or march(*told))
     assert errors_of(run(scene(), "mujoco")) == {} and len(calls) == 1
 
 

@@ -18,7 +18,7 @@ from models.systems.pitch_plane.scene import build
 from studies.choice import chosen, lines
 from studies.command import sweep
 from studies.command.comparison import compare, report
-from studies.command.sweep_figure import BROKEN, WARNING, Swept, draw
+from studies.command.sweep_figure import BROKEN, WARNING, Swept, draw_sweep
 from studies.command_line import app
 from validation.cases import stated_errors
 from validation.common.grounds import allowing
@@ -64,7 +64,7 @@ def pressing():
 
 def test_a_sweep_tells_in_table_columns_json_and_code(tmp_path, monkeypatch, capsys):
     (tmp_path / "s.toml").write_text(SCENE)
-    monkeypatch.setattr(sweep, "draw", lambda swept, folder: [])
+    monkeypatch.setattr(sweep, "draw_sweep", lambda swept, folder: [])
     asked = [str(tmp_path / "s.toml"), "--engine", "reference", "--sweep", "effects.road.speed=5,20", "--strict"]
     asked += ["--workers", "1"]
     with pytest.raises(SystemExit) as ended:
@@ -92,7 +92,7 @@ def test_curves_have_marks_at_the_points_of_their_own_engine(tmp_path, monkeypat
     swept = Swept("s.toml", "k", (1, 2), columns, [{}, {}], results)
     seen = []
     monkeypatch.setattr("studies.command.sweep_figure.save", lambda figure, path: seen.append(figure))
-    draw(swept, tmp_path)
+    draw_sweep(swept, tmp_path)
     marks = {line.get_label(): line.get_xydata().tolist() for line in seen[0].axes[0].lines}
     assert marks[WARNING["label"]] == [[2.0, 2.5]] and [2.0, 2.5] in marks[BROKEN["label"]]
     assert swept.broken("reference") == [1] and swept.warned("reference") == []

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named, without
+from models.core.scene_effects import named_effects, without
 from models.engines.free_vehicle import built_share, free_model
 from models.engines.towed_springs import divided, numbers_beside
 from models.multibody import forces as at
@@ -16,7 +16,7 @@ from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.energy import energy, unaccounted
 from models.systems.handling.plan import describe
 from models.systems.handling.run import build as build_model
-from models.systems.handling.run import driven, driven_by, run
+from models.systems.handling.run import drive_run, driven_by, run
 from models.systems.handling.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
@@ -60,7 +60,7 @@ def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_ca
 
 
 def test_energy_is_accounted_for():
-    drive = driven("mujoco", Handling(train(), controls=TURN), 20.0, 0.04)
+    drive = drive_run("mujoco", Handling(train(), controls=TURN), 20.0, 0.04)
     assert np.abs(unaccounted(drive)).max() < 1e-7 * energy(drive)[0]
 
 
@@ -75,7 +75,7 @@ def test_wheels_of_a_trailer_are_not_driven_nor_steered_and_brake_with_those_beh
 
 def test_a_scene_names_its_trailer_and_runs_in_both_engines():
     towing = scene()
-    assert "trailer" in named(towing) and "trailer" not in named(without(towing, "trailer"))
+    assert "trailer" in named_effects(towing) and "trailer" not in named_effects(without(towing, "trailer"))
     assert "caravan, towed by body at (-2.4, 0, 0.43) m, turns rx ry rz; 582 N on it" in describe(towing)
     ours, theirs = (run(towing, engine) for engine in ("mujoco", "exudyn"))
     assert np.abs(ours["positions"] - theirs["positions"]).max() < 1e-12
@@ -84,7 +84,7 @@ def test_a_scene_names_its_trailer_and_runs_in_both_engines():
 def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
     (tmp_path / "mine.toml").write_text((SHIPPED / "r19_caravan.toml").read_text())
     towing = scene(vehicle={"file": str(tmp_path / "mine.toml")})
-    assert "trailer" in named(towing)
+    assert "trailer" in named_effects(towing)
     with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):
         without(towing, "trailer")
 
@@ -108,7 +108,7 @@ def test_a_train_that_jackknifes_is_no_result():
     """A caravan that is backed up folds."""
     car = Handling(caravan(), Tyres(friction=1.2), Controls(steer=((0.0, 0.1), (0.1, 0.12))))
     with pytest.raises(RunFailed, match=r"jackknifes: a trailer turns by more than 1\.57 rad .* 'caravan'"):
-        driven("mujoco", car, -4.0, 3.0)
+        drive_run("mujoco", car, -4.0, 3.0)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from models.road.shape_filter import ShapeFilter
 from models.road.two_track import (
     CASES,
     FRONT_REAR,
-    LEFT_RIGHT,
+    TRACK_CORRELATIONS,
     TwoTrackRoad,
     excitation,
     half_track,
@@ -49,7 +49,7 @@ def test_equal_tracks_are_those_of_the_left():
     assert heights.tolist() == [abs(wheel.y) for wheel in WHEELS]
 
 
-@pytest.mark.parametrize("case", list(itertools.product(LEFT_RIGHT, FRONT_REAR)))
+@pytest.mark.parametrize("case", list(itertools.product(TRACK_CORRELATIONS, FRONT_REAR)))
 def test_delayed_noise_gives_the_delayed_output(case):
     """Also the pairs that are none of the paper's five."""
     by_noise, by_output = (

@@ -74,6 +74,7 @@ def built(text):
     return build_vehicle(tomllib.loads(text), "car.toml")
 
 
+@pytest.mark.grounds("closed form")
 def test_the_example_means_what_it_says():
     linear = linearise(built(EXAMPLE))
     assert linear.coordinates == (("body", "z"), ("body", "ry"), ("front wheel", "z"), ("rear wheel", "z"))
@@ -87,6 +88,7 @@ def test_the_example_means_what_it_says():
     np.testing.assert_allclose(linear.outputs[2].road_factors, [190e3, 0])
 
 
+@pytest.mark.grounds("closed form")
 def test_every_table_is_built():
     vehicle = built(FULL)
     springs = {spring.name: spring for spring in vehicle.springs}
@@ -100,6 +102,15 @@ def test_every_table_is_built():
     (side,) = vehicle.side_forces
     assert (side.body, side.point, side.roll_steer) == ("body", (1.2, 0.7, 0.0), 0.05)
     assert vehicle.bars[0].track == 1.4
+    bar, seat, tyre = vehicle.bars[0], springs["driver"], vehicle.tyres[1]
+    assert (bar.stiffness, bar.damping, bar.point_left, bar.point_right) == (
+        5e3,
+        0,
+        (1.2, 0.7, 0.31),
+        (1.2, -0.7, 0.31),
+    )
+    assert (seat.stiffness, seat.damping, seat.first_point, seat.second_point) == (1e4, 500, *[(0, 0.3, 0.6)] * 2)
+    assert (tyre.stiffness, tyre.damping, tyre.point) == (190e3, 10, (1.2, -0.7, 0.31))
     assert vehicle.drags[0].coefficient == 0.5
     assert vehicle.outputs[1].axis == (1, 0, 0)
     assert linearise(vehicle, 10.0).stiffness.shape == (12, 12)

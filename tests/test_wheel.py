@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from studies.command.asked import SCENES
-from validation.replay.jobs import SHORTER
+from validation.replay.jobs import SHORT_RUN_SETTINGS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("models", "studies", "validation", "twinrig")
-LESS = tomllib.loads(SHORTER.read_text())
+LESS = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
 NAMES = sorted(path.stem for path in SCENES.glob("*.toml"))
 
 pytestmark = pytest.mark.full

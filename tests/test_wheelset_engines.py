@@ -15,7 +15,7 @@ from models.rail import equations as eq
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.equations import Equations
 from models.rail.joint_forces import from_joints, joint_forces, to_joints
-from models.rail.limit_cycle import attained, refined, solved
+from models.rail.limit_cycle import attained, refined, solved_orbit
 from models.rail.linear import critical_speed
 from models.rail.wheelset import CHOSEN
 
@@ -104,9 +104,9 @@ def test_what_cannot_be_is_refused(engine):
 @both
 def test_limit_cycle(engine):
     expected = attained(Equations(CHOSEN, 75.0, cells=11))
-    slower = solved(replace(expected, equations=Equations(CHOSEN, 74.5, cells=11)), "amplitude")
+    slower = solved_orbit(replace(expected, equations=Equations(CHOSEN, 74.5, cells=11)), "amplitude")
     guess = replace(slower, equations=engine(CHOSEN, 75.0, cells=11))
-    found = refined(solved(guess, "amplitude", precise=False), "amplitude")
+    found = refined(solved_orbit(guess, "amplitude", precise=False), "amplitude")
     half = refined(expected, "amplitude")
     assert found.amplitude - slower.amplitude > 1e-5
     assert abs(found.amplitude - half.amplitude) <= half.error < 1e-2 * half.amplitude

@@ -9,12 +9,12 @@ import pytest
 
 from models.core.assumptions import broken_of
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named, without
+from models.core.scene_effects import named_effects, without
 from models.rail import equations as eq
-from models.rail.eigenvalues import free, growth
+from models.rail.eigenvalues import free_wheelset, growth
 from models.rail.equations import Equations
-from models.rail.flange_climbing import nadal, shares
-from models.rail.limit_cycle import attained, beginning, branch, refined, solved
+from models.rail.flange_climbing import bound_shares, nadal
+from models.rail.limit_cycle import attained, beginning, branch, refined, solved_orbit
 from models.rail.linear import NoCriticalSpeed, critical_or_why, critical_speed
 from models.rail.wheelset import CHOSEN
 from models.systems.wheelset import plan
@@ -128,7 +128,7 @@ def test_the_study_saves_what_it_says(tmp_path):
 
 def test_no_critical_speed_is_told_apart():
     with pytest.raises(NoCriticalSpeed) as told:
-        critical_speed(free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4), partial(growth, Equations))
+        critical_speed(free_wheelset(CHOSEN).changed(mass=1e4, yaw_inertia=3e4), partial(growth, Equations))
     assert told.value.unstable
 
 
@@ -147,7 +147,7 @@ def test_orbits_that_are_none():
     assert attained(Equations(CHOSEN, 40.0, cells=7), start=1e-3) is None
     orbit = attained(Equations(CHOSEN, 75.0, cells=7))
     with pytest.raises(RunFailed, match="no periodic motion"):
-        solved(replace(orbit, equations=Equations(CHOSEN, 20.0, cells=7)), "amplitude")
+        solved_orbit(replace(orbit, equations=Equations(CHOSEN, 20.0, cells=7)), "amplitude")
 
 
 def test_what_the_scene_does_not_name_is_absent():
@@ -165,7 +165,7 @@ def test_limit_of_climbing() -> None:
     """Without friction a flange climbs only beyond the tangent of its angle; a wheel without load climbs at once."""
     assert nadal(0.0) == pytest.approx(np.tan(np.radians(70.0)), rel=1e-15)
     force, load = np.array([0.0, 0.0, -2e4, 1e3]), np.array([0.0, 1e4, 1e4, 0.0])
-    assert shares(force, load).tolist() == [0.0, 0.0, 2.0, np.inf]
+    assert bound_shares(force, load).tolist() == [0.0, 0.0, 2.0, np.inf]
 
 
 def test_the_flange_of_a_cone_is_not_silently_unread_beside_profiles() -> None:
@@ -179,7 +179,7 @@ def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tm
     lines = "\n".join(f"{key} = {value!r}" for key, value in values.items())
     (tmp_path / "own.toml").write_text(f"{lines}\n[profiles]\nwheel = 'S1002'\n")
     own = scene(wheelset={"parameters": str(tmp_path / "own.toml")})
-    assert "profiles" in named(own) and "flange" not in named(own)
+    assert "profiles" in named_effects(own) and "flange" not in named_effects(own)
     with pytest.raises(InputError, match=r"wheelset.parameters = .*has profiles: name a file without them"):
         without(own, "profiles")
 

@@ -59,7 +59,7 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
     """The checked scene of a table with changes of dotted keys; the table itself stays as it is."""
     from models.core.scene_file import set_key
     from models.core.systems import of_table as checked
-    from studies.command.asked import KNOWN
+    from studies.command.asked import KNOWN_SYSTEMS
 
     if not isinstance(changes, Mapping):
         raise InputError("set", "", changes, 'must be a table of dotted keys, for example {"run.step": 5e-4}')
@@ -67,7 +67,7 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
     file = file + CHANGED if changes and not file.endswith(CHANGED) else file
     for key, value in changes.items():
         set_key(changed, str(key), plain(value))
-    return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN))
+    return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN_SYSTEMS))
 
 
 def plain(value: Any) -> Any:

@@ -38,10 +38,10 @@ TOLERANCE = 1e-9
 """Asked of a method that keeps one."""
 LOOSE = 1e-4
 """Largest state error (m, rad, m/s, rad/s) of a method of order 4 or more at 1 ms; RK4 has 1e-6."""
-EXACT = 1e-11
+ROUNDING_ERROR = 1e-11
 """Errors below this are rounding, in which no order shows."""
 
-KEPT = 1e3 * TOLERANCE
+EXACT_BOUND = 1e3 * TOLERANCE
 """Bound, in SI or as a share, of what is exact to rounding in fixed steps, for a method that keeps a tolerance."""
 BY_STEPS = ("of the error at the double step", "orders lost")
 """Units of hard cases that compare two steps: they say nothing of a method that keeps a tolerance, or of low order."""
@@ -141,7 +141,7 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
         "equilibrium",
         "distance from the static equilibrium on a flat road",
         "m, rad, m/s, rad/s",
-        KEPT if _adaptive(name) else 1e-9,
+        EXACT_BOUND if _adaptive(name) else 1e-9,
         "nothing moves what is at rest, beyond a kept tolerance",
         partial(_at_rest, name, settings),
     )
@@ -233,7 +233,7 @@ def _order(name: str, second: Independence) -> Row:
     def gap() -> float:
         truth = _reference_run(road, HALVED[-1])
         errors = [checks.state_gap(_run(name, road, _settings(name, step)), truth) for step in HALVED]
-        return 0.0 if errors[0] < EXACT else abs(float(np.log2(errors[0] / errors[1])) - declared)
+        return 0.0 if errors[0] < ROUNDING_ERROR else abs(float(np.log2(errors[0] / errors[1])) - declared)
 
     return _error_row("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
 
@@ -243,7 +243,7 @@ def _tightened(name: str, road: Assembly) -> float:
     errors = [
         checks.state_gap(_run(name, road, settings), _reference_run(road)) for settings in (loose, _settings(name))
     ]
-    return errors[1] / errors[0] if errors[0] > EXACT else 0.0
+    return errors[1] / errors[0] if errors[0] > ROUNDING_ERROR else 0.0
 
 
 def _guards(name: str, folder: Path) -> Row:
@@ -284,7 +284,7 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
                 yield not_run(id, SYSTEM, quantity, "compares steps of a method of order 4")
                 continue
             if _adaptive(name):
-                case = replace(case, tolerance=max(case.tolerance, KEPT))
+                case = replace(case, tolerance=max(case.tolerance, EXACT_BOUND))
             try:
                 outcome = judge(case, name, case_folder)
             except Exception as error:  # what foreign code leads to is a row, not the end of the table

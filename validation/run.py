@@ -44,14 +44,14 @@ SEEDED = (
     "validation.ride.fitted_roads",
 )
 """Modules beside the cases that draw at random by a seed of their own."""
-ALONE = {
+CASES_ALONE = {
     True: ("recommendation",),
     False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges", "stated_errors"),
 }
 """Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
 of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
 that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""
-KEPT = "cases"
+FINISHED_CASES = "cases"
 """Folder of finished cases."""
 
 Outcomes = dict[str, tuple[list[Row], float]]
@@ -113,7 +113,10 @@ def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None],
     def lost(cases: range, reason: str) -> Arrays:
         return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
 
-    store, blocks = job.folder / KEPT / ("alone" if alone else "together"), Blocks(1, 1) if alone else Blocks(1)
+    store, blocks = (
+        job.folder / FINISHED_CASES / ("alone" if alone else "together"),
+        Blocks(1, 1) if alone else Blocks(1),
+    )
     told = run_paths(job, len(job.names), store, pool, blocks, lambda done: progress(done.done), lost)["record"]
     records = (json.loads(str(each)) for each in told)
     return {
@@ -172,7 +175,7 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
     from rich.console import Console
     from rich.progress import Progress
 
-    alone = ALONE[quick]
+    alone = CASES_ALONE[quick]
     together = tuple(sorted((name for name in CASES if name not in alone), key=_last_duration, reverse=True))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))

@@ -23,17 +23,17 @@ from models.own_model.path import DURATION, LARGEST, file_path
 from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
-ALL = "all"
+ALL_COORDINATES = "all"
 """The quantity of all coordinates together."""
-PER_SECOND = (40, 50, 80, 100, 160, 200, 250, 400, 500, 800, 1000, 1600, 2000, 4000, 8000, 16000, 32000)
-STEPS = tuple(1.0 / n for n in PER_SECOND)
+STEPS_PER_SECOND = (40, 50, 80, 100, 160, 200, 250, 400, 500, 800, 1000, 1600, 2000, 4000, 8000, 16000, 32000)
+STEPS = tuple(1.0 / n for n in STEPS_PER_SECOND)
 """s: tried by every method."""
 METHODS = {
     "exudyn": ("RK44", "RK33", "ExplicitMidpoint", "ExplicitEuler", "GeneralizedAlpha", "TrapezoidalIndex2"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
 }
 STAGES = {"RK44": 4, "RK4": 4, "RK33": 3, "ExplicitMidpoint": 2}
-EXACT, TIGHT = "DOP853", 1e-10
+REFERENCE_METHOD, REFERENCE_TOLERANCE = "DOP853", 1e-10
 """Method of another family about the plain equations, and its relative tolerance."""
 USUAL_STEP = 5e-3
 """s: taken for Exudyn's default method, which has none of its own."""
@@ -59,7 +59,7 @@ class PricedModel:
     def columns(self) -> list[int]:
         """Coordinates that the quantity is."""
         places = named_coordinates(self.twin)
-        return [i for name, i in places.items() if self.quantity in (ALL, name)]
+        return [i for name, i in places.items() if self.quantity in (ALL_COORDINATES, name)]
 
     @property
     def unit(self) -> str:
@@ -94,11 +94,11 @@ class PricedModel:
 
     def second(self, last: Setting) -> Setting | None:
         """A Runge-Kutta method of order 8 about the plain equations."""
-        return Setting("reference", EXACT, last.value, 0)
+        return Setting("reference", REFERENCE_METHOD, last.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
-        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin.model, 1)
+        steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
         if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
             raise RunFailed(setting.engine, "the motion blows up at this step")
@@ -126,7 +126,16 @@ class PricedModel:
 
         times = step * np.arange(steps + 1)
         span, rows = (0.0, float(times[-1])), times[:: max(1, steps // 200)]
-        done = solve_ivp(rates, span, np.concatenate(start), EXACT, rows, dense_output=True, rtol=TIGHT, atol=TIGHT)
+        done = solve_ivp(
+            rates,
+            span,
+            np.concatenate(start),
+            REFERENCE_METHOD,
+            rows,
+            dense_output=True,
+            rtol=REFERENCE_TOLERANCE,
+            atol=REFERENCE_TOLERANCE,
+        )
         if not done.success:
             raise RunFailed("reference", done.message)
         states: np.ndarray = done.sol(times).T
@@ -148,13 +157,15 @@ def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommend
     """The cheapest settings of a model; InputError for what cannot be asked."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
-    if twin.driven.couplings or twin.driven.frictions:
-        said = "has no price here: dry friction and couplings of joints are soft in MuJoCo and rigid elsewhere"
+    if twin.driven.tied or twin.driven.frictions:
+        said = "has no price here: dry friction and constraints are soft in MuJoCo and rigid elsewhere"
         raise InputError("--tolerance", "", tolerance, said)
     places = named_coordinates(twin)
     if not places:
         raise InputError(twin.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
-    return recommend(PricedModel(twin, chosen(quantity or ALL, {ALL: None, **places})), tolerance)
+    return recommend(
+        PricedModel(twin, chosen(quantity or ALL_COORDINATES, {ALL_COORDINATES: None, **places})), tolerance
+    )
 
 
 def named_coordinates(twin: TwinModel) -> dict[str, int]:

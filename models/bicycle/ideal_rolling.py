@@ -24,7 +24,7 @@ from models.bicycle.four_bodies import (
     Y,
     four_bodies,
 )
-from models.bicycle.whipple import FREE, Control, Whipple
+from models.bicycle.whipple import UNCONTROLLED, Control, Whipple
 from models.core.errors import RunFailed
 from models.multibody.plain.motion import FIRST, PLACE, RATE, REST, Bodies, PlainMotion
 
@@ -35,7 +35,7 @@ UP = np.array([0.0, 0.0, 1.0])
 class IdealBicycle:
     """The bicycle as four bodies; raises nothing beyond what ``Whipple`` does."""
 
-    def __init__(self, bicycle: Whipple, control: Control = FREE) -> None:
+    def __init__(self, bicycle: Whipple, control: Control = UNCONTROLLED) -> None:
         vehicle = four_bodies(bicycle)
         self.bicycle, self.control, self.bodies = bicycle, control, Bodies(vehicle)
         self.gravity = -bicycle.gravity * UP

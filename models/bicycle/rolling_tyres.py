@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from models.bicycle.four_bodies import COUNT, FRONT, LEAN, PITCH, REAR, STEER, four_bodies
-from models.bicycle.whipple import FREE, Control, Whipple
+from models.bicycle.whipple import UNCONTROLLED, Control, Whipple
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
@@ -36,9 +36,9 @@ from models.multibody.forces import (
     leave,
     room,
 )
-from models.multibody.moving_vehicle import WheelContact, carried
+from models.multibody.moving_vehicle import WheelContact, carried_velocity
 from models.multibody.tree import cross, dot, plus, put, three, times
-from models.tyre.bristles import FIRST, net, shape_factor, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, net, shape_factor, tyre_forces
 from models.vehicles.free_vehicle import joints
 from models.vehicles.spatial import SpatialVehicle
 
@@ -59,7 +59,7 @@ class BicycleTyre(Strict):
     stiffness: float = quantity("-", "how many times as stiff: s C, s^2 k, half width by s", default=1.0)
 
 
-USUAL = BicycleTyre()
+UNCHANGED_TYRE = BicycleTyre()
 """A tyre that no scene changes."""
 
 
@@ -68,8 +68,8 @@ class RollingBicycle:
     """The bicycle on its tyres, as engines build it: ``driven``. InputError for what only the linear equations take."""
 
     bicycle: Whipple
-    tyre: BicycleTyre = USUAL
-    control: Control = FREE
+    tyre: BicycleTyre = UNCHANGED_TYRE
+    control: Control = UNCONTROLLED
     vehicle: SpatialVehicle = field(init=False)
     numbers: np.ndarray = field(init=False)
 
@@ -160,7 +160,7 @@ def _touch(tyre, vehicle, wheel):
     along = times((axle[1], -axle[0], 0.0), 1.0 / flat)
     across = (-along[1], along[0], 0.0)
     turning = plus(plus(three(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yawing)), times(axle, spin))
-    sliding = plus(plus(three(spot, tree.RATE), carried(vehicle.frame, centre)), cross(turning, arm))
+    sliding = plus(plus(three(spot, tree.RATE), carried_velocity(vehicle.frame, centre)), cross(turning, arm))
     elastic = max(tyre[forces.STATIC] + tyre[forces.VERTICAL] * (tyre[forces.RADIUS] * flat - centre[2]), 0.0)
     load = max(elastic - tyre[forces.VISCOUS] * sliding[2], 0.0) if elastic > 0.0 else 0.0
     ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[forces.VERTICAL]
@@ -169,7 +169,7 @@ def _touch(tyre, vehicle, wheel):
     slip[3] = -spin * dot(cross(axle, arm), along)
     patch[A], patch[B] = math.sqrt(tyre[forces.RADIUS] * load / tyre[forces.VERTICAL]), tyre[forces.HALF_WIDTH]
     patch[LOAD], patch[MU] = load, tyre[forces.GRIP]
-    patch[FIRST] = patch[FIRST + 1] = patch[FIRST + 2] = 1.0 / tyre[forces.BRISTLES]
+    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre[forces.BRISTLES]
     report[PRESS] = load
     report[forces.SLIP_X], report[forces.SLIP_Y], report[forces.TURN] = slip[0], slip[1], slip[2]
     put(way, forces.CENTRE, centre)

@@ -16,7 +16,7 @@ from models.core.errors import InputError
 
 RATE = 100.0
 """Samples per second."""
-SHORTEST = 20
+SHORTEST_WINDOW = 20
 """Samples of a window."""
 STARTS = [(decay, frequency) for decay in (-1.0, -3.0, -6.0) for frequency in (4.0, 7.0, 10.0)]
 """Where fits begin (1/s, rad/s)."""
@@ -100,8 +100,8 @@ def _windows(path: Path) -> list[tuple[str, float, int, int]]:
             row = cells[0], float(cells[1]), int(cells[2]), int(cells[3])
         except (ValueError, IndexError):
             raise InputError(path, f"line {line}", text, "must be: file, speed (m/s), first and last sample") from None
-        if not 0.0 < row[1] < np.inf or not 0 <= row[2] <= row[3] - SHORTEST:
-            allowed = f"needs a speed above 0 and at least {SHORTEST} samples from first to last"
+        if not 0.0 < row[1] < np.inf or not 0 <= row[2] <= row[3] - SHORTEST_WINDOW:
+            allowed = f"needs a speed above 0 and at least {SHORTEST_WINDOW} samples from first to last"
             raise InputError(path, f"line {line}", text, allowed)
         rows.append(row)
     if not rows:

@@ -103,7 +103,7 @@ class Control(Strict):
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
 
 
-FREE = Control()
+UNCONTROLLED = Control()
 """No control, no friction."""
 
 
@@ -168,7 +168,7 @@ class Whipple(Strict):
         K2 = np.array([[0.0, (ST - mass * zT) * cosine / w], [0.0, (SA + SF * sine) * cosine / w]])
         return Linear(M, C1, K0, K2)
 
-    def state_matrix(self, speed: float, control: Control = FREE) -> np.ndarray:
+    def state_matrix(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
         """(4, 4): rates of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
@@ -176,13 +176,13 @@ class Whipple(Strict):
         below = np.linalg.solve(M, -np.hstack([stiffness, damping]))
         return np.vstack([np.eye(2, 4, 2), below])
 
-    def eigenvalues(self, speed: float, control: Control = FREE) -> np.ndarray:
+    def eigenvalues(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
         """(4,) 1/s, sorted by real and imaginary part, at a speed (m/s)."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
-    def weave(self, speed: float, control: Control = FREE) -> complex:
+    def weave(self, speed: float, control: Control = UNCONTROLLED) -> complex:
         """The oscillation with positive imaginary part (1/s), the faster of two; nan where there is none."""
         values = self.eigenvalues(speed, control)
         fastest = complex(values[np.argmax(values.imag)])

@@ -8,7 +8,7 @@ from models.brake.plane_chain import ChainPoint, Direction, rows
 from models.brake.plane_records import PlaneMotion, Report, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
-from models.brake.surfaces import even, surfaces_of, under_wheels
+from models.brake.surfaces import is_uniform, surfaces_of, under_wheels
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
@@ -86,7 +86,7 @@ def advance(motion, torques, step, steer, vehicle):
     wheels, time = motion.turning.size, 0.0
     surfaces = surfaces_of(array(doubles(4 * wheels), (4, wheels)))
     for n in range(torques.shape[0] - 1):
-        if n == 0 or not even(vehicle.road):
+        if n == 0 or not is_uniform(vehicle.road):
             under_wheels(motion.state, step, vehicle, surfaces)
         regular = vehicle.slope * 9.81 * step
         parts = parts_of(motion.state, regular)

@@ -44,7 +44,7 @@ def velocity(point, positions, rates, reach):
 
 
 @lean
-def place_of(point, positions, reach):
+def chain_point_place(point, positions, reach):
     """Place (2) on the ground of a ``ChainPoint``."""
     k, x, y = point
     px, py = positions[0], positions[1]

@@ -50,7 +50,7 @@ class Air(NamedTuple):
     commands: np.ndarray
 
 
-def still(chambers: Chambers, sample: float) -> Air:
+def resting_chambers(chambers: Chambers, sample: float) -> Air:
     """No pressure anywhere but in the supply, all valves released; sample (s)."""
     wheels = chambers.fill.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:

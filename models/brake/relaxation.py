@@ -6,8 +6,8 @@ With a = tan of the slip angle that the tyre has taken up, and u, v the speeds o
 
 which holds at rest too: there the tyre is a spring. It is solved exactly over half a step with the speeds before the
 step and over the other half with those after it; the step between takes the forces at a in its middle: order two, and
-stable at rest for steps below ``longest_step``. Below ``SLOW`` a damper across the wheel fades in, without which a
-vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
+stable at rest for steps below ``longest_step``. Below ``FADING_SPEED`` a damper across the wheel fades in, without
+which a vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
 and high-speed calculations, SAE 950311 (recalled, not checked). Along the wheel slip does not lag.
 """
 
@@ -22,10 +22,10 @@ from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.samples import compiled
 from models.brake.surfaces import surfaces_of, under_wheels
-from models.brake.wheel_step import SLOWEST, phi_1
+from models.brake.wheel_step import SLOWEST_SPEED, phi_1
 from models.machine.compiled import inlined, njit
 
-SLOW = 1.0
+FADING_SPEED = 1.0
 """Speed (m/s) along the wheel below which the damper fades in."""
 DAMPING = 0.7
 """Damping ratio at rest, of a wheel that bears its share of the mass."""
@@ -53,10 +53,10 @@ def take_up(i, u, v, time, slope, lag, lagging):
     """
     length = lag.length[i]
     if math.isnan(lag.angle[i]):
-        lag.angle[i] = v / max(abs(u), SLOWEST)
+        lag.angle[i] = v / max(abs(u), SLOWEST_SPEED)
     lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
-    fade = max(1.0 - abs(u) / SLOW, 0.0)
-    rate = math.sqrt(max(slope, SLOWEST) * GRAVITY * length)
+    fade = max(1.0 - abs(u) / FADING_SPEED, 0.0)
+    rate = math.sqrt(max(slope, SLOWEST_SPEED) * GRAVITY * length)
     lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
 
 
@@ -67,7 +67,7 @@ def longest_step(slope: float, lively: float, length: float) -> float:
     its liveliest motion, g of a point mass. With w^2 = slope lively / length and c = 2 DAMPING w sqrt(lively / g), the
     step is v' = v - h (w^2 y + c v), y' = y + h v', whose roots lie within 1 where (h w)^2 + 2 h c < 4.
     """
-    w, spread = math.sqrt(max(slope, SLOWEST) * lively / length), 2.0 * DAMPING * math.sqrt(lively / GRAVITY)
+    w, spread = math.sqrt(max(slope, SLOWEST_SPEED) * lively / length), 2.0 * DAMPING * math.sqrt(lively / GRAVITY)
     return (math.sqrt(spread**2 + 4.0) - spread) / w
 
 

@@ -20,7 +20,7 @@ from models.brake.brake import Brakes
 from models.brake.plane_records import REPORTED, PlaneMotion
 from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
-from models.machine.compiled import lean, named, njit
+from models.machine.compiled import lean, named_closure, njit
 
 
 class Row(NamedTuple):
@@ -209,8 +209,8 @@ class CompiledSamples:
 
 def compiled(go: Callable[..., Any], name: str) -> CompiledSamples:
     """``moved`` by a compiled function, compiled."""
-    some = lean(named(_with(some_samples, go=go), name))
-    return CompiledSamples(njit(cache=True, error_model="numpy")(named(_with(samples, some=some), name)))
+    some = lean(named_closure(_with(some_samples, go=go), name))
+    return CompiledSamples(njit(cache=True, error_model="numpy")(named_closure(_with(samples, some=some), name)))
 
 
 by_steps = compiled(advance, "by_steps")

@@ -92,7 +92,7 @@ class Sprung:
         return alone._replace(
             masses=masses,
             inertias=inertias,
-            reach=_reach(np.array([free.body(hitch_of(name)).position[0] for name in free.towed]), centres),
+            reach=_hitch_reach(np.array([free.body(hitch_of(name)).position[0] for name in free.towed]), centres),
             unit=unit,
             group=unit.copy(),
             place=place,
@@ -106,7 +106,7 @@ class Sprung:
         )
 
 
-def _reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
+def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """reach (U, U) of ``Plane``, m: hitches (U - 1,) and centres (U,) ahead of the vehicle's centre."""
     reach = np.zeros((centres.size, centres.size))
     for k in range(1, centres.size):
@@ -144,7 +144,7 @@ def sprung(
     tyres = _ordered(vehicle)
     _check_row(vehicle)
     inertias = _spins(vehicle.name, tyres, spin_inertia)
-    centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
+    centred = _displaced(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0), forces=forces)
     if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
         raise ValueError("the carrier and the sway are not the first bodies")
@@ -193,23 +193,23 @@ def _check_row(vehicle: SpatialVehicle) -> None:
         before = name
 
 
-def alone(vehicle: SpatialVehicle) -> list[Body]:
+def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
     """Bodies of a vehicle without those of what it tows."""
     return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:
     """(3,) m: centre of mass, in the design position, of a vehicle without what it tows."""
-    bodies = alone(vehicle)
+    bodies = without_trailer(vehicle)
     masses = np.array([body.mass for body in bodies])
     return masses @ np.array([body.position for body in bodies]) / masses.sum()
 
 
-PLACES = ("position", "point", "first_point", "second_point", "point_left", "point_right")
+POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_left", "point_right")
 """What parts of a vehicle call their places."""
 
 
-def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
+def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     """The vehicle drawn elsewhere on the ground."""
 
     def at(part: Any, name: str) -> Vector:
@@ -218,7 +218,7 @@ def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
 
     parts: dict[str, Any] = {
         kind: tuple(
-            replace(part, **{name: at(part, name) for name in PLACES if hasattr(part, name)})
+            replace(part, **{name: at(part, name) for name in POSITION_FIELDS if hasattr(part, name)})
             for part in getattr(vehicle, kind)
         )
         for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
@@ -228,7 +228,7 @@ def _moved(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
 
 def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
     """The plane vehicle of a centred one, without what it tows; spin_inertias (kg m^2): of its wheels."""
-    bodies = alone(vehicle)
+    bodies = without_trailer(vehicle)
     front_axle, rear_axle = (
         Axle(
             x=left.point[0],

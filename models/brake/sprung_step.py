@@ -19,7 +19,7 @@ from models.brake.plane_records import TURNING, Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
-from models.machine.compiled import inlined, lean, named, njit
+from models.machine.compiled import inlined, lean, named_closure, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,
@@ -302,4 +302,4 @@ def advance_with(**parts: Callable[..., Any]) -> Callable[..., Any]:
 
 def compiled(name: str, **parts: Callable[..., Any]) -> Callable[..., Any]:
     """``advance_with`` an engine's own compiled functions, compiled."""
-    return njit(cache=True, error_model="numpy")(named(advance_with(**parts), name))
+    return njit(cache=True, error_model="numpy")(named_closure(advance_with(**parts), name))

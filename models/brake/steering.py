@@ -6,9 +6,9 @@ import numpy as np
 
 from models.brake.figures_of_merit import crossing
 
-REACHED, HALF = 0.9, 0.5
+REACHED_SHARE, HALF_SHARE = 0.9, 0.5
 """Share of the steady yaw rate by which the response is timed, and of the last angle from which."""
-SETTLED = 0.05
+STEADY_RANGE = 0.05
 """Largest range of a yaw rate that is called steady, by its mean."""
 
 
@@ -27,7 +27,7 @@ class Steering:
     @property
     def half(self) -> float:
         """Time (s) at which the angle first reaches half of its last one."""
-        goal, last = HALF * abs(self.angles[-1]), np.sign(self.angles[-1])
+        goal, last = HALF_SHARE * abs(self.angles[-1]), np.sign(self.angles[-1])
         reached = last * self.angles >= goal
         i = int(np.argmax(reached))
         if i == 0:
@@ -54,7 +54,7 @@ def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawRespon
     """
     end = yaw_rates[times >= times[-1] - 1.0]
     steady = float(end.mean())
-    if np.ptp(end) > SETTLED * abs(steady) or steady == 0.0:
+    if np.ptp(end) > STEADY_RANGE * abs(steady) or steady == 0.0:
         return None
     share = yaw_rates / steady
-    return YawResponse(crossing(times, -share, -REACHED) - half, float(max(share.max() - 1.0, 0.0)), steady)
+    return YawResponse(crossing(times, -share, -REACHED_SHARE) - half, float(max(share.max() - 1.0, 0.0)), steady)

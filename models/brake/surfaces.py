@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.plane_chain import ChainPoint, place_of, velocity
+from models.brake.plane_chain import ChainPoint, chain_point_place, velocity
 from models.brake.plane_vehicle import Plane
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
@@ -87,7 +87,7 @@ def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
     return Road(starts, left, right, line, kinds)
 
 
-EVEN = road([Stretch(0.0, 0, 0)])
+UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
 """The same surface everywhere."""
 
 
@@ -104,7 +104,7 @@ def check_way(road: Road, distance: float) -> None:
 
 
 @inlined
-def even(road):
+def is_uniform(road):
     """Whether one surface is everywhere."""
     return road.starts.size == 1 and road.left[0] == road.right[0]
 
@@ -119,14 +119,14 @@ def under_wheels(state, step, vehicle, surfaces):
     the side where it is in the middle of the step.
     """
     plane, kind, road = vehicle.plane, vehicle.kind, vehicle.road
-    if even(road):
+    if is_uniform(road):
         for i in range(kind.size):
             surfaces.first[i] = surfaces.second[i] = road.left[0] * road.kinds + kind[i]
             surfaces.share[i] = 0.0
         return
     for i in range(plane.unit.size):
         centre = ChainPoint(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
-        px, py = place_of(centre, state[0], plane.reach)
+        px, py = chain_point_place(centre, state[0], plane.reach)
         vx, vy = velocity(centre, state[0], state[1], plane.reach)
         low, high = min(px, px + step * vx), max(px, px + step * vx)
         right, left = min(py, py + step * vy), max(py, py + step * vy)

@@ -16,7 +16,7 @@ from models.brake.plane_chain import headings, inertia
 from models.brake.plane_records import motion_of, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
-from models.brake.surfaces import EVEN, OnRoad, surfaces_of, under_wheels
+from models.brake.surfaces import UNIFORM_ROAD, OnRoad, surfaces_of, under_wheels
 from models.core.errors import InputError
 from models.core.strict import quantity
 from models.machine.compiled import njit
@@ -91,7 +91,7 @@ def follow(
     pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
     turning = np.hypot(*state[1, :2]) / plane.radius
     motion = motion_of(state.copy(), turning)
-    vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, EVEN)
+    vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, UNIFORM_ROAD)
     constant = np.tile(np.asarray(torques, float), (2, 1))
     if not _follow(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")

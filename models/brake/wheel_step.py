@@ -21,7 +21,7 @@ import numpy as np
 from models.machine.compiled import lean
 from models.tyre.tyre_table import Cells, cell_and_share, longitudinal_adhesion
 
-SLOWEST = 1e-9
+SLOWEST_SPEED = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
 MOST_PIECES = 100_000
 
@@ -163,8 +163,8 @@ def wheel_step(step_input, wheel, grip):
     """Step a ``Wheel`` through a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
     torque0, torque1, step = step_input.torque0, step_input.torque1, step_input.step
     radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
-    u0, u1 = max(step_input.speed0, SLOWEST), max(step_input.speed1, 0.0)
-    mean = max(0.5 * (u0 + u1), SLOWEST)
+    u0, u1 = max(step_input.speed0, SLOWEST_SPEED), max(step_input.speed1, 0.0)
+    mean = max(0.5 * (u0 + u1), SLOWEST_SPEED)
     kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1
     sliding = node_force(last, grip)
     gain, now, impulse, area, locked = (torque1 - torque0) / step, 0.0, 0.0, 0.0, 0.0

@@ -196,10 +196,10 @@ def _of_theory(contact: Contact, motion: Motion, forces: Rolled) -> tuple[float,
 
 def _of_linear(contact: OnEllipse, motion: Motion, forces: Rolled) -> tuple[float, float]:
     """Distances of force (N) and moment (N m) from FASTSIM, and its bands."""
-    better, error = rolled(Fastsim(contact.hertz, contact.friction, contact.pair, **BEST), motion, 31)
+    better, error = rolled(Fastsim(contact.hertz, contact.friction, contact.pair, **BEST_CHOICES), motion, 31)
     off = float(np.linalg.norm(forces.force - better.force))
     return off + error.total, abs(forces.mz - better.mz) + error.moment
 
 
-BEST = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
+BEST_CHOICES = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
 """Choices of FASTSIM that are closest to the exact theory on the whole."""

@@ -34,7 +34,16 @@ from models.contact.fastsim_many import BLENDED, ONE_FLEXIBILITY, THREE_FLEXIBIL
 from models.contact.fastsim_many import forces as march_all
 from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
-from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
+from models.contact.inputs import (
+    LARGEST_LOAD,
+    NEGLIGIBLE_BOUND,
+    Array,
+    creepages,
+    number,
+    quantity,
+    together,
+    whole_number,
+)
 from models.contact.linear_theory import flexibilities as linear_flexibilities
 from models.contact.material import Falling, Pair
 from models.core.errors import InputError
@@ -194,7 +203,7 @@ def contacts_of(ellipse: RollingEllipse, pair: Pair) -> tuple[Array, tuple[int, 
     contacts = np.empty(given[0].size, CONTACT)
     for name, values in zip(("a", "b", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
         contacts[name] = values.ravel()
-    loaded = contacts["load"] > NOTHING
+    loaded = contacts["load"] > NEGLIGIBLE_BOUND
     for name in ("a", "b"):
         quantity(name, contacts[name][loaded], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
         contacts[name][~loaded] = 0.1

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import LONGEST, STILL, advance, cut, lateness
+from models.contact.fastsim_kernels import LARGEST_EXPONENT, NEGLIGIBLE_SLIP, advance, cut, lateness
 from models.contact.fastsim_many import (
     ONE_FLEXIBILITY,
     add_strip,
@@ -147,7 +147,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
             x, y, now = cut(-0.5 * u, -0.5 * v, g)
         else:
             x, y, now = advance((px, py, slips), (u, v, v1 * change), bound)
-        turns = slips * (u * u + v * v) > STILL
+        turns = slips * (u * u + v * v) > NEGLIGIBLE_SLIP
         reach = (abs(u) + abs(v)) * cells.rate[i] if turns else 0.0
         late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
@@ -181,10 +181,10 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 def _turning(px, py, u, v, before, rate):
     """Turning of a slipping traction by ``advance``: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
     size = math.sqrt(u * u + v * v)
-    h = min(size * rate, LONGEST)
+    h = min(size * rate, LARGEST_EXPONENT)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))
     grown = base**8
     over, aside = before * size - (px * u + py * v), px * v - py * u
     whole = (grown * over) ** 2 + aside * aside
-    growth = 8.0 * (1.0 + h * (1.0 + 0.5 * h)) / base * rate if h < LONGEST else 0.0
+    growth = 8.0 * (1.0 + h * (1.0 + 0.5 * h)) / base * rate if h < LARGEST_EXPONENT else 0.0
     return grown * (over * over + aside * aside) / whole, 2.0 * grown * over * aside / whole * growth, size

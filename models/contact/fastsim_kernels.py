@@ -17,9 +17,9 @@ from models.machine.compiled import compiled, njit
 
 PLAIN, SECOND_ORDER = 0, 1
 
-LONGEST = 50.0
+LARGEST_EXPONENT = 50.0
 """exp(-50) of an angle is nothing; larger exponents would overflow."""
-STILL = 1e-60
+NEGLIGIBLE_SLIP = 1e-60
 """Square of a rigid slip per cell that turns no traction."""
 
 
@@ -53,9 +53,9 @@ def advance(traction, slip, bound):
     x, y = px - u, py - v
     v += turn * lateness((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
     square, speed = x * x + y * y, u * u + v * v
-    turns = slips * speed > STILL
+    turns = slips * speed > NEGLIGIBLE_SLIP
     size = math.sqrt(speed if turns else square)
-    h = min(size * rate, LONGEST)
+    h = min(size * rate, LARGEST_EXPONENT)
     grown = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))
     grown *= grown
     grown *= grown

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut, march_plain, march_second_order
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANES, SLIP, Workspace, cells_in, strips_in
-from models.contact.inputs import NOTHING
+from models.contact.inputs import NEGLIGIBLE_BOUND
 from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU = range(4)
@@ -63,7 +63,7 @@ def forces_within(contacts, strips, cells, kind, march, room, answers):
 @lean
 def touches(contact):
     """Whether there is anything that friction could hold."""
-    return contact.mu * contact.load > NOTHING
+    return contact.mu * contact.load > NEGLIGIBLE_BOUND
 
 
 @lean

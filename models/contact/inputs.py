@@ -16,7 +16,7 @@ LARGEST_APPROACH = 0.05
 LARGEST_CREEPAGE = 10.0
 LARGEST_SPIN = 1e9
 """1/m"""
-NOTHING = 1e-60
+NEGLIGIBLE_BOUND = 1e-60
 """N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
 
 

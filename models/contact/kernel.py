@@ -22,7 +22,14 @@ from models.contact.fastsim_kernels import SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, forces_within
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
-from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
+from models.contact.inputs import (
+    LARGEST_APPROACH,
+    LARGEST_CREEPAGE,
+    LARGEST_LOAD,
+    LARGEST_SPIN,
+    NEGLIGIBLE_BOUND,
+    Array,
+)
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import compiled
@@ -88,7 +95,7 @@ def contact(kind, inputs, table, outputs):
         return NOT_PLAUSIBLE
     if head.cells == 0.0:
         _linear(values, out)
-    elif values.mu * out.load > NOTHING:
+    elif values.mu * out.load > NEGLIGIBLE_BOUND:
         _creep(values, table, out)
     return FINE
 

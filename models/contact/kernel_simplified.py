@@ -59,7 +59,7 @@ is reached (m); first node, spacing and bottom along x and y (m); lengths. Then 
 padded heights."""
 HEADER = size_of(HEAD)
 MOST_CELLS = 200
-SETTLED = 1e-12
+DEPTH_TOLERANCE = 1e-12
 """Share of the approach, from first touch on, to which the depth settles."""
 TRIES = 100
 
@@ -133,7 +133,7 @@ def settle(numbers, approach, modulus):
     for _ in range(TRIES):
         stiffness, reached, volume = fit_at(numbers, low + depth, modulus)
         off = reached - approach
-        if abs(off) <= SETTLED * over:
+        if abs(off) <= DEPTH_TOLERANCE * over:
             return low + depth, stiffness, volume
         if not math.isfinite(off) or (off < 0.0 and depth >= most):
             break

@@ -100,7 +100,7 @@ def centres(cells: int, step: float) -> Array:
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
-PARTS = 8
+AVERAGING_POINTS = 8
 """Points along each axis of a cell over which Hertz' pressure is averaged."""
 
 
@@ -108,8 +108,10 @@ def hertzian(a: float, b: float, load: float, cells: int) -> Pressed:
     """Pressure of an ellipse with semi-axes a, b (m), the mean of each of ``cells`` x ``cells`` cells, scaled to the
     load (N).
     """
-    inner = (np.arange(cells * PARTS) + 0.5) / (cells * PARTS) * 2 - 1
-    height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(cells, PARTS, cells, PARTS)
+    inner = (np.arange(cells * AVERAGING_POINTS) + 0.5) / (cells * AVERAGING_POINTS) * 2 - 1
+    height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(
+        cells, AVERAGING_POINTS, cells, AVERAGING_POINTS
+    )
     pressure, dx, dy = height.mean((1, 3)), 2 * a / cells, 2 * b / cells
     return Pressed(pressure * load / (pressure.sum() * dx * dy), centres(cells, dx), centres(cells, dy))
 
@@ -133,7 +135,7 @@ def solve_normal(
     InputError : a wrong shape or value, or a contact that reaches the edge of the grid
     RunFailed : the contact conditions were not met to ``TOLERANCE``
     """
-    distance = _checked(distance, dx, dy, load, approach)
+    distance = _checked_distance(distance, dx, dy, load, approach)
     rows, columns = distance.shape
     x, y = centres(columns, dx), centres(rows, dy)
     if (load is not None and load <= 0) or (approach is not None and not np.any(distance < approach)):
@@ -152,7 +154,7 @@ def solve_normal(
     return NormalSolution(pressure, x, y, reached, gap, _violation(gap, contact, displacement), iterations)
 
 
-def _checked(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
+def _checked_distance(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
     """The distance as an array of numbers; raises InputError."""
     distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
     if distance.ndim != 2 or min(distance.shape) < 2:

@@ -27,10 +27,10 @@ Points = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
 OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
-APART = re.compile(r"[\s,;]+")
+SEPARATORS = re.compile(r"[\s,;]+")
 DECIMAL_COMMA = re.compile(r"\d,\d.*(?<!,)[\s;]|(?<!,)[\s;].*\d,\d")
 """A comma between digits where something else parts the numbers."""
-SHOWN = 40
+SHOWN_CHARACTERS = 40
 """Characters of a line that a message shows."""
 OFF_TAPING = 5e-3
 """Largest |z| (m) of a wheel at y = 0: its radius is measured there."""
@@ -84,13 +84,17 @@ def _lines(path: Path) -> list[str]:
 def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
     """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
     if DECIMAL_COMMA.search(text.strip()):
-        raise InputError(path, f"line {number}", text.strip()[:SHOWN], "has decimal commas: write decimal points")
+        raise InputError(
+            path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], "has decimal commas: write decimal points"
+        )
     try:
-        numbers = [float(part) for part in APART.split(text.strip(" \t,;"))]
+        numbers = [float(part) for part in SEPARATORS.split(text.strip(" \t,;"))]
     except ValueError:
         numbers = []
     if len(numbers) < least or not all(math.isfinite(value) for value in numbers):
-        raise InputError(path, f"line {number}", text.strip()[:SHOWN], f"must hold {least} or more finite numbers")
+        raise InputError(
+            path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], f"must hold {least} or more finite numbers"
+        )
     return numbers
 
 
@@ -105,7 +109,10 @@ def _columns(lines: list[str], path: Path) -> Points:
     for k, row in rows:
         if len(row) > 2:
             raise InputError(
-                path, f"line {k}", lines[k - 1].strip()[:SHOWN], f"must hold y and z, found {len(row)} numbers"
+                path,
+                f"line {k}",
+                lines[k - 1].strip()[:SHOWN_CHARACTERS],
+                f"must hold y and z, found {len(row)} numbers",
             )
     y, z = _points([row for _, row in rows])
     return y * MM, z * MM
@@ -123,7 +130,7 @@ def _miniprof(lines: list[str], path: Path) -> Points:
                 raise InputError(
                     path,
                     f"line {k}",
-                    line.strip()[:SHOWN],
+                    line.strip()[:SHOWN_CHARACTERS],
                     "must be key=value: a MiniProf header ends with an empty line",
                 )
             heading = bool(line.strip())

@@ -13,7 +13,7 @@ from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
-IN_PLACE = (1.0,)
+NO_SHIFT = (1.0,)
 """Weights for u itself, by dx: a shift without rolling."""
 INNER_TOLERANCE = 1e-6
 """Relative residual at which the linear solver of one Newton step stops."""

@@ -28,21 +28,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.contact.inputs import NOTHING, Array, creepages, number
+from models.contact.inputs import NEGLIGIBLE_BOUND, Array, creepages, number
 from models.contact.material import Pair
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
-from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
+from models.contact.rolling_operator import NO_SHIFT, UPSTREAM, FreeSystem, SlipOperator
 from models.core.errors import RunFailed
 
 TOLERANCE = 1e-8
 """Largest residual of a solution."""
-COARSEST = 16
+COARSEST_CELLS = 16
 """Cells along the shorter side of a grid that is solved from nothing; larger ones start from a grid with half of them,
 for which the exact theory of few cells is near enough."""
 MOST_STEPS = 12
 """Of Newton's method alone; three to six are usual."""
-RELAXATION, SLOWER = 0.5, 0.7
+RELAXATION, RELAXATION_FACTOR = 0.5, 0.7
 """Of the first sweeps, and its factor after each round that came no nearer: needed for cells narrower than long."""
 SWEEPS = 3
 """In each round."""
@@ -104,7 +104,7 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
         number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
         for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
     )
-    by_cell = _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, pair, IN_PLACE)
+    by_cell = _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, pair, NO_SHIFT)
     return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
 
 
@@ -115,7 +115,7 @@ def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: Pair, weights: 
     shape = pressed.pressure.shape
     traction, slip = np.zeros((2, *shape, 2))
     stick = np.zeros(shape, bool)
-    if mu * pressed.load <= NOTHING:
+    if mu * pressed.load <= NEGLIGIBLE_BOUND:
         return RollingSolution(0.0, 0.0, 0.0, traction, slip, stick, 0.0, 0.0, 0)
     contact = pressed.contact
     spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
@@ -189,7 +189,7 @@ def _solve(cells: _Cells, rigid: RigidSlip, pair: Pair, weights: tuple[float, ..
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
-    if min(bound.shape) < COARSEST:
+    if min(bound.shape) < COARSEST_CELLS:
         return _solve_tractions(nothing)
     coarse = cells.coarser()
     known = _solve(coarse, rigid, pair, weights)[0].traction
@@ -230,7 +230,7 @@ def _solve_tractions(state: _State) -> tuple[_State, int]:
             sweep(traction, motion, state.operator.reversed, state.bound, relaxation)
         swept = state.moved(np.moveaxis(traction, 0, -1))
         nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _after_newton_step(swept))
-        relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
+        relaxation *= 1.0 if nearest.residual < state.residual else RELAXATION_FACTOR
         state, done = nearest, done + 1
     return state, done
 

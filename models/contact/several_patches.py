@@ -21,9 +21,9 @@ from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import (
-    FINER,
     GRADIENT,
-    LEAST,
+    LEAST_STIFFNESS_SHARE,
+    POINTS_PER_MESH,
     covariances,
     crude_net,
     displacement,
@@ -35,7 +35,7 @@ from models.contact.simplified_kernels import (
 )
 from models.core.errors import RunFailed
 
-CLOSE = 1e-11
+PATCHES_TOLERANCE = 1e-11
 """Share of approach and load to which patches settle."""
 TRIES = (("hybr", 0.3, 1.0), ("lm", 0.05, 1.0), ("hybr", 0.05, 1.15), ("hybr", 0.3, 0.9))
 """Method, first step and start by the given one, in turn: where a patch only just touches beside a large one the fit
@@ -73,7 +73,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
     height, pressure, cover = crude_net(surface, cells, shape)
-    volume = float(resultant(surface, FINER * cells, shape))
+    volume = float(resultant(surface, POINTS_PER_MESH * cells, shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
     dx, dy = mesh_of(box, cells)
@@ -95,7 +95,7 @@ def solve_common_approach(
         right[i] = -_product(nets[k], whole, nets[k].height, kind)
     stiffness = np.zeros(len(nets))
     if loaded:
-        least = LEAST * (depths - lows)[loaded] / [np.mean(pushed[k, k]) for k in loaded]
+        least = LEAST_STIFFNESS_SHARE * (depths - lows)[loaded] / [np.mean(pushed[k, k]) for k in loaded]
         stiffness[loaded] = np.maximum(np.linalg.lstsq(products, right, rcond=None)[0], least)
     raised = [sum((stiffness[m] * pushed[k, m] for m in loaded), nets[k].height) for k in range(len(nets))]
     approach = [
@@ -148,7 +148,7 @@ def solve_depths(
             options={"xtol": 1e-14, "factor": factor},
         )
         off, answer, stiffness, loads = state(solved.x)
-        if np.abs(off).max() <= CLOSE:
+        if np.abs(off).max() <= PATCHES_TOLERANCE:
             return answer, stiffness, loads
     raise RunFailed("simplified theory", f"patches at an approach near {answer[-1]:.4g} m did not settle")
 

@@ -13,9 +13,9 @@ PARABOLIC, ELLIPTIC = 0, 1
 """Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
 DISPLACEMENT, GRADIENT = 0, 1
 """What the least squares fit."""
-FINER = 3
+POINTS_PER_MESH = 3
 """Points per crude mesh and axis at which the pressure is summed to the load."""
-LEAST = 0.2
+LEAST_STIFFNESS_SHARE = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
 bottom leaves the fit undefined, and this bound keeps it positive."""
 Pair = tuple[float, float]
@@ -175,9 +175,9 @@ def crude_fit(surface, cells, shape, kind, modulus):
     mean_u, both, square = covariances(u, height, cover)
     if kind == GRADIENT:
         both, square = slope_products(u, height, cover, dx, dy, True)
-    least = LEAST * (surface.depth - surface.low) / mean_u
+    least = LEAST_STIFFNESS_SHARE * (surface.depth - surface.low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
-    total = resultant(surface, FINER * cells, shape)
+    total = resultant(surface, POINTS_PER_MESH * cells, shape)
     approach = stiffness * weighted_mean(u, pressure) + weighted_mean(height, pressure)
     return stiffness, approach, total
 

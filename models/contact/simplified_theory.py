@@ -184,7 +184,7 @@ def press(
     reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
         return _gathered(reached, (), pair, options)
-    return _shared(patches, reached, None, pair, options)
+    return _patches_at_common_approach(patches, reached, None, pair, options)
 
 
 def load_at_depth(patch: Patch, depth: float, pair: Pair, options: SimplifiedOptions = PLAIN) -> PatchPressure:
@@ -212,7 +212,7 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
         depths = zip(patches, _shallow(patches, reached), strict=True)
         return _total([load_at_depth(patch, depth, pair, options) for patch, depth in depths])
 
-    return _shared(patches, _depth_for_load(alone_at, load, lowest, np.inf), load, pair, options)
+    return _patches_at_common_approach(patches, _depth_for_load(alone_at, load, lowest, np.inf), load, pair, options)
 
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
@@ -243,7 +243,7 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
     return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
 
 
-def _shared(
+def _patches_at_common_approach(
     patches: list[Patch], approach: float, load: float | None, pair: Pair, options: SimplifiedOptions
 ) -> NormalContact:
     """The patches at their common approach (m), or near it where a load (N) is given."""
@@ -286,7 +286,7 @@ def roll(
     friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     motion = tuple(creepages(xi_x, xi_y, spin, number).values())
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
-    fine = [_fine(part, pressed.options, cells) for part in pressed.patches]
+    fine = [_fine_strips(part, pressed.options, cells) for part in pressed.patches]
     tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
     crude_tractions = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
@@ -305,7 +305,7 @@ def roll(
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
+def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
     """Strips of a patch as ``march`` takes them."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells

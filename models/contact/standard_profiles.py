@@ -58,7 +58,7 @@ SECTIONS: tuple[Callable[[Array], Array], ...] = (
 RADII = (300.0, 80.0, 13.0)
 CHANGES = (10.49975, 25.98806)
 """Distance from the rail's axis (mm) at which 300 changes to 80 and 80 to 13 mm."""
-SIDE = 20.0
+SIDE_SLOPE = 20.0
 """Slope of the head's side."""
 LOWEST = 37.0
 """Depth of the head's side below its top (mm) down to which it is kept."""
@@ -91,13 +91,13 @@ def _half_head() -> tuple[Array, Array]:
     y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
     for radius, end in zip(RADII, (*CHANGES, None), strict=True):
         centre_y, centre_z = y[-1][-1] - radius * np.sin(angle), z[-1][-1] + radius * np.cos(angle)
-        last = np.arctan(SIDE) if end is None else np.arcsin((end - centre_y) / radius)
+        last = np.arctan(SIDE_SLOPE) if end is None else np.arcsin((end - centre_y) / radius)
         angles = np.linspace(angle, last, 2001)[1:]
         y.append(centre_y + radius * np.sin(angles))
         z.append(centre_z - radius * np.cos(angles))
         angle = last
     depth = np.linspace(z[-1][-1], LOWEST, 1001)[1:]
-    y.append(y[-1][-1] + (depth - z[-1][-1]) / SIDE)
+    y.append(y[-1][-1] + (depth - z[-1][-1]) / SIDE_SLOPE)
     return np.concatenate(y), np.concatenate([*z, depth])
 
 

@@ -17,9 +17,9 @@ from models.core.errors import InputError
 
 NODES = 97
 """Nodes along each axis of a distance that is made here: 48 spacings on each side of the centre."""
-EVEN = 2e-3
+UNEVEN_SHARE = 2e-3
 """Nodes count as even if none is farther from its even place than this share of a step, as rounding in a file does."""
-LARGEST = 1.0
+LARGEST_CONTACT = 1.0
 """m, of places and heights: no contact is so large, and larger ones are usually in mm."""
 
 
@@ -114,15 +114,17 @@ def from_arrays(x: Array, y: Array, height: Array) -> Distance:
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
     """
     nodes = {
-        name: quantity(name, array, f"places in m within +-{LARGEST:g}", -LARGEST, LARGEST)
+        name: quantity(name, array, f"places in m within +-{LARGEST_CONTACT:g}", -LARGEST_CONTACT, LARGEST_CONTACT)
         for name, array in (("x", x), ("y", y))
     }
-    height = quantity("height", height, f"finite everywhere, in m within +-{LARGEST:g}", -LARGEST, LARGEST)
+    height = quantity(
+        "height", height, f"finite everywhere, in m within +-{LARGEST_CONTACT:g}", -LARGEST_CONTACT, LARGEST_CONTACT
+    )
     for name, array in nodes.items():
         if array.ndim != 1 or array.size < 4:
             raise InputError("", name, list(array.shape), "must have the shape (n,) with n of 4 or more")
         even = np.linspace(array[0], array[-1], array.size)
-        if not np.abs(array - even).max() < EVEN * (even[1] - even[0]):
+        if not np.abs(array - even).max() < UNEVEN_SHARE * (even[1] - even[0]):
             raise InputError("", name, None, "must ascend in even steps (m)")
     shape = (nodes["y"].size, nodes["x"].size)
     if height.shape != shape:

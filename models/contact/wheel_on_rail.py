@@ -29,7 +29,7 @@ from models.contact.profiles import Profile
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
 
-DEEP = 2e-4
+SURROUNDINGS_DISTANCE = 2e-4
 """Distance (m) up to which the surroundings of a touching place are taken in; steel yields long before."""
 NODES = 121
 """Nodes of a distance along each axis."""
@@ -226,7 +226,7 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
     touches = []
     for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
-        if gap[k] < DEEP and 0 < k < gap.size - 1:
+        if gap[k] < SURROUNDINGS_DISTANCE and 0 < k < gap.size - 1:
             touches.append(_touching_place(side, pose, points, gap, (first, k, last)))
     return sorted(touches, key=lambda touch: touch.gap)
 
@@ -238,7 +238,7 @@ def _touching_place(side: WheelAndRail, pose: Pose, points: Array, gap: Array, a
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))
-    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5  # where the surroundings end, if not at a ridge
+    deep = (gap - gap[k]) * np.cos(angle) > SURROUNDINGS_DISTANCE * 1.5  # where the surroundings end, if not at a ridge
     below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
     low, high = first + int(below[-1]) if below.size else first, k + int(above[0]) if above.size else last
     cut = (False, False, low == first and first > 0, high == last and last < gap.size - 1)
@@ -258,7 +258,7 @@ def distance_over(side: WheelAndRail, pose: Pose, place: Array, angle: float, en
 
     place : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
     """
-    half = 1.2 * np.sqrt(2.0 * DEEP * side.wheelset.radius / np.cos(angle))
+    half = 1.2 * np.sqrt(2.0 * SURROUNDINGS_DISTANCE * side.wheelset.radius / np.cos(angle))
     rail_s, rail_n = _rail_heights(side.rail, place, angle)
     x = np.linspace(-half, half, NODES)
     s = np.linspace(max(ends[0], rail_s[0]), min(ends[1], rail_s[-1]), NODES)

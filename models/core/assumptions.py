@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.result import Result
 
-RARE = 0.00135
+ALLOWED_TIME_SHARE = 0.00135
 """Share of the time for which a Gaussian may lie beyond a limit: that of three standard deviations."""
 
 
@@ -71,13 +71,18 @@ class Broken:
     remedy: str
     law: str = ""
 
+    @property
+    def _worst(self) -> str:
+        """The worst value in four digits, without a power of ten up to a million, and its unit."""
+        return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
+
     def brief(self) -> str:
         """A few words for a figure."""
         return f"assumption broken: {self.fact()}"
 
     def fact(self) -> str:
         """Sentence that the assumption was broken, for readers who know the assumption."""
-        return f"{self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
+        return f"{self.says}; {self.where}, {self._time}, {self._worst}"
 
     @property
     def _time(self) -> str:
@@ -87,10 +92,9 @@ class Broken:
 
     def line(self) -> str:
         """A sentence for readers."""
-        unit = f" {self.unit}" if self.unit else ""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, worst {self.worst:.4g}{unit} "
+            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 
@@ -118,18 +122,19 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
 
 
 def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
-    """Where a Gaussian lies beyond a limit for more than RARE of the time, by the row where that is for longest."""
+    """Where a Gaussian lies beyond a limit for more than ALLOWED_TIME_SHARE of the time, by the row where that is for
+    longest."""
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = np.array([a.least - values.mean, values.mean - a.most]) / values.deviation
     known = np.isfinite(values.deviation) & (values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
-    if not (shares > RARE).any():
+    if not (shares > ALLOWED_TIME_SHARE).any():
         return None
     side, row = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
     timed = "time" in run.data.coords and len(values.mean) == len(run.times)
-    first = float(run.times[np.argmax((shares > RARE).any(axis=0))]) if timed else math.nan
+    first = float(run.times[np.argmax((shares > ALLOWED_TIME_SHARE).any(axis=0))]) if timed else math.nan
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
     place = f"{where} {values.rows[row]}" if values.rows else where
     share, law = float(shares[side, row]), " by the normal law"

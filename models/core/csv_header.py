@@ -63,12 +63,12 @@ class Head:
 
     def cells(self, line: Line) -> tuple[str, ...]:
         """Cells of a line, as many as there are headings."""
-        return tuple((split(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
+        return tuple((split_cells(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
 
     def groups(self) -> tuple[str, ...]:
         """Group of every heading from the row above them, where it has as many cells; a cell that is empty carries on
         the one before it. Nothing where there is no such row."""
-        above = split(self.titles[-1].text, self.separator) if self.titles else []
+        above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
         if len(self.names) < 3 or len(trimmed(above)) < 2 or len(above) not in (len(self.names), self.width):
             return ()
         groups = [""]
@@ -84,7 +84,7 @@ def heading(text: str) -> tuple[str, str]:
     return name.strip(), unit.strip()
 
 
-def split(text: str, separator: str) -> list[str]:
+def split_cells(text: str, separator: str) -> list[str]:
     """Cells of a line, without quotes and spaces around them."""
     try:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])]
@@ -137,7 +137,7 @@ def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separator
     """The headings in the first line that has a known heading, whatever is beneath it: errors there are left to the
     reader of the rows."""
     for i, line in enumerate(lines):
-        parted = {sign: trimmed(split(line.text, sign)) for sign in separators}
+        parted = {sign: trimmed(split_cells(line.text, sign)) for sign in separators}
         heads = [
             Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
             for sign, names in parted.items()
@@ -150,12 +150,12 @@ def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separator
 
 def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator: str) -> Head | None:
     """Headings in line ``i`` above a row of numbers; None where this is not so."""
-    names = trimmed(split(lines[i].text, separator))
+    names = trimmed(split_cells(lines[i].text, separator))
     place = next((k for k, name in enumerate(names) if known(name)), None)
     if place is None or len(names) < 2 or any(is_number(name) or TIMED.fullmatch(name) for name in names):
         return None
     for j in range(i + 1, min(i + 2 + BETWEEN, len(lines))):
-        cells = split(lines[j].text, separator)
+        cells = split_cells(lines[j].text, separator)
         if not (len(cells) >= len(names) >= len(trimmed(cells))):
             return None
         if is_number(cells[place]) or TIMED.fullmatch(cells[place]):
@@ -186,7 +186,7 @@ def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
 
 def _rewritten(path: str | Path, lines: list[Line], head: Head) -> str:
     """Text with the head and the rows in the plain form."""
-    rows = {line.number: split(line.text, head.separator) for line in lines[head.line :]}
+    rows = {line.number: split_cells(line.text, head.separator) for line in lines[head.line :]}
     cells = [cell for row in rows.values() for cell in row]
     sign = decimal_sign(path, head.line + 1, head.separator, cells)
     new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: head.line]}

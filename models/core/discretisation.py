@@ -32,7 +32,7 @@ CELLS = "cells along each axis"
 FALL, FLOOR = 0.6, 0.03
 """Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
 share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
-STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
+UNMOVED_DEVIATION, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
 
@@ -73,7 +73,7 @@ def size_of(values: np.ndarray) -> float:
     what is still."""
     largest = float(np.abs(values).max(initial=0.0))
     deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
-    return deviation if deviation > STILL * largest else largest
+    return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
 def observed_order(fine: float, coarse: float, declared: float) -> float:
@@ -261,7 +261,7 @@ def by_cells(error: float, size: float, unit: str, cells: int, order: float, mos
     return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
 
 
-def summed(first: Estimate, other: Estimate) -> Estimate:
+def summed_error(first: Estimate, other: Estimate) -> Estimate:
     """An error on top of another, as that of an input on top of that of the run which it drives.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
@@ -356,5 +356,6 @@ def error_lines(run: Result) -> list[str]:
 
 
 def _size(name: str, estimate: Estimate) -> str:
-    size = f"{estimate.error:.2g} {estimate.unit}".rstrip()
-    return f"{100.0 * estimate.share:.2g} % ({name}: {size})"
+    share, error = (float(f"{value:.2g}") for value in (100.0 * estimate.share, estimate.error))
+    size = f"{error:g} {estimate.unit}".rstrip()
+    return f"{share:g} % ({name}: {size})"

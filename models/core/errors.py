@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # the command line imports this file before it knows whether it will compute anything
     import numpy as np
 
-LONGEST = 80
+LONGEST_VALUE_TEXT = 80
 """Characters of an offending value that a message shows."""
 MOST_NAMES = 40
 """Accepted names that a message lists; of more it lists those most like the user's."""
@@ -43,7 +43,7 @@ def _value_text(value: Any) -> str:
         return ""
     plain = value.tolist() if hasattr(value, "tolist") else value
     text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
-    return f" = {text if len(text) <= LONGEST else text[: LONGEST - 3] + '...'}"
+    return f" = {text if len(text) <= LONGEST_VALUE_TEXT else text[: LONGEST_VALUE_TEXT - 3] + '...'}"
 
 
 def nearest(name: object, choices: tuple[str, ...]) -> str:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 Weight = Literal["error", "doubt", "note"]
 """An error stops what follows, a doubt is carried into the report, a note says what was looked at and found good."""
 
-FEW = 3
+LISTED_FINDINGS = 3
 """Findings of one check that are told one by one where people read."""
 
 
@@ -44,14 +44,17 @@ def lines(findings: Iterable[Finding]) -> list[str]:
 
 
 def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings, but where more than FEW of one check and weight were found only the worst, which says so."""
+    """The findings, but where more than LISTED_FINDINGS of one check and weight were found only the worst, which says
+    so."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)
-    return [f for alike in kinds.values() for f in (alike if len(alike) <= FEW else [_largest_of_alike(alike)])]
+    return [
+        f for alike in kinds.values() for f in (alike if len(alike) <= LISTED_FINDINGS else [_largest_finding(alike)])
+    ]
 
 
-def _largest_of_alike(alike: list[Finding]) -> Finding:
+def _largest_finding(alike: list[Finding]) -> Finding:
     """The one of the largest size, with the number of channels or places."""
     worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
     names = {name for finding in alike for name in finding.signals or (finding.place,)}

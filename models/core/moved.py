@@ -7,7 +7,7 @@ from importlib.abc import MetaPathFinder
 from pathlib import Path
 from types import ModuleType
 
-MOVED: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+MOVED_MODULES: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 """Old names, of modules or of whole packages, and where their content is now."""
 
 
@@ -16,8 +16,8 @@ class Moved(MetaPathFinder):
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> None:
         """Raise ModuleNotFoundError with the new name for an old one."""
-        if name in MOVED:
-            raise ModuleNotFoundError(f"{name} is now {MOVED[name]}: change the import", name=name)
+        if name in MOVED_MODULES:
+            raise ModuleNotFoundError(f"{name} is now {MOVED_MODULES[name]}: change the import", name=name)
 
 
 def tell_new_names() -> None:

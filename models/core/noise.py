@@ -38,12 +38,12 @@ def normal_block(
     stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
     its fourth, so that blocks never overlap.
     """
-    key = np.array([_word("seed", seed), _word("path", path)], dtype=np.uint64)
-    bits = np.random.Philox(key=key, counter=np.array([0, 0, _word("block", block), source], dtype=np.uint64))
+    key = np.array([_whole_number("seed", seed), _whole_number("path", path)], dtype=np.uint64)
+    bits = np.random.Philox(key=key, counter=np.array([0, 0, _whole_number("block", block), source], dtype=np.uint64))
     return np.random.Generator(bits).standard_normal((rows, channels))
 
 
-def _word(name: str, value: int) -> int:
+def _whole_number(name: str, value: int) -> int:
     """A whole number of 64 bits."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**64:
         raise InputError("", name, value, "must be a whole number from 0 to 2^64 - 1")

@@ -12,7 +12,7 @@ from models.core.errors import RunFailed
 
 ALLOWED = 0.08
 """Share of the velocities that may be missing in any second."""
-STILL, ROUNDING = 1e-6, 1e-9
+NEGLIGIBLE_VELOCITY, ROUNDING = 1e-6, 1e-9
 """m/s of the largest mass, and share of the velocities at the start, below which a motion is none."""
 
 
@@ -28,7 +28,7 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
     way = step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
     each = np.linalg.norm((positions[2:] - positions[:-2] - way) @ root, axis=1) / (2.0 * step)
     whole = np.linalg.norm((rates - rates[0]) @ root, axis=1).max()
-    whole = max(whole, ROUNDING * np.linalg.norm(rates[0] @ root), STILL * np.sqrt(mass.diagonal().max()))
+    whole = max(whole, ROUNDING * np.linalg.norm(rates[0] @ root), NEGLIGIBLE_VELOCITY * np.sqrt(mass.diagonal().max()))
     sums = np.concatenate(([0.0], np.cumsum(each)))
     window = min(len(each), max(1, round(1.0 / step)))
     within = sums[window:] - sums[:-window]

@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.core.whole_files import FULL, drop_parts
+from models.core.whole_files import DISK_FULL_ERRORS, drop_parts
 
 COMMAND = "command.txt"
 """First file of a folder that the user named: what made the others."""
@@ -29,7 +29,7 @@ def new_folder(wanted: Path | None, name: str) -> Path:
         free = _make_folder(wanted) or not any(wanted.iterdir())
     except OSError as error:
         raise _unwritable_folder(wanted, "cannot be used", error) from None
-    if not free or not _marked(wanted):
+    if not free or not _take_folder(wanted):
         allowed = "holds files already and is left as it is: name a new or empty folder"
         raise InputError("--out", "", str(wanted), allowed)
     return wanted
@@ -48,7 +48,7 @@ def resumed_folder(wanted: Path, blocks: str) -> Path:
     return wanted
 
 
-def _marked(folder: Path) -> bool:
+def _take_folder(folder: Path) -> bool:
     """Put the command into the folder as its first file; False if another run was faster."""
     try:
         with (folder / COMMAND).open("x", encoding="utf-8", errors="backslashreplace") as file:
@@ -91,4 +91,8 @@ def _make_folder(path: Path) -> bool:
 
 def _unwritable_folder(folder: Path, reason: str, error: OSError) -> Exception:
     """A full disk is no mistake of what the user wrote."""
-    return error if error.errno in FULL else InputError("--out", "", str(folder), f"{reason}: {error.strerror}")
+    return (
+        error
+        if error.errno in DISK_FULL_ERRORS
+        else InputError("--out", "", str(folder), f"{reason}: {error.strerror}")
+    )

@@ -9,9 +9,9 @@ of its ``TABLE``; an effect with physics or code of its own has a file, which no
 
 A scene names it in one of two ways. Either by a table [effects.NAME]: then the file has ``Parameters``, ``EXAMPLE``, a
 table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds. Or by the system's
-own tables: then the file has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's table,
-``leave_out(table, scene)`` and, if there are usual values, ``put_in(table, scene)``; both raise InputError with the
-remedy where it cannot be. Where an effect is a choice of method, to leave it out is the next cheaper one.
+own tables: then the file has ``PLACE``, the key that names it, ``named_effects(scene)``, and two edits of the scene's
+table, ``leave_out(table, scene)`` and, if there are usual values, ``put_in(table, scene)``; both raise InputError with
+the remedy where it cannot be. Where an effect is a choice of method, to leave it out is the next cheaper one.
 """
 
 import ast
@@ -175,7 +175,7 @@ def module_of(system: str, name: str) -> Any:
     return Effect(vars(file))
 
 
-def named(scene: Any) -> tuple[str, ...]:
+def named_effects(scene: Any) -> tuple[str, ...]:
     """Effects that a scene names; none that it could name by a table alone is imported to know it."""
     there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
     there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
@@ -189,7 +189,7 @@ def _names(scene: Any, file: Path) -> bool:
 
 def absent_effects(scene: Any) -> tuple[str, ...]:
     """Effects of its system that a scene does not name."""
-    there = named(scene)
+    there = named_effects(scene)
     return tuple(name for name in names_of(scene.system) if name not in there)
 
 
@@ -252,7 +252,7 @@ def _read(name: str, values: Any, system: str, file: str) -> Any:
 
 def check(scene: Any) -> None:
     """Refuse effects that cannot be together, with the remedy."""
-    legal(named(scene), scene)
+    legal(named_effects(scene), scene)
 
 
 def legal(present: Iterable[str], scene: Any) -> None:
@@ -312,8 +312,8 @@ def without(scene: Any, *left_out: str) -> Any:
         else:
             module_of(scene.system, name).leave_out(table, scene)
     smaller = _confirmed(rebuilt(table, scene), left_out, False)
-    needy = [name for name in named(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
-    gone = [name for name in needy if name not in (*left_out, *named(smaller))]
+    needy = [name for name in named_effects(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out, *named_effects(smaller))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(
@@ -340,7 +340,7 @@ def with_effects(scene: Any, *more: str) -> Any:
 
 def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
     """The scene, once it is known that it names each of these, or none of them."""
-    there = named(scene)
+    there = named_effects(scene)
     for name in effects:
         if (name in there) is not wanted:
             said = "cannot be in this scene: nothing of it takes part" if wanted else "is still there: leave it in"
@@ -371,6 +371,6 @@ def rebuilt(table: Table, scene: Any) -> Any:
 
 def lines(scene: Any, width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
-    said = {name: module_of(scene.system, name).COST for name in named(scene)}
+    said = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
     return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]

@@ -24,14 +24,16 @@ def accepted() -> Any:
     return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
 
 
-LARGEST = 1e15
+LARGEST_QUANTITY = 1e15
 """No quantity of a vehicle is larger in SI units; products of two such values are still finite."""
 
 
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
     """Field of a physical quantity in SI: positive, or from zero on, or of either sign, and not beyond all measure."""
-    above, least = (None, -LARGEST) if signed else (None, 0) if zero else (0, None)
-    return Field(default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST)
+    above, least = (None, -LARGEST_QUANTITY) if signed else (None, 0) if zero else (0, None)
+    return Field(
+        default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST_QUANTITY
+    )
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -43,7 +45,7 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
     Of several errors the first is told in full, an unknown key before all others, and the rest are named.
     """
     if not isinstance(values, Mapping):
-        raise InputError(file, place, values, WORDS["dict_type"])
+        raise InputError(file, place, values, ERROR_SENTENCES["dict_type"])
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
@@ -103,10 +105,10 @@ def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) ->
         return f"must be {' or '.join(names)}{facts}{suggestion(first['input'], names)}"
     if kind == "value_error":
         return f"{first['ctx']['error']}{facts}"
-    return WORDS.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
+    return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
 
 
-WORDS = {
+ERROR_SENTENCES = {
     "float_type": "must be a number",
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",

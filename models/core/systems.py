@@ -20,7 +20,7 @@ from typing import Any
 
 from models.core.errors import InputError
 
-DEFAULT = "pitch-plane"
+DEFAULT_SYSTEM = "pitch-plane"
 """System of a scene that names none."""
 
 
@@ -63,7 +63,7 @@ def listed(folder: Path, package: str) -> dict[str, System]:
     """Systems by their names: all packages within ``folder`` (the package ``package``) that have scenes."""
     places = sorted(path.parent for path in folder.glob("*/scene.py"))
     systems = {place.name.replace("_", "-"): System(f"{package}.{place.name}", place) for place in places}
-    return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT))
+    return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT_SYSTEM))
 
 
 SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
@@ -86,7 +86,7 @@ def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, systems: Mapping[str, System] = SYSTEMS) -> Any:
     """The checked scene of nested tables; messages name ``file``, and files that it names lie in ``folder``."""
-    name = table.get("system", DEFAULT)
+    name = table.get("system", DEFAULT_SYSTEM)
     if not isinstance(name, str) or name not in systems:
         raise InputError(file, "system", name, "no such system", tuple(systems))
     return import_module(systems[name].scene).build(table, file, folder)

@@ -43,7 +43,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 """Marks that text in UTF-16 begins with."""
 HEAD = 100_000
 """Characters among which the headings of a plain table are."""
-KEPT = 4
+CACHED_TEXTS = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
 NUMBER = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
@@ -125,7 +125,7 @@ def _is_plain(text: str, columns: Columns) -> bool:
     return not strange and any(name in columns for name in names)
 
 
-@lru_cache(KEPT)
+@lru_cache(CACHED_TEXTS)
 def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
     """Numbered header line and numbered rows, without comments and empty lines."""
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
@@ -201,7 +201,7 @@ def _header_wanted(columns: Columns) -> str:
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
-@lru_cache(KEPT)
+@lru_cache(CACHED_TEXTS)
 def _all_cells(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
     """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
     header, rows = _header_and_rows(path, text)

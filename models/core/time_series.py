@@ -11,9 +11,9 @@ from models.core.tables import SECONDS, read_table, write_table
 MARK = 1e28
 """SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
 
-SHORT = 100.0
+SHORT_TIME_SHARE = 100.0
 """Part of the time that is needed below which a file's times may be of another unit."""
-MANY, WHEEL, CHASSIS = 1000, 0.02, 0.2
+MANY_SAMPLES, WHEEL_SAMPLE_TIME, CHASSIS_SAMPLE_TIME = 1000, 0.02, 0.2
 """Samples of a record, and s between them, from which on times may be of another unit: a wheel moves with up to 25 Hz,
 a chassis with up to 2.5 Hz on its springs, and shows nothing of it in fewer."""
 
@@ -39,19 +39,20 @@ def read_time_series(
 
 def other_unit(lasts: float, needed: float) -> str:
     """Hint that the times of a file may be in milliseconds, if it is far shorter (s) than needed; else empty."""
-    wrong = lasts < needed / SHORT
+    wrong = lasts < needed / SHORT_TIME_SHARE
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
-def sparse(count: int, period: float, needed: float, apart: float = WHEEL) -> str:
+def sparse(count: int, period: float, needed: float, apart: float = WHEEL_SAMPLE_TIME) -> str:
     """Sentence on so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
     ``apart`` (s) for what moves: their times may be of another unit; "" of others."""
     lasts = period * (count - 1)
-    if count < MANY or lasts < SHORT * needed or period < apart:
+    if count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed or period < apart:
         return ""
     return (
         f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, of which the run takes {needed:.4g} s; "
-        f"{'a wheel' if apart == WHEEL else 'a chassis'} moves with up to {0.5 / apart:g} Hz. If their times are in "
+        f"{'a wheel' if apart == WHEEL_SAMPLE_TIME else 'a chassis'} moves with up to {0.5 / apart:g} Hz. If their "
+        "times are in "
         "milliseconds, head the column time [ms]."
     )
 

@@ -9,7 +9,7 @@ from models.core.assumptions import Broken, assumed_of, broken_of
 from models.core.discretisation import WARNED, error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
-EACH = 4
+LISTED_RESULTS = 4
 """Results up to which the error of each has a line."""
 
 Results = Mapping[str, Result]
@@ -22,7 +22,7 @@ def lines(results: Results) -> list[str]:
 
 
 def _errors(results: Results) -> list[str]:
-    if len(results) <= EACH:
+    if len(results) <= LISTED_RESULTS:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
     untold: dict[str, list[str]] = {}
     worst = {name: estimate for name, run in results.items() if (estimate := worst_of(run)) is not None}
@@ -44,7 +44,9 @@ def _errors(results: Results) -> list[str]:
 
 
 def _list_of_few(names: list[str]) -> str:
-    return ", ".join(names[:EACH]) + (f" and {len(names) - EACH} more" if len(names) > EACH else "")
+    return ", ".join(names[:LISTED_RESULTS]) + (
+        f" and {len(names) - LISTED_RESULTS} more" if len(names) > LISTED_RESULTS else ""
+    )
 
 
 def breaches(results: Results) -> list[tuple[str, Broken]]:
@@ -66,7 +68,7 @@ def remarks(results: Results) -> list[str]:
         for name, run in results.items()
         if (worst := worst_of(run)) is not None and worst.warned
     ]
-    return [*steps[:EACH], *(breach.brief() for _, breach in breaches(results))]
+    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in breaches(results))]
 
 
 def gathered(joined: Result, parts: Results) -> Result:
@@ -126,13 +128,13 @@ def _plain(run: Result, key: str) -> dict[str, Any]:
     return said
 
 
-SAID = ("engine", "error", "assumptions")
+DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
 """Attributes by which a result says what it must be doubted for."""
 
 
 def attributes(results: Results) -> dict[str, dict[str, str]]:
     """Attributes of results without their channels, for JSON; ``speaking`` reads them."""
-    return {name: {key: run.data.attrs[key] for key in SAID} for name, run in results.items()}
+    return {name: {key: run.data.attrs[key] for key in DOUBT_ATTRIBUTES} for name, run in results.items()}
 
 
 def speaking(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:

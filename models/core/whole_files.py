@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PART = ".{}.{}.part{}"
+PARTIAL_NAME = ".{}.{}.part{}"
 """Name of a file while it is written: its final name, the number of the process, and its extension again."""
-FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
+DISK_FULL_ERRORS = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 """What a system says where nothing more can be stored: the disk, the user's share of it, or a file is full."""
 
 
@@ -20,7 +20,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     An earlier file of that name is replaced. After an error nothing of the part is left, and the error goes on; if it
     is one of the system's, it names ``path``.
     """
-    part = path.with_name(PART.format(path.name, os.getpid(), path.suffix))
+    part = path.with_name(PARTIAL_NAME.format(path.name, os.getpid(), path.suffix))
     try:
         yield part
         with part.open("rb") as file:
@@ -41,7 +41,7 @@ def write_whole(path: Path, content: bytes | memoryview | str) -> None:
 
 def drop_parts(folder: Path) -> None:
     """Remove from a folder, and from those within it, what killed processes left of files and folders they wrote."""
-    for part in list(folder.rglob(PART.format("*", "*", "*"))):
+    for part in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
         number = part.name.rpartition(".part")[0].rpartition(".")[2]
         if number.isdigit() and not _at_work(int(number)):
             shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
@@ -60,5 +60,5 @@ def _at_work(process: int) -> bool:
 
 def reason_of(error: OSError) -> str:
     """The operating system's reason why a file could not be written, as a phrase with the file."""
-    reason = "the disk is full" if error.errno in FULL else error.strerror or str(error)
+    reason = "the disk is full" if error.errno in DISK_FULL_ERRORS else error.strerror or str(error)
     return " ".join(reason.split()) + (f" ({error.filename})" if error.filename else "")

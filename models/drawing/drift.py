@@ -12,12 +12,12 @@ from models.core.told import Results
 from models.drawing.figures import (
     BAD,
     BLUE,
+    COLUMN_WIDTH,
     DOUBTFUL,
     GOOD,
     GREY,
-    SMALL,
+    SMALL_TEXT,
     VERMILION,
-    WIDE,
     about_one,
     heading,
     legend_below,
@@ -28,7 +28,7 @@ from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 Row = dict[str, Any]
 
 ROADS = {"road": ("on the road", BLUE), "grade": ("on the grade", VERMILION)}
-WORDS = {"accepted": ("✓", GOOD), "stabilise": ("~", DOUBTFUL), "rejected": ("✗", BAD)}
+VERDICT_SIGNS = {"accepted": ("✓", GOOD), "stabilise": ("~", DOUBTFUL), "rejected": ("✗", BAD)}
 """Sign and colour of a verdict."""
 MARKS = dict(zip(CHANNELS, ("o", "s", "^", "D"), strict=True))
 NAMES = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
@@ -50,7 +50,7 @@ def decision(rows: list[Row], limits: Limits, grade: float | None, results: Resu
     """One line per method: damage, pitch error, artificial moment, the two verdicts and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (2.5, 1.25, 1.25, 1.5)
-    figure, axes = subplots(1, 4, figsize=(WIDE, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
+    figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
     for row in rows:
         _marks(axes, row, methods.index(row["method"]))
     right = (1 - limits.damage_error, 1 + limits.damage_error)
@@ -82,7 +82,7 @@ def _marks(axes: Any, row: Row, line: int) -> None:
             axes[0].plot(place, y, mark, color=colour, markersize=4, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
         told = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
-        axes[0].text(1.0, y, told, color=colour, fontsize=SMALL, ha="center", va="center")
+        axes[0].text(1.0, y, told, color=colour, fontsize=SMALL_TEXT, ha="center", va="center")
     for axis, name, span in ((axes[1], "pitch error max [rad]", PITCH), (axes[2], "moment share to 15 Hz", SHARE)):
         axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=4, clip_on=False)
 
@@ -102,14 +102,14 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     for (road, key), x in places.items():
         name = "by damage" if key == "verdict" else "without truth"
         where = "road" if road == "road" else "grade"
-        style = {"fontsize": SMALL, "va": "bottom", "ha": "center", "rotation": 90, "color": ROADS[road][1]}
+        style = {"fontsize": SMALL_TEXT, "va": "bottom", "ha": "center", "rotation": 90, "color": ROADS[road][1]}
         axis.text(x, -0.75, f"{where}, {name}", **style)
-    axis.text(8.9, -0.75, "seconds / free", fontsize=SMALL, va="bottom", ha="center", rotation=90)
+    axis.text(8.9, -0.75, "seconds / free", fontsize=SMALL_TEXT, va="bottom", ha="center", rotation=90)
     free = next(row["seconds"] for row in rows if row["method"] == "free")
     for row in rows:
         line = methods.index(row["method"])
         for key in ("verdict", "without truth"):
-            sign, colour = WORDS[row[key]]
+            sign, colour = VERDICT_SIGNS[row[key]]
             x = places[row["road"], key]
             axis.text(x, line, sign, color=colour, va="center", ha="center", fontsize=10, fontweight="bold")
         if row["road"] == rows[0]["road"]:
@@ -131,7 +131,7 @@ def _legend(figure: Any, grade: float | None) -> None:
     good = Rectangle((0, 0), 1, 1, color=GOOD, alpha=0.16, label="within the limits")
     signs = [
         Line2D([], [], marker="s", linestyle="", color=colour, markersize=5, label=f"{sign} {word}")
-        for word, (sign, colour) in WORDS.items()
+        for word, (sign, colour) in VERDICT_SIGNS.items()
     ]
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
@@ -141,7 +141,7 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
 
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
     """
-    figure, axes = subplots(1, 2, figsize=(WIDE, 4.6))
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
         name, colour = ROADS[road]
         axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring {name}")

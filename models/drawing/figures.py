@@ -1,6 +1,7 @@
 """How figures look: one style, one set of colours, SVG and PNG, the same bytes from the same results.
 
-Pages show figures ``WIDE`` inches wide: no figure is wider, so that its letters are read in the size they are drawn.
+Pages show figures ``COLUMN_WIDTH`` inches wide: no figure is wider, so that its letters are read in the size they are
+drawn.
 
 Logarithmic axes have decades labelled in plain text, 10⁻³, or few decades by numbers, with marks between them: formulas
 in labels and eight marks to every decade are half of what drawing a figure of many panels takes.
@@ -24,11 +25,11 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullLocator
 from models.core.told import Results, remarks
 from models.core.whole_files import whole_file
 
-WIDE = 8.0
+COLUMN_WIDTH = 8.0
 """Width (inches) of the column in which pages show figures: at most that of a figure."""
-TITLE, SMALL = 9.5, 7.5
+TITLE_TEXT, SMALL_TEXT = 9.5, 7.5
 """Size (points) of titles, and the smallest one, of remarks and crowded legends."""
-LEAST = 7.0
+SMALLEST_TEXT = 7.0
 """Size (points) below which nobody reads a figure."""
 
 DARK, BLUE, VERMILION, GREEN = "#222222", "#0072b2", "#d55e00", "#009e73"
@@ -63,7 +64,7 @@ rcParams.update(
         "figure.dpi": 110,
         "savefig.dpi": 150,
         "font.size": 8.5,
-        "axes.titlesize": TITLE,
+        "axes.titlesize": TITLE_TEXT,
         "axes.prop_cycle": cycler(color=TURNS),
         "figure.titlesize": 10.5,
         "figure.labelsize": 8.5,
@@ -132,7 +133,9 @@ def subplot_mosaic(
     return figure, figure.subplot_mosaic([list(row) for row in places], **more)
 
 
-def panels(count: int, across: int, height: float, wide: float = WIDE, **more: Any) -> tuple[Figure, list[Axes]]:
+def panels(
+    count: int, across: int, height: float, wide: float = COLUMN_WIDTH, **more: Any
+) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels, ``across`` of them beside each other, each so many inches high; no place is empty.
 
     more : as for ``subplots``; panels that share an axis show its numbers once.
@@ -187,14 +190,14 @@ def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
 
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-MANY = 2.0
+MANY_DECADES = 2.0
 """Decades on an axis from which on only whole powers of ten are marked."""
-FEW = ("", "2", "4")
-"""What stands before a power of ten that is written on an axis of one decade to ``MANY``."""
+DECADE_MARKS = ("", "2", "4")
+"""What stands before a power of ten that is written on an axis of one decade to ``MANY_DECADES``."""
 
 
 def _spans_few_decades(low: float, high: float) -> bool:
-    return 0 < low < high and bool(np.log10(high / low) < MANY)
+    return 0 < low < high and bool(np.log10(high / low) < MANY_DECADES)
 
 
 class _Powers(LogFormatterSciNotation):
@@ -206,7 +209,7 @@ class _Powers(LogFormatterSciNotation):
         if not power:
             return text
         low, high = sorted(self.axis.get_view_interval()) if self.axis else (0.0, 0.0)
-        if _spans_few_decades(low, high) and high > 10 * low and (power[1] or "") not in FEW:
+        if _spans_few_decades(low, high) and high > 10 * low and (power[1] or "") not in DECADE_MARKS:
             return ""
         if _spans_few_decades(low, high) and 1e-3 <= x < 1e5:
             return f"{x:g}"

@@ -17,7 +17,7 @@ from models.sensors.inertial_unit import bias
 
 NODES = 41
 """Constant angle errors at which damage is counted; an odd number, so that one of them is zero."""
-SMALLEST = 1e-3
+EVEN_SPACING_ANGLE = 1e-3
 """rad; below it the nodes are evenly spaced, above it their spacing grows with the angle."""
 
 UnitPaths = tuple[np.ndarray, np.ndarray]
@@ -49,8 +49,8 @@ def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
 
     Raises InputError, which names the scene's file, for a run without damage.
     """
-    widest = np.arcsinh(reach / SMALLEST)
-    angles = SMALLEST * np.sinh(np.linspace(-widest, widest, NODES))
+    widest = np.arcsinh(reach / EVEN_SPACING_ANGLE)
+    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, NODES))
     damage = np.array([damages(result, angle) for angle in angles])
     true = damage[NODES // 2]
     if not (true > 0).all():

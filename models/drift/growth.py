@@ -27,9 +27,9 @@ roads, for an average over a motion means something only where the error hardly 
 as much changes the growth rate of these roads by 1 to 3 %."""
 SERIES = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
-LONGEST = 710.0
+LARGEST_EXPONENT = 710.0
 """From about this 2 lambda t on, sinh is beyond all numbers."""
-LEAST = 1e-300
+SMALLEST_POSITIVE = 1e-300
 """What counts as above 0 (rad^2/s^3, rad)."""
 MEDIAN = 0.6744897501960817
 """Median of |x| of a normal x, by its standard deviation."""
@@ -78,7 +78,7 @@ def rigid_pitch(p: Parameters) -> RigidPitch:
     return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
 
 
-def fast(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
+def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
     """Part of ``values`` (n,) above ``cutoff`` (Hz), without delay, by the gain x^4 / (1 + x^4) at x = f / cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
@@ -100,7 +100,7 @@ def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np
 
 def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> float:
     """lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces vertical."""
-    return float(np.sqrt(rigid_pitch(p).growth(fast(pitch_rate, period, cutoff)).mean()))
+    return float(np.sqrt(rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff)).mean()))
 
 
 def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
@@ -111,7 +111,7 @@ def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: 
     happens at about two thirds of the time counts most.
     """
     times = period * np.arange(len(pitch_rate))
-    squares = rigid_pitch(p).growth(fast(pitch_rate, period, cutoff))
+    squares = rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff))
 
     def weighted(values: np.ndarray) -> np.ndarray:
         second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
@@ -137,7 +137,7 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
     large = np.where(np.abs(x) > SERIES, x, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # beyond all numbers is infinite, at no rate and no time alike
-        closed = np.where(large > LONGEST, np.inf, 6 * (np.sinh(large) - large) / large**3)
+        closed = np.where(large > LARGEST_EXPONENT, np.inf, 6 * (np.sinh(large) - large) / large**3)
     return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES, closed, series)
 
 
@@ -166,7 +166,11 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     """
     from scipy.optimize import brentq
 
-    for name, value, least in (("rate", rate, 0.0), ("intensity", intensity, LEAST), ("angle", angle, LEAST)):
+    for name, value, least in (
+        ("rate", rate, 0.0),
+        ("intensity", intensity, SMALLEST_POSITIVE),
+        ("angle", angle, SMALLEST_POSITIVE),
+    ):
         if not (math.isfinite(value) and value >= least):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
     longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN) - math.log(intensity)) / 3.0  # without growth
@@ -180,6 +184,6 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
 def _log_gain(log_x: float) -> float:
     """Logarithm of 6 (sinh x - x) / x^3 from that of x = 2 lambda t: neither need be a number itself."""
     x = math.exp(log_x)
-    if x > LONGEST:
+    if x > LARGEST_EXPONENT:
         return math.log(3.0) + x - 3.0 * log_x
     return float(np.log(pitch_variance(1.0, x / 2.0, 3.0)))

@@ -17,7 +17,7 @@ LEVEL = 1e-3
 """Share of the runs of a right filter that are called inconsistent all the same."""
 LAGS = 20
 """Samples over which correlation is looked for."""
-FEWEST = 100
+FEWEST_INNOVATIONS = 100
 """Innovations of a column below which its mean and correlation are not judged."""
 
 
@@ -73,7 +73,7 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
     square = float(np.mean(innovations[known] ** 2))
     figures = [Figure("mean square", square, *(chi2.ppf([tail, 1 - tail], count) / count).tolist())]
     for name, column in zip(names, innovations.T, strict=True):
-        if np.isfinite(column).sum() >= FEWEST:
+        if np.isfinite(column).sum() >= FEWEST_INNOVATIONS:
             figures += [_mean(name, column, tail), _correlation(name, column, tail)]
     return Consistency(tuple(figures))
 

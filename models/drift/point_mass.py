@@ -5,7 +5,7 @@ sampling period ``step`` (s). Two results, each the covariance (2, 2) of the err
 (m/s): of the stochastic differential equation (4) with the intensity deviation^2 step (eqs 8, 11 to 13), and of
 the explicit Euler scheme (3) itself. They differ by O(1/n) after n steps.
 
-The printed variances of position subtract numbers of size t that leave one of size eta^2 t^3; below SMALL the
+The printed variances of position subtract numbers of size t that leave one of size eta^2 t^3; below SERIES_LIMIT the
 same functions are summed as their power series, so that every digit is good at any damping.
 """
 
@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from models.core.errors import InputError
 from models.core.noise import normal
 
-SMALL = 1.0
+SERIES_LIMIT = 1.0
 """Damping times time below which a series is used: 20 terms there, and no digit lost by the closed form above."""
 
 
@@ -41,7 +41,7 @@ def _relative(x: float) -> float:
 
 def _bracket(x: float) -> float:
     """The bracket of eq. (11) by t^3 eta^2: (x + (1 - exp(-2x))/2 - 2 (1 - exp(-x))) / x^3, 1/3 at x = 0."""
-    if x > SMALL:
+    if x > SERIES_LIMIT:
         return (x - math.expm1(-2 * x) / 2 + 2 * math.expm1(-x)) / x**3
     return math.fsum((2 ** (k - 1) - 2) / math.factorial(k) * (-1) ** (k + 1) * x ** (k - 3) for k in range(3, 26))
 
@@ -84,7 +84,7 @@ def _squares(h: float, n: int) -> float:
     """
     if n == 0:
         return 0.0
-    if n * h > SMALL:
+    if n * h > SERIES_LIMIT:
         return (n - 2 * _geometric_sum(h, n) + _geometric_sum(h * (2 - h), n)) / h**2
     terms = range(2, 40)
     whole = ((math.comb(2 * n, k + 1) - 4 * math.comb(n, k + 1) - 2 * math.comb(n, k), n ** (k + 1)) for k in terms)

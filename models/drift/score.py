@@ -40,7 +40,7 @@ SURPRISED = 2.0
 is right, and noise that is estimated is right to a third. An axle force 0.5 % too large, which takes a third off the
 damage along the vehicle, makes 2."""
 
-LEAST, COARSEST = 100, 5e-3
+FEWEST_ROWS, COARSEST_SPACING = 100, 5e-3
 """Rows and spacing (s) that a balance of moments over each step takes: a quarter of a wave at 50 Hz."""
 
 Word = Literal["accepted", "accepted with doubt", "rejected", "stabilise"]
@@ -120,8 +120,8 @@ def figures_of_run(run: Result, p: Parameters) -> RunFigures:
     """
     step = _step(run)
     inertia, heave = p.I * np.diff(run["pitch_rate"]) / step, p.m3 * np.diff(run["z3_rate"]) / step
-    moment = inertia - _means(_natural_moment(run, p), step)
-    force = heave - _means(p.m3 * p.g - run["f3"] - run["f4"], step)
+    moment = inertia - _step_means(_natural_moment(run, p), step)
+    force = heave - _step_means(p.m3 * p.g - run["f3"] - run["f4"], step)
     band = {
         name: low_pass(values, step)
         for name, values in (("moment", moment), ("inertia", inertia), ("force", force), ("heave", heave))
@@ -280,7 +280,7 @@ def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 
-def _means(values: np.ndarray, step: float) -> np.ndarray:
+def _step_means(values: np.ndarray, step: float) -> np.ndarray:
     """Mean over each step of sampled values (n,): the trapezoidal rule with its end correction, order 4."""
     slope = np.gradient(values, step, edge_order=2)
     return (values[1:] + values[:-1]) / 2.0 - step / 12.0 * np.diff(slope)
@@ -297,12 +297,12 @@ def _natural_moment(run: Result, p: Parameters) -> np.ndarray:
 def _step(run: Result) -> float:
     """Spacing (s) of the rows."""
     steps = np.diff(run.times)
-    if len(steps) < LEAST or np.ptp(steps) > 1e-6 * steps[0] or steps[0] > COARSEST:
+    if len(steps) < FEWEST_ROWS or np.ptp(steps) > 1e-6 * steps[0] or steps[0] > COARSEST_SPACING:
         raise InputError(
             "",
             "times",
             None,
-            f"the score needs {LEAST} rows or more, equally spaced by {COARSEST:g} s "
+            f"the score needs {FEWEST_ROWS} rows or more, equally spaced by {COARSEST_SPACING:g} s "
             "or less: leave run.output_step out",
         )
     return float(steps.mean())

@@ -66,5 +66,5 @@ OUTSIDE: dict[str, type] = {}
 """Classes from files outside the tree by their names ``module:Class``, once they are registered (outside.py)."""
 
 RECOMMENDED = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
-DEFAULT = {"exudyn": "GeneralizedAlpha", "mujoco": "Euler"}
+DEFAULT_METHODS = {"exudyn": "GeneralizedAlpha", "mujoco": "Euler"}
 """What an engine does if it is not told otherwise (Exudyn 1.13, MuJoCo 4)."""

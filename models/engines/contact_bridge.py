@@ -47,7 +47,7 @@ HEAD = record("wheels", "speed", "weight", "sunk", "mu", "G", "nu", "curved_x", 
 HEADER = size_of(HEAD)
 
 THEORIES = get_args(Theory)
-WIDE = 0.03
+HALF_WIDTH = 0.03
 """Half the sides (m) of the distance that is made of curvatures."""
 OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5, 1e-5, 1e-4])
 """Steps (m, rad; m/s, rad/s) by which forces are differentiated: creepages of about 1e-6."""
@@ -123,7 +123,7 @@ class Wheels:
     @cached_property
     def bodies(self) -> Distance:
         """Undeformed distance of a wheel on its rail."""
-        return self.distance if self.distance is not None else quadratic(*self.curvatures, WIDE, WIDE)
+        return self.distance if self.distance is not None else quadratic(*self.curvatures, HALF_WIDTH, HALF_WIDTH)
 
     @property
     def sticking(self) -> Array:

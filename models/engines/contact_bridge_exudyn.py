@@ -15,7 +15,7 @@ from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
-from models.engines.exudyn_system import add_node, items, packed_forces, quiet_settings, solve, start
+from models.engines.exudyn_system import add_node, items, packed_forces, quiet_settings, set_start, solve
 
 Law = Callable[[Array, Array, Array, Array], Any]
 Listed = Callable[[Any, Any], Any]
@@ -139,7 +139,7 @@ class Rolling:
         Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.
         """
         check_step("exudyn", self.wheels, solver, step, steps)
-        start(self.mbs, q, v)
+        set_start(self.mbs, q, v)
         options, data = quiet_settings(), self.mbs.systemData
         ti = options.timeIntegration
         ti.automaticStepSize = tolerance > 0.0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mujoco": ".xml", "exudyn": ".py"}
 """Ends of the names of files, by the engines that have them."""
-SEEN = 1e-6
+LIGHTEST_SHOWN_BODY = 1e-6
 """kg: lighter bodies are carriers of joints and of spin, and no part that people know."""
 
 
@@ -71,7 +71,7 @@ def of_exudyn(mbs: Any, coordinates: dict[str, int], subject: Subject, left_out:
     return Exported(script(mbs, coordinates, subject.comment(has, missing)), has, missing)
 
 
-def of_free(engine: str, driven: Driven, subject: Subject, left_out: Sequence[str]) -> Exported:
+def export_free_vehicle(engine: str, driven: Driven, subject: Subject, left_out: Sequence[str]) -> Exported:
     """A free vehicle without what its kernel does."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
@@ -98,7 +98,11 @@ def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
 
 def masses_of_shown_bodies(vehicle: SpatialVehicle, built: Iterable[str]) -> dict[str, float]:
     """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
-    return {str(i): body.mass for i, body in enumerate(vehicle.bodies) if str(i) in set(built) and body.mass > SEEN}
+    return {
+        str(i): body.mass
+        for i, body in enumerate(vehicle.bodies)
+        if str(i) in set(built) and body.mass > LIGHTEST_SHOWN_BODY
+    }
 
 
 def coordinate_names(vehicle: SpatialVehicle) -> list[str]:

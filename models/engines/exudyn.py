@@ -21,9 +21,9 @@ from models.engines.exudyn_system import (
     march_settings,
     mass_and_force,
     recorders,
+    set_start,
     solve,
     solver_counts,
-    start,
 )
 from models.engines.protocol import balanced, guard, landings_followed
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
@@ -190,7 +190,7 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
             _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
 
 
-def _flat(mbs: Any, t: float, load: float) -> float:
+def _flat_road(mbs: Any, t: float, load: float) -> float:
     """Height and rate of the road where there is no other."""
     return 0.0
 
@@ -244,7 +244,9 @@ class ExudynModel:
             _drive(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
             flat = assembly.input is None
-            height, rate = (_flat, _flat) if flat else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
+            height, rate = (
+                (_flat_road, _flat_road) if flat else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
+            )
             _pushing_tyre(self.built, tyre, height, rate)
         if assembly.moment is not None:
             _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
@@ -264,7 +266,7 @@ class ExudynModel:
     def _set_state(self, q: np.ndarray, v: np.ndarray) -> None:
         whole = np.zeros((2, self.built.mbs.systemData.ODE2Size()))
         whole[:, self._columns] = q, v
-        start(self.built.mbs, *whole)
+        set_start(self.built.mbs, *whole)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""

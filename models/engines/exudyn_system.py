@@ -2,7 +2,7 @@
 solvers."""
 
 import struct
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import exudyn as exu
@@ -69,7 +69,7 @@ def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
     ]
 
 
-def start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
+def set_start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
     """Let a system begin with coordinates and rates (n,), in Exudyn's own order."""
     initial = exu.ConfigurationType.Initial
     mbs.systemData.SetODE2Coordinates(q, initial)
@@ -90,17 +90,32 @@ def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]
     return mass, force
 
 
-def ties(mbs: Any) -> np.ndarray:
-    """(c, n): derivatives by the coordinates of Exudyn's own constraints, at its initial state."""
+def ties(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """(c, n) at each of some coordinates (n,): derivatives by them of Exudyn's own constraints."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     solver.InitializeSolver(mbs, options)
     n, count = solver.GetODE2size(), solver.GetAEsize()
-    solver.SetSystemJacobian(np.zeros((n + count, n + count)))
-    solver.ComputeJacobianAE(mbs)
-    rows = np.array(solver.GetSystemJacobian(), float)[n:, :n]
+    nothing, rows = np.zeros((n + count, n + count)), list[np.ndarray]()
+    for q in places:
+        mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Current)
+        solver.SetSystemJacobian(nothing)
+        solver.ComputeJacobianAE(mbs)
+        rows.append(np.array(solver.GetSystemJacobian(), float)[n:, :n])
     solver.FinalizeSolver(mbs, options)
     return rows
+
+
+def tie_gaps(mbs: Any, q: np.ndarray) -> np.ndarray:
+    """(c,): how far coordinates (n,) are from satisfying Exudyn's own constraints."""
+    mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Initial)
+    solver: Any = exu.MainSolverImplicitSecondOrder()
+    options = quiet_settings()
+    solver.InitializeSolver(mbs, options)
+    solver.ComputeAlgebraicEquations(mbs)
+    gaps = np.array(solver.GetSystemResidual(), float)[solver.GetODE2size() :]
+    solver.FinalizeSolver(mbs, options)
+    return gaps
 
 
 def march_settings(settings: Settings) -> Any:

@@ -65,6 +65,16 @@ class Build:
             return kind(bodyNumber=tree, localPosition=local)
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
+    def frame_marker(self, body: str | None, point: Vector, axes: np.ndarray) -> Any:
+        """Marker of a point with axes (3, 3) as columns, as they lie in the design position; for bodies of trees."""
+        if body is None:
+            frame = lists.HT(rotation=axes.tolist(), translation=list(point))
+            return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.ground, localHT=frame))
+        tree, link, origin = self.links[body]
+        local = self.in_body_axes(body, np.subtract(point, origin))
+        frame = lists.HT(rotation=(self.frames[body].T @ axes).tolist(), translation=local.tolist())
+        return self.mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localHT=frame))
+
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
         """Function that reads a coordinate, or its rate, at the stage; 0 where the body does not have it."""
         if (body, freedom) not in self.places:

@@ -18,8 +18,17 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.native_parts import Coupling, DryFriction, GroundSpring, LineSpring, NativePart, joint_parts
-from models.engines.protocol import guard, timed
+from models.engines.native_parts import (
+    Connection,
+    Coupling,
+    DryFriction,
+    GroundSpring,
+    LineSpring,
+    NativePart,
+    TurningSpring,
+    joint_parts,
+)
+from models.engines.protocol import guard, settings_of
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -35,9 +44,9 @@ class Driven:
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
     engine has all of them as its own, and calls nothing back; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
-    parts, ground_springs, line_springs : springs, dampers, mounts and bars that the engine has as its own beside the
-    kernel's forces; frictions, couplings : along its coordinates and between them, as the engine has them: explicit
-    integrators of Exudyn ignore couplings.
+    parts, ground_springs, line_springs, turning_springs : springs, dampers, mounts and bars that the engine has as its
+    own beside the kernel's forces; frictions, couplings, connections : along its coordinates, between them, and between
+    points of bodies, as the engine has them: explicit integrators of Exudyn ignore the latter two.
     """
 
     vehicle: SpatialVehicle
@@ -50,11 +59,18 @@ class Driven:
     line_springs: tuple[LineSpring, ...] = ()
     frictions: tuple[DryFriction, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+    connections: tuple[Connection, ...] = ()
+    turning_springs: tuple[TurningSpring, ...] = ()
 
     @property
     def size(self) -> int:
         """Number of coordinates of the driven vehicle."""
         return len(self.vehicle.coordinates())
+
+    @property
+    def tied(self) -> bool:
+        """Whether constraints tie coordinates or bodies."""
+        return bool(self.couplings or self.connections)
 
     @property
     def has_kernel(self) -> bool:
@@ -104,7 +120,7 @@ class FreeModel(ABC):
 
         RunFailed unless all of it is finite and sane.
         """
-        settings, rest = timed(self.ENGINE, self.settings), np.zeros(self.size)
+        settings, rest = settings_of(self.ENGINE, self.settings), np.zeros(self.size)
         steps, step = settings.steps, settings.step
         states = self.march(rest if q is None else q, rest if v is None else v, steps, step)
         times = step * np.arange(steps + 1)

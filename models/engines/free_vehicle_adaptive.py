@@ -16,7 +16,7 @@ from models.engines.protocol import guard
 
 ABSOLUTE = 1e-2
 """Absolute tolerance (m, rad, per s) by the relative one."""
-FINEST = 3e-14
+FINEST_TOLERANCE = 3e-14
 """Relative tolerance below which scipy's methods would work on rounding."""
 
 
@@ -34,12 +34,12 @@ def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: S
 
 def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
     """States (steps + 1, 2 n), a row at a time, and what it took."""
-    from models.engines.exudyn_system import solver_counts, solver_failure, start
+    from models.engines.exudyn_system import set_start, solver_counts, solver_failure
 
     mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
     states[0], counts = begun, {"steps": 0, "force calls": 0}
     for i in range(settings.steps):
-        start(mbs, *np.split(states[i], 2))
+        set_start(mbs, *np.split(states[i], 2))
         if solver_failure(mbs, settings.integrator, _options(i * settings.step, settings)):
             raise RunFailed("exudyn", "no step is short enough for its tolerance", i * settings.step, states[i])
         data, took = mbs.systemData, solver_counts(mbs)
@@ -64,7 +64,7 @@ def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[
     """States (steps + 1, 2 n) of plain equations, and what it took."""
     from scipy.integrate import solve_ivp
 
-    tolerance = max(settings.tolerance, FINEST)
+    tolerance = max(settings.tolerance, FINEST_TOLERANCE)
 
     def rate(time: float, state: np.ndarray) -> np.ndarray:
         q, v = np.split(state, 2)

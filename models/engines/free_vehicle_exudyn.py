@@ -1,5 +1,6 @@
 """A free vehicle in Exudyn: one kinematic tree, all forces by its user function around the compiled kernel."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import exudyn as exu
@@ -7,15 +8,26 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start, ties
+from models.engines.exudyn_system import (
+    items,
+    mass_and_force,
+    packed_forces,
+    recorders,
+    set_start,
+    solve,
+    tie_gaps,
+    ties,
+)
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import (
     Coordinates,
+    add_connection,
     add_ground_spring,
     add_line_spring,
     add_parts,
     add_rotors,
+    add_turning_spring,
     built_elements,
 )
 from models.engines.native_parts import rotors
@@ -53,11 +65,15 @@ class FreeExudyn(FreeModel):
             add_ground_spring(built, spring)
         for line in driven.line_springs:
             add_line_spring(built, line)
+        for turning in driven.turning_springs:
+            add_turning_spring(built, turning)
         coordinates = Coordinates(built, node)
         for friction in driven.frictions:
             coordinates.rub(friction)
         for coupling in driven.couplings:
             coordinates.couple(coupling)
+        for connection in driven.connections:
+            add_connection(built, connection)
         self._sensors = recorders(mbs, [node])
         mbs.Assemble()
 
@@ -78,17 +94,20 @@ class FreeExudyn(FreeModel):
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Exudyn's own mass matrix (n, n) and residual (n,)."""
-        start(self.mbs, q, v)
+        set_start(self.mbs, q, v)
         return mass_and_force(self.mbs, time)
 
-    def ties(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """(c, n): derivatives of Exudyn's own constraints by the coordinates."""
-        start(self.mbs, q, v)
-        return ties(self.mbs)
+    def ties(self, places: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """(c, n) at each of some coordinates (n,): derivatives of Exudyn's own constraints by them."""
+        return ties(self.mbs, places)
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """(c,): how far coordinates (n,) are from satisfying Exudyn's own constraints."""
+        return tie_gaps(self.mbs, q)
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
-        start(self.mbs, q, v)
+        set_start(self.mbs, q, v)
         if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))
         return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for (sensor,) in self._sensors])

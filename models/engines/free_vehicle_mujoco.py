@@ -16,13 +16,15 @@ from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.native_mujoco import (
+    add_connection,
     add_constraints,
     add_ground_spring,
     add_line_spring,
     add_parts,
     add_rotors,
+    add_turning_spring,
     built_elements,
-    ends,
+    end_bodies,
     set_laws,
     set_line_springs,
     set_rotors,
@@ -58,15 +60,22 @@ def specified(driven: Driven) -> mujoco.MjSpec:
         add_ground_spring(spec, driven.vehicle, spring)
     for line in driven.line_springs:
         add_line_spring(spec, driven.vehicle, line)
+    for turning in driven.turning_springs:
+        add_turning_spring(spec, driven.vehicle, turning)
     add_constraints(spec, driven.vehicle, driven.frictions, driven.couplings)
+    for connection in driven.connections:
+        add_connection(spec, driven.vehicle, connection)
     spec.option.gravity = driven.gravity
     spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
     return spec
 
 
 def _merged(driven: Driven) -> dict[str, str]:
-    """Bodies that are one with the only one that rides on each, and bear no end of a spring."""
-    bearing = ends(driven.parts) | {body for line in driven.line_springs for body, _ in line.ends if body is not None}
+    """Bodies that are one with the only one that rides on each, and bear no end of a spring or a constraint."""
+    held = [body for line in driven.line_springs for body, _ in line.ends]
+    held += [body for connection in driven.connections for body, _ in connection.ends]
+    held += [body for each in driven.turning_springs for body in each.bodies]
+    bearing = end_bodies(driven.parts) | {body for body in held if body is not None}
     return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in bearing}
 
 
@@ -78,8 +87,10 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     if not np.array_equal(places.columns, np.arange(driven.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
     set_masses(model, places, driven.vehicle.bodies)
-    set_laws(model, driven.parts)
     set_rotors(model, rotors(driven.vehicle))
+    if driven.tied:  # how soft constraints are depends on all inertias
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    set_laws(model, driven.parts)
     set_line_springs(model, driven.line_springs)
     return model
 
@@ -143,6 +154,12 @@ class FreeMujoco(FreeModel):
         mass = np.empty((self.size, self.size))
         mujoco.mj_fullM(self.model, self.data, mass)
         return mass, self.data.qfrc_smooth + self.data.qfrc_constraint
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """(c,): how far coordinates (n,) are from satisfying MuJoCo's own equality constraints."""
+        self.acceleration(0.0, q, np.zeros(self.size))
+        gaps: np.ndarray = self.data.efc_pos[self.data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
+        return gaps.copy()
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by MuJoCo's RK4; RunFailed where it gives up."""

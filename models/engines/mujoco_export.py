@@ -21,7 +21,7 @@ IDLE = 1e-300
 """Gain of an actuator that no control drives: with a gain and a slope of 0 a positive damping would be a ratio."""
 UNSET = -1.0
 """Spring length of a tendon that MuJoCo's compiler takes for "as in the design position"."""
-DENSITY, LEAST = 400.0, 0.04
+SHAPE_DENSITY, LEAST_HALF_WIDTH = 400.0, 0.04
 """kg/m^3 of a body's shape, and its least half width (m): large enough to be seen."""
 COLOURS = ((0.0, 0.45, 0.7, 0.6), (0.84, 0.37, 0.0, 0.6), (0.0, 0.62, 0.45, 0.6), (0.8, 0.47, 0.65, 0.6))
 """Of shapes, in turn: red, green, blue, opaque."""
@@ -35,7 +35,7 @@ def add_shapes(spec: mujoco.MjSpec, masses: Mapping[str, float]) -> None:
     spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [0.5, 0.5, 0.5]
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for i, (name, mass) in enumerate(masses.items()):
-        half = max(LEAST, 0.5 * (mass / DENSITY) ** (1 / 3))
+        half = max(LEAST_HALF_WIDTH, 0.5 * (mass / SHAPE_DENSITY) ** (1 / 3))
         spec.body(name).add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=[1.6 * half, 0.8 * half, 0.6 * half],

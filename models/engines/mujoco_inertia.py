@@ -14,7 +14,7 @@ from models.vehicles.spatial import Body, SpatialVehicle, Vector
 
 MARGIN = 1e-13
 """Share by which A + B is kept above C, so that rounding does not undo it."""
-TOLD = 1e-9
+TOLD_SHARE = 1e-9
 """Share of a moment from which on lowering it is told."""
 
 
@@ -75,7 +75,7 @@ def _lower(name: str, tensors: dict[str, np.ndarray]) -> str:
     moments = np.maximum(moments, 0.0)
     moments[2] = (moments[0] + moments[1]) / (1.0 + 2.0 * MARGIN)
     tensors[name] = axes * moments @ axes.T
-    if largest - moments[2] < TOLD * largest:
+    if largest - moments[2] < TOLD_SHARE * largest:
         return ""
     where = ", ".join(f"{part:.3g}" for part in axis)
     return (

@@ -14,11 +14,11 @@ import numpy as np
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle
 
 AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
-NONE: Mapping[str, str] = {}
+NO_CARRIERS: Mapping[str, str] = {}
 """Carriers, where no body is one with another: the body that rides on each, by their names."""
 
 
-def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NONE) -> mujoco.MjSpec:
+def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NO_CARRIERS) -> mujoco.MjSpec:
     """Bodies and joints, with masses and inertias of 1 for the moment (see ``weigh``).
 
     Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
@@ -78,7 +78,9 @@ class MujocoIndices:
     carriers : bodies that are one there with the only one that rides on them, by its name.
     """
 
-    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel, carriers: Mapping[str, str] = NONE) -> None:
+    def __init__(
+        self, vehicle: SpatialVehicle, model: mujoco.MjModel, carriers: Mapping[str, str] = NO_CARRIERS
+    ) -> None:
         order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
         self.bodies = {name: int(model.body(order[_merged(carriers, name)]).id) for name in order}
         self.joints: dict[tuple[str, str], int] = {

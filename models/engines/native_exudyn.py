@@ -19,12 +19,14 @@ from models.engines.exudyn_tree import JOINTS, Build
 from models.engines.native_parts import (
     SLIDES,
     AxialTravel,
+    Connection,
     CoordinateTravel,
     Coupling,
     DryFriction,
     GroundSpring,
     LineSpring,
     NativePart,
+    TurningSpring,
 )
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
@@ -86,6 +88,32 @@ def add_line_spring(built: Build, spring: LineSpring) -> None:
             force=spring.stiffness * (length - spring.length),
         )
     )
+
+
+def add_turning_spring(built: Build, spring: TurningSpring) -> None:
+    """A connector between frames of both bodies, of rotations alone, whose rotation is a vector and no angles."""
+    ends = zip(spring.bodies, spring.axes, strict=True)
+    places = {body: (0.0, 0.0, 0.0) if body is None else built.vehicle.body(body).position for body in spring.bodies}
+    turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
+    built.mbs.AddObject(
+        items.RigidBodySpringDamper(
+            markerNumbers=[built.frame_marker(body, places[body], axes) for body, axes in ends],
+            stiffness=spring.stiffness * turning,
+            damping=spring.damping * turning,
+            useIntrinsicFormulation=True,
+        )
+    )
+
+
+def add_connection(built: Build, connection: Connection) -> None:
+    """A spherical joint, or one that leaves no freedom between frames of both bodies."""
+    if connection.axes is None:
+        markers = [built.marker(*end) for end in connection.ends]
+        built.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
+        return
+    ends = zip(connection.ends, connection.axes, strict=True)
+    markers = [built.frame_marker(*end, axes) for end, axes in ends]
+    built.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:

@@ -10,22 +10,24 @@ spring length below 0, a positive damping for a ratio) is written into the compi
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from models.engines.native_parts import (
     AxialTravel,
+    Connection,
     CoordinateTravel,
     Coupling,
     DryFriction,
     GroundSpring,
     LineSpring,
     NativePart,
+    TurningSpring,
 )
 from models.vehicles.cut_vehicle import Element
-from models.vehicles.spatial import Curve, SpatialVehicle
+from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 
 ENDLESS = 1e300
 """N: a force range that cuts nothing off."""
@@ -47,7 +49,7 @@ class Affine(NamedTuple):
     high: float = ENDLESS
 
 
-def ends(parts: Sequence[NativePart]) -> set[str]:
+def end_bodies(parts: Sequence[NativePart]) -> set[str]:
     """Bodies on which parts have sites: MuJoCo must know them apart from what rides on them."""
     axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
     return {name for travel in axial for name in (travel.frame, travel.body)}
@@ -94,10 +96,10 @@ def set_rotors(model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTrav
 
 def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
     """An actuator along each axis of space on which something acts, between sites on the body and on the ground."""
-    number, name = len(spec.sites), [body.name for body in vehicle.bodies].index(spring.body)
+    number = len(spec.sites)
     tip, foot = f"ground spring {number}", f"ground {number}"
-    spec.body(str(name)).add_site(name=tip, pos=np.subtract(spring.point, vehicle.body(spring.body).position))
-    spec.worldbody.add_site(name=foot, pos=spring.anchor)
+    _add_site(spec, vehicle, tip, spring.body, spring.point)
+    _add_site(spec, vehicle, foot, None, spring.anchor)
     for i, load in enumerate(spring.load):
         if spring.stiffness[i] or spring.damping[i] or load:
             strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
@@ -108,12 +110,9 @@ def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: Grou
 def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSpring) -> None:
     """A spatial tendon between two sites; ``set_line_springs`` gives it its law."""
     number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE}{spring.name}")
-    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
-    for i, (body, point) in enumerate(spring.ends):
-        carrier = spec.worldbody if body is None else spec.body(numbers[body])
-        origin = (0.0, 0.0, 0.0) if body is None else vehicle.body(body).position
+    for i, end in enumerate(spring.ends):
         site = f"end {number + i}"
-        carrier.add_site(name=site, pos=np.subtract(point, origin))
+        _add_site(spec, vehicle, site, *end)
         tendon.wrap_site(site)
 
 
@@ -132,7 +131,56 @@ def add_constraints(
         equality.data[:2] = coupling.offset, coupling.ratio
         equality.solref[:], equality.solimp[:] = coupling.solref, coupling.solimp
     if frictions or couplings:
-        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        _allow_constraints(spec)
+
+
+def _allow_constraints(spec: mujoco.MjSpec) -> None:
+    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+
+
+def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Connection) -> None:
+    """A soft equality constraint between two sites: of their places, or of their axes, too."""
+    axes = connection.axes or (np.eye(3), np.eye(3))
+    first = len(spec.sites)
+    for i, ((body, point), columns) in enumerate(zip(connection.ends, axes, strict=True)):
+        _add_site(spec, vehicle, f"joint {first + i}", body, point).quat = _quaternion(columns)
+    kinds, turns = mujoco.mjtEq, connection.axes is not None
+    equality = spec.add_equality(
+        type=kinds.mjEQ_WELD if turns else kinds.mjEQ_CONNECT,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        name1=f"joint {first}",
+        name2=f"joint {first + 1}",
+    )
+    equality.data[10] = connection.torque_scale
+    equality.solref[:], equality.solimp[:] = connection.solref, connection.solimp
+    _allow_constraints(spec)
+
+
+def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:
+    """An actuator about each axis of a site on the first body, whose length is that of the rotation vector along it."""
+    number = len(spec.sites)
+    foot, tip = f"turn {number}", f"turn {number + 1}"
+    for name, body, axes in zip((foot, tip), spring.bodies, spring.axes, strict=True):
+        place = (0.0, 0.0, 0.0) if body is None else vehicle.body(body).position
+        _add_site(spec, vehicle, name, body, place).quat = _quaternion(axes)
+    for gear in np.eye(6)[3:]:
+        twist = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
+        twist.gear[:], twist.gainprm[0], twist.biastype = gear, 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+        twist.biasprm[1:3] = -spring.stiffness, -spring.damping
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return quaternion
+
+
+def _add_site(spec: mujoco.MjSpec, vehicle: SpatialVehicle, name: str, body: str | None, point: Vector) -> Any:
+    """A site on a body (None: the ground), its place (m) in the design position."""
+    if body is None:
+        return spec.worldbody.add_site(name=name, pos=point)
+    number = [each.name for each in vehicle.bodies].index(body)
+    return spec.body(str(number)).add_site(name=name, pos=np.subtract(point, vehicle.body(body).position))
 
 
 def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:

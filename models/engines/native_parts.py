@@ -126,6 +126,39 @@ class Coupling:
     solimp: tuple[float, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class TurningSpring:
+    """A spring and damper between the turning of two bodies (None: the ground), the same about all axes.
+
+    The moment is -stiffness r - damping w: r the rotation vector from the first body's axes to the second's, w the
+    angular velocity of the second against the first; axes : (3, 3) of each as columns in the design position, parallel
+    where it is at rest; stiffness in N m/rad, damping in N m s/rad.
+    """
+
+    name: str
+    bodies: tuple[str | None, str]
+    axes: tuple[np.ndarray, np.ndarray]
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """A constraint that keeps a point of a body at one of another (None: the ground), and with axes their turning, too.
+
+    ends : both bodies with their points (m) in the design position, where they need not meet; axes : (3, 3) of each as
+    columns in the design position, which must be parallel, None where the bodies turn freely about the point; solref,
+    solimp, torque_scale (m) : how soft MuJoCo makes it. Exudyn's is rigid.
+    """
+
+    name: str
+    ends: tuple[tuple[str | None, Vector], tuple[str | None, Vector]]
+    axes: tuple[np.ndarray, np.ndarray] | None
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
+    torque_scale: float
+
+
 @dataclass(frozen=True)
 class Division:
     """How the elements of a vehicle are divided between an engine and the compiled forces.

@@ -85,13 +85,13 @@ def _class(name: str) -> type:
     except AttributeError:
         raise _unusable_engine(name, f"the module {module} has no {attribute}") from None
     except (Exception, SystemExit) as error:
-        raise _unusable_engine(name, f"the module {module} cannot be imported: {_said(error)}") from None
+        raise _unusable_engine(name, f"the module {module} cannot be imported: {_error_text(error)}") from None
     if not isinstance(outside_class, type):
         raise _unusable_engine(name, f"{attribute} is no class")
     return outside_class
 
 
-def _said(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
@@ -111,7 +111,7 @@ def _call_engine(name: str, question: str, function: Callable, *arguments: Any) 
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{question} raised {_said(error)}") from error
+        raise RunFailed(name, f"{question} raised {_error_text(error)}") from error
 
 
 def _answer_as_array(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -205,7 +205,7 @@ class Guarded:
         return blank | dict(getattr(self.model, "plan", dict)())
 
 
-TIGHT = 1e-10
+REFERENCE_TOLERANCE = 1e-10
 """Tolerance of the reference's own run."""
 MARGIN, FLOOR, CEILING = 100.0, 1e-5, 0.1
 """A run is refused beyond so many times the expected error, of the largest motion; but not below the first share of
@@ -215,7 +215,7 @@ that motion (between their own steps, methods interpolate to 3e-6), and always b
 def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
     """Say how far a run is from the reference; raises RunFailed where its order and step cannot explain that."""
     try:
-        truth = _of_reference(assembly, replace(settings, integrator="DOP853", tolerance=TIGHT))
+        truth = _of_reference(assembly, replace(settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
     except (InputError, RunFailed) as error:
         return f"nothing was compared with it: the reference gives no run of this scene ({error})"
     gap, where = relative_gap(run, truth)

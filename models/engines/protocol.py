@@ -102,7 +102,7 @@ def _refuse_uneven_step(engine: str, step: float, multiple: str, length: float) 
         )
 
 
-def timed(engine: str, settings: Settings | None) -> Settings:
+def settings_of(engine: str, settings: Settings | None) -> Settings:
     """Settings of a run; RunFailed where the model was built without."""
     if settings is None:
         raise RunFailed(engine, "the model was built without settings: it knows no step and no duration")

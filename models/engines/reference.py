@@ -16,7 +16,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import guard, landings_followed
-from models.machine.compiled import named, njit
+from models.machine.compiled import named_closure, njit
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
 NO_INPUT = np.zeros((1, 4))
@@ -25,7 +25,7 @@ NO_INPUT = np.zeros((1, 4))
 
 def compiled(function: Any, key: tuple) -> Any:
     """Compile a closure with an index of its own: those of one factory would share numba's."""
-    function = named(function, *key)
+    function = named_closure(function, *key)
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
@@ -71,7 +71,7 @@ def _sum(rhs, added):
         rhs(y, u, p, dy)
         added(y, u, p, dy)
 
-    return register_jitable(named(total, rhs.__name__, added.__name__))
+    return register_jitable(named_closure(total, rhs.__name__, added.__name__))
 
 
 @dataclass

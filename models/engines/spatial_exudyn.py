@@ -7,8 +7,16 @@ import numpy as np
 
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, solver_counts, start
-from models.engines.protocol import timed
+from models.engines.exudyn_system import (
+    KINDS,
+    mass_and_force,
+    quiet_settings,
+    recorders,
+    set_start,
+    solve,
+    solver_counts,
+)
+from models.engines.protocol import settings_of
 from models.engines.spatial_exudyn_build import RoadRows, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,
@@ -55,7 +63,7 @@ class SpatialExudyn:
             return np.linalg.solve(*self._mass_and_force(q, v))
 
     def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        start(self.mbs, self._values_in_exudyn_order(q), self._values_in_exudyn_order(v))
+        set_start(self.mbs, self._values_in_exudyn_order(q), self._values_in_exudyn_order(v))
         mass, force = mass_and_force(self.mbs, time)
         return mass[np.ix_(self._columns, self._columns)], force[self._columns]
 
@@ -66,7 +74,7 @@ class SpatialExudyn:
         steps to both sides, its answers combine to central differences of order six.
         """
         zero, h = np.zeros(self.size), difference_step(self.vehicle)
-        start(self.mbs, zero, zero)
+        set_start(self.mbs, zero, zero)
         with self.road.still(self._flat[0]):
             parts = {i: self._linearised(i * h) for weight in DIFFERENCES for i in (weight, -weight)}
         stiffness, damping = (
@@ -112,8 +120,8 @@ class SpatialExudyn:
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
         """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
-        settings, rest = timed("exudyn", self.settings), np.zeros(self.size)
-        start(
+        settings, rest = settings_of("exudyn", self.settings), np.zeros(self.size)
+        set_start(
             self.mbs,
             self._values_in_exudyn_order(rest if q is None else q),
             self._values_in_exudyn_order(rest if v is None else v),

@@ -14,7 +14,7 @@ from models.engines.mujoco_layout import check
 from models.engines.mujoco_march import FORCE_CALLS, march
 from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
-from models.engines.protocol import timed
+from models.engines.protocol import settings_of
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
 from models.engines.spatial_protocol import EngineKinematics, curves, difference_step, jacobian, linear_vehicle, sound
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -120,7 +120,7 @@ class SpatialMujoco:
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
         """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
-        settings, rest = timed("mujoco", self.settings), np.zeros(self.model.nv)
+        settings, rest = settings_of("mujoco", self.settings), np.zeros(self.model.nv)
         both, start = np.concatenate((self.numbers.columns, rest.size + self.numbers.columns)), np.empty(2 * rest.size)
         start[both] = np.concatenate((rest if q is None else q, rest if v is None else v))
         with installed(self.law):

@@ -21,15 +21,15 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.whole_files import FULL, reason_of
+from models.core.whole_files import DISK_FULL_ERRORS, reason_of
 from models.ensemble.store import Arrays, Store
 
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
-AHEAD = 64
+BLOCKS_AHEAD = 64
 """Blocks under way at once, so that the memory for results on their way stays bounded; two per worker of a cluster that
 has more."""
-TOLD = 5
+NAMED_FAILURES = 5
 """Failed blocks that a message names."""
 LIVES, AMONG_OTHERS = 4, 2
 """Times that a block may lose its worker, of which so many among others; then it is computed alone, and is to blame
@@ -45,7 +45,7 @@ class Blocks(NamedTuple):
     at once."""
 
     size: int = BLOCK
-    ahead: int = AHEAD
+    ahead: int = BLOCKS_AHEAD
 
     def count(self, paths: int) -> int:
         """Number of blocks."""
@@ -206,7 +206,7 @@ def in_order(
     blocks: Iterator[T],
     executor: Executor | None = None,
     store: Store | None = None,
-    ahead: int = AHEAD,
+    ahead: int = BLOCKS_AHEAD,
 ) -> Generator[tuple[T, Any]]:
     """Each of some blocks with what a function gives for it, in their order, each as soon as those before it are there.
 
@@ -231,8 +231,8 @@ def in_order(
     with closing(_answers(function, missing(), executor, ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                raise (_full if answer.full else _gone)(f"block {i}: {answer.reason}", kept)
-            _keep(kept, i, answer)
+                raise (_disk_full if answer.full else _gone)(f"block {i}: {answer.reason}", kept)
+            _save_block(kept, i, answer)
             while given in here and kept.has(given):
                 yield here.pop(given), kept.load(given)
                 given += 1
@@ -240,7 +240,7 @@ def in_order(
         yield here[i], kept.load(i)
 
 
-def each_of(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
+def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
     """What a function gives for each of a few blocks, in their order.
 
     Raises what the function raises for the first block that fails: InputError and RunFailed as they are, by whatever
@@ -248,7 +248,7 @@ def each_of(function: Callable[[T], Any], blocks: Iterable[T], executor: Executo
     """
     if executor is None:
         return [function(block) for block in blocks]
-    with closing(_answers(function, iter(enumerate(blocks)), executor, AHEAD)) as answers:
+    with closing(_answers(function, iter(enumerate(blocks)), executor, BLOCKS_AHEAD)) as answers:
         kept = {i: answer for i, _, answer in answers}
     ordered = [kept[i] for i in sorted(kept)]
     for answer in ordered:
@@ -269,12 +269,12 @@ def _next_kept(
         return False
     if isinstance(answer, _Failure):
         if answer.full:
-            raise _full(answer.reason, store)
+            raise _disk_full(answer.reason, store)
         if answer.gone:
             raise _gone(answer.reason, store)
         failed[i] = answer.reason
         return True
-    _keep(store, i, answer)
+    _save_block(store, i, answer)
     counted.add(len(block))
     return True
 
@@ -283,8 +283,8 @@ def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFa
     """The failure that names blocks and paths."""
     told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
     kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
-    more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
-    return RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
+    more = f"; {len(failed) - NAMED_FAILURES} more blocks" if len(failed) > NAMED_FAILURES else ""
+    return RunFailed("ensemble", "; ".join(told[:NAMED_FAILURES]) + more + kept)
 
 
 def _answers(
@@ -300,7 +300,7 @@ def _answers(
     lost, waiting = Counter[int](), dict[Future, tuple[int, T]]()
     try:
         while queue or alone or waiting:
-            while (queue and _near(queue[0][0], waiting, alone, ahead)) or (alone and not waiting):
+            while (queue and _may_begin(queue[0][0], waiting, alone, ahead)) or (alone and not waiting):
                 i, block = (queue or alone).popleft()
                 waiting[_submitted(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
@@ -312,14 +312,14 @@ def _answers(
                 if died and lost[i] < LIVES:
                     (alone if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
-                    yield i, block, future.result() if error is None else _said(error)
+                    yield i, block, future.result() if error is None else _error_text(error)
             queue.extend(islice(missing, max(ahead - len(queue), 0)))
     finally:
         for future in waiting:
             future.cancel()
 
 
-def _near(i: int, waiting: dict[Future, tuple[int, T]], alone: Collection[tuple[int, T]], ahead: int) -> bool:
+def _may_begin(i: int, waiting: dict[Future, tuple[int, T]], alone: Collection[tuple[int, T]], ahead: int) -> bool:
     """Whether a block may be begun beside those that wait, and before those that will be computed alone."""
     first = min((other for other, _ in (*waiting.values(), *alone)), default=i)
     return len(waiting) < ahead and i < first + ahead
@@ -338,17 +338,17 @@ def _worker_died(error: BaseException | None) -> bool:
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
-def _keep(store: Store | _Memory, block: int, arrays: Arrays) -> None:
+def _save_block(store: Store | _Memory, block: int, arrays: Arrays) -> None:
     """Save a block; RunFailed where the disk is full, which no other block would change."""
     try:
         store.save(block, arrays)
     except OSError as error:
-        if error.errno not in FULL:
+        if error.errno not in DISK_FULL_ERRORS:
             raise
-        raise _full(reason_of(error), store) from None
+        raise _disk_full(reason_of(error), store) from None
 
 
-def _full(reason: str, store: Store | _Memory) -> RunFailed:
+def _disk_full(reason: str, store: Store | _Memory) -> RunFailed:
     kept = f"; the finished blocks are kept in {store.folder}: make room and resume" if isinstance(store, Store) else ""
     return RunFailed("ensemble", f"{reason}{kept}")
 
@@ -373,18 +373,18 @@ def _attempt(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
     try:
         arrays = job(block)
     except Exception as error:
-        return _said(error)
+        return _error_text(error)
     if not isinstance(block, range):
         return arrays
     short = [name for name, values in arrays.items() if len(values) != len(block)]
     return _Failure(f"{short[0]!r} has not one row per path") if short else arrays
 
 
-def _said(error: BaseException) -> _Failure:
+def _error_text(error: BaseException) -> _Failure:
     if _worker_died(error):
         return _Failure("its worker died: killed, or out of memory")
     if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":
         return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", gone=True)
-    full = isinstance(error, OSError) and error.errno in FULL
+    full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRORS
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
     return _Failure(said, full, error=error if isinstance(error, InputError | RunFailed) else None)

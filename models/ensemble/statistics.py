@@ -6,7 +6,7 @@ import numpy as np
 
 from models.core.errors import InputError
 
-FEWEST = 3
+FEWEST_PATHS = 3
 ERRORS_95 = 1.959964
 """Standard errors on either side of a 95 % interval."""
 FAN = (5, 25, 50, 75, 95)
@@ -17,7 +17,7 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
     """Standard deviation of values (n,) and its standard error, for any law of finite fourth moment.
 
     By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
-    value is none. Raises InputError for fewer than ``FEWEST`` values, of which two have an error of 0 by this.
+    value is none. Raises InputError for fewer than ``FEWEST_PATHS`` values, of which two have an error of 0 by this.
     """
     if not len(values):
         return deviation_of(0, 0.0, 0.0)
@@ -27,8 +27,8 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
 
 def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float]:
     """Standard deviation and its standard error, by the second and fourth central moments of ``count`` values."""
-    if count < FEWEST:
-        raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST} values or more")
+    if count < FEWEST_PATHS:
+        raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST_PATHS} values or more")
     spread = math.sqrt(second * count / (count - 1))
     if spread == 0.0:
         return 0.0, 0.0

@@ -14,7 +14,7 @@ from models.ensemble.statistics import deviation_of, ranks
 
 ACCURACY = 0.005
 """Largest relative error of a quantile by ``Spread``."""
-SMALLEST, LARGEST = 1e-15, 1e9
+SMALLEST_MAGNITUDE, LARGEST_MAGNITUDE = 1e-15, 1e9
 """Magnitudes between which ``Spread`` tells values apart; smaller ones count as 0."""
 
 
@@ -104,7 +104,7 @@ class Spread:
 
     def __init__(self) -> None:
         self._width = np.log1p(2.0 * ACCURACY / (1.0 - ACCURACY))
-        self._bins = int(np.ceil(np.log(LARGEST / SMALLEST) / self._width)) + 2
+        self._bins = int(np.ceil(np.log(LARGEST_MAGNITUDE / SMALLEST_MAGNITUDE) / self._width)) + 2
         self._counts = np.zeros((0, self._bins), dtype=np.int64)
 
     def add(self, values: np.ndarray) -> None:
@@ -112,9 +112,9 @@ class Spread:
         columns = values.shape[1]
         if not len(self._counts):
             self._counts = np.zeros((columns, self._bins), dtype=np.int64)
-        sizes = np.clip(np.abs(values), 0.0, LARGEST)
+        sizes = np.clip(np.abs(values), 0.0, LARGEST_MAGNITUDE)
         with np.errstate(divide="ignore"):
-            place = np.ceil(np.log(sizes / SMALLEST) / self._width)
+            place = np.ceil(np.log(sizes / SMALLEST_MAGNITUDE) / self._width)
         place = np.clip(np.nan_to_num(place, nan=0.0, neginf=0.0), 0, self._bins - 1).astype(np.int64)
         known = ~np.isnan(values)
         cells = (np.arange(columns) * self._bins + place)[known]
@@ -125,5 +125,5 @@ class Spread:
         upto = self._counts.cumsum(axis=1)
         wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
         place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
-        middle = SMALLEST * np.exp(self._width * place) * (1.0 - ACCURACY)
+        middle = SMALLEST_MAGNITUDE * np.exp(self._width * place) * (1.0 - ACCURACY)
         return np.where(upto[:, -1] > 0, np.where(place == 0, 0.0, middle), np.nan)

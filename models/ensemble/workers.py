@@ -115,11 +115,11 @@ def _end_with(pipe: Connection) -> None:
     os._exit(1)
 
 
-USUAL = 2
+DEFAULT_WORKERS = 2
 """Processes, if there are so many cores and nobody asks for another number; no result depends on it."""
 SCHEMES = ("tcp", "tls", "ws", "wss", "ucx", "inproc")
 """Ways in which a Dask scheduler is reached."""
-PATIENCE = "10s"
+SCHEDULER_TIMEOUT = "10s"
 """How long a scheduler has to answer."""
 
 
@@ -131,12 +131,12 @@ class Crew:
     cluster: str | None = None
 
     @classmethod
-    def given(cls, workers: int | None = None, cluster: str | None = None, usual: int = USUAL) -> "Crew":
+    def given(cls, workers: int | None = None, cluster: str | None = None, usual: int = DEFAULT_WORKERS) -> "Crew":
         """The crew that is asked for; ``usual`` processes, one per core at most, where none is."""
         return cls(workers or min(usual, os.cpu_count() or 1), cluster)
 
     @classmethod
-    def of(cls, scene: Any, usual: int = USUAL) -> "Crew":
+    def of(cls, scene: Any, usual: int = DEFAULT_WORKERS) -> "Crew":
         """The crew that a scene asks for, as ``given``."""
         return cls.given(scene.workers, scene.cluster, usual)
 
@@ -182,7 +182,7 @@ def cluster(address: str, *places: Path) -> Iterator[Executor]:
     if scheme not in SCHEMES:
         raise InputError("", "cluster", scheme, "is no way to reach a scheduler", SCHEMES)
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError("", "cluster", address, f"no Dask scheduler answers there: {reason}") from None

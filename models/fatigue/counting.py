@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.core.errors import InputError
-from models.fatigue.damage import checked, summed, turning_points
+from models.fatigue.damage import checked_load, damage_sum, turning_points
 from models.fatigue.rainflow_cycles import cycles
 
 LEVELS, RANGES = 64, 64
@@ -37,14 +37,14 @@ class Counted:
 
 def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Counted:
     """Count a load (n,); raises InputError for one without a sample, or with one that is not finite."""
-    load = checked(load)
+    load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = cycles(turns)
     least, greatest = float(load.min()), float(load.max())
     levels = np.linspace(least, greatest, LEVELS + 1)
     ranges = np.linspace(0.0, greatest - least, RANGES + 1)[1:]
     return Counted(
-        {slope: summed(spans, counts, slope) for slope in slopes},
+        {slope: damage_sum(spans, counts, slope) for slope in slopes},
         levels,
         level_crossings(turns, levels),
         ranges,
@@ -58,7 +58,7 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Number of times that a load (n,), or its turning points, rises through each level (l,), in any order; raises
     InputError for a load as ``count`` does, and for a level that is no number."""
-    load, given = checked(load), np.asarray(levels, float)
+    load, given = checked_load(load), np.asarray(levels, float)
     if np.isnan(given).any():
         raise InputError("", "levels", None, "must be numbers")
     levels, places = np.unique(given, return_inverse=True)

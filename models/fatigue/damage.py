@@ -16,7 +16,7 @@ SLOPE = 5.0
 CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
 
 
-STILL = 1e-9
+REST_RANGE_SHARE = 1e-9
 """A load that varies by less than this part of its size is at rest: what a run's rounding leaves, a thousandfold."""
 
 
@@ -29,7 +29,7 @@ def turning_points(load: np.ndarray) -> np.ndarray:
     return load[np.concatenate(([0], turns, [len(load) - 1]))]
 
 
-def checked(load: np.ndarray) -> np.ndarray:
+def checked_load(load: np.ndarray) -> np.ndarray:
     """The load (n,) as doubles; InputError for none, for one that is masked or not finite, for no row of them."""
     if np.ma.is_masked(load):
         raise InputError(
@@ -48,7 +48,7 @@ def checked(load: np.ndarray) -> np.ndarray:
     return load
 
 
-def summed(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
+def damage_sum(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
     """Sum of count times range^slope of cycles (c,); InputError for a slope that is none and a sum beyond doubles."""
     if not (math.isfinite(slope) and slope > 0.0):
         raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
@@ -70,13 +70,13 @@ def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
     """
     from models.fatigue.rainflow_cycles import cycles
 
-    spans, _, counts = cycles(turning_points(checked(load)))
-    return summed(spans, counts, slope)
+    spans, _, counts = cycles(turning_points(checked_load(load)))
+    return damage_sum(spans, counts, slope)
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
     """Pseudo-damage of a load (n,) by that of the true one (m,); raises InputError if the true one never varies."""
     whole = pseudo_damage(truth, slope)
-    if whole == 0.0 or np.ptp(truth) <= STILL * np.abs(truth).max():
+    if whole == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():
         raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")
     return pseudo_damage(load, slope) / whole

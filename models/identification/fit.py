@@ -12,7 +12,7 @@ from models.identification.problem import FAILED, Problem
 
 STAGE, MOST_STAGES = 4, 20
 """Trials of a stage, and stages of a fit."""
-SETTLED = 1e-4
+COST_DECREASE = 1e-4
 """Relative decrease of the cost in a stage at which a fit ends: with the residuals of a hundred corners, which count
 once each, estimates then move by a tenth of their standard errors at most."""
 INSIDE = 1e-6
@@ -60,17 +60,17 @@ def fit(
             if stage_store is not None:
                 stage_store.save(first + stage, block)
         values, before, cost = block["values"], cost, float(block["cost"])
-        converged = before - cost <= SETTLED * cost
+        converged = before - cost <= COST_DECREASE * cost
         size = np.sqrt(2.0 * cost / int((problem.weights > 0.0).sum()))
-        tell(f"stage {stage + 1}, error {size:.4g} of the channels", _share(stage, before, cost))
+        tell(f"stage {stage + 1}, error {size:.4g} of the channels", _done_share(stage, before, cost))
         if converged:
             break
     return Fit(problem, values, problem.residuals(values), cost, stage + 1, converged)
 
 
-def _share(stage: int, before: float, cost: float) -> float:
+def _done_share(stage: int, before: float, cost: float) -> float:
     """Which part of a fit may be done: stages grow few as the cost settles."""
-    settled = 0.0 if not np.isfinite(before) else min(1.0, -np.log10(max(1.0 - cost / before, SETTLED)) / 4.0)
+    settled = 0.0 if not np.isfinite(before) else min(1.0, -np.log10(max(1.0 - cost / before, COST_DECREASE)) / 4.0)
     return 0.9 * max(settled, stage / MOST_STAGES)
 
 
@@ -89,14 +89,14 @@ def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> d
         jac=lambda x: problem.jacobian(x * scale, residuals, executor).reshape(-1, len(x)),
         bounds=(low / scale, high / scale),
         max_nfev=STAGE,
-        ftol=0.1 * SETTLED,
+        ftol=0.1 * COST_DECREASE,
         xtol=1e-8,
         gtol=1e-12,
     )
     return {"values": solved.x * scale, "cost": np.array(solved.cost)}
 
 
-def held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
+def fit_with_held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
     """The same with parameter ``k`` at a value, and the others from ``start`` (p,) on."""
     others = [replace(each, start=float(at)) for each, at in zip(problem.parameters, start, strict=True)]
     del others[k]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from models.core.errors import InputError
+from models.core.errors import InputError, suggestion
 from models.core.result import Result
 from models.core.scene_file import set_key
-from models.core.strict import LARGEST
+from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import Clock, Curve, Measured, Parameter, Problem, measured_channel
 from models.measured.curve import curve
@@ -27,7 +27,7 @@ def parameter(scene: Any, text: str) -> Parameter:
     Raises InputError for a key that is not there or holds no number, and for a range that does not hold the start.
     """
     key, equals, span = (part.strip() for part in text.partition("="))
-    start, low, high = held_by(scene, key)
+    start, low, high = scene_value(scene, key)
     if equals:
         ends = span.split(":")
         try:
@@ -37,7 +37,7 @@ def parameter(scene: Any, text: str) -> Parameter:
     return Parameter(key, start, low, high)
 
 
-def held_by(scene: Any, key: str) -> tuple[float, float, float]:
+def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
     """What a scene holds at a dotted key, and the least and the largest value that its table allows."""
     owner: Any = scene
     *tables, last = key.split(".")
@@ -45,18 +45,18 @@ def held_by(scene: Any, key: str) -> tuple[float, float, float]:
         owner = _inside(owner, table, key)
     value = _inside(owner, last, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene", _names(owner))
+        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene")
     field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
     limits = field.metadata if field is not None else []
-    low = max((float(each) for limit in limits for each in _ends(limit, "gt", "ge")), default=-np.inf)
-    high = min((float(each) for limit in limits for each in _ends(limit, "lt", "le")), default=np.inf)
+    low = max((float(each) for limit in limits for each in _limit_ends(limit, "gt", "ge")), default=-np.inf)
+    high = min((float(each) for limit in limits for each in _limit_ends(limit, "lt", "le")), default=np.inf)
     return float(value), low, high
 
 
-def _ends(limit: Any, *names: str) -> list[float]:
+def _limit_ends(limit: Any, *names: str) -> list[float]:
     """Ends that a limit of a field names; what stands for "beyond all measure" is none."""
     ends = (getattr(limit, name, None) for name in names)
-    return [end for end in ends if end is not None and abs(end) < LARGEST]
+    return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
 
 def _inside(owner: Any, name: str, key: str) -> Any:
@@ -66,7 +66,10 @@ def _inside(owner: Any, name: str, key: str) -> Any:
         return owner[name]
     if isinstance(owner, BaseModel) and name in type(owner).model_fields:
         return getattr(owner, name)
-    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", _names(owner))
+    names = _names(owner)
+    if isinstance(owner, Mapping) and not suggestion(name, names):
+        raise InputError(OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from")
+    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
 
 
 def _names(owner: Any) -> tuple[str, ...]:

@@ -9,14 +9,14 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.smoothing import smoothed
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 from models.measured.outliers import without_outliers
 
 FAILED = 1e3
 """Residual of every sample where a model fails at trial values, so that a search turns back."""
 OVERSAMPLED = 4.0
 """Samples that are kept for each period of the low-pass."""
-LEAST = 32
+FEWEST_SAMPLES = 32
 """Samples of a channel that a fit needs."""
 
 Curve = tuple[np.ndarray, np.ndarray]
@@ -99,8 +99,8 @@ def measured_channel(name: str, unit: str, curve: Curve, clock: Clock, place: st
     values = without_outliers(raw)
     known = np.isfinite(values)
     inside = known & (times >= clock.times[0]) & (times <= clock.times[-1])
-    if inside.sum() < LEAST:
-        allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {LEAST} are needed"
+    if inside.sum() < FEWEST_SAMPLES:
+        allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {FEWEST_SAMPLES} are needed"
         raise InputError(place, name, int(inside.sum()), allowed)
     period = max(float(np.median(np.diff(times))), clock.period)
     nearest = np.abs(times[known][_nearest(times[known], clock.times)] - clock.times)
@@ -179,10 +179,10 @@ class Problem:
         """
         answer = self.residuals if of is None else of
         ways = [self._ways(values, k) for k in range(len(self.parameters))]
-        base, *there = each_of(answer, [values, *(way[0][0] for way in ways)], executor)
+        base, *there = block_results(answer, [values, *(way[0][0] for way in ways)], executor)
         again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED]
         chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
-        for k, moved in zip(again, each_of(answer, [chosen[k][0] for k in again], executor), strict=True):
+        for k, moved in zip(again, block_results(answer, [chosen[k][0] for k in again], executor), strict=True):
             there[k] = moved
         columns = [(row - base) / change for row, (_, change) in zip(there, chosen, strict=True)]
         return np.stack(columns, axis=-1)

@@ -15,9 +15,9 @@ from scipy.stats import f as f_distribution
 
 BLIND = 1e-6
 """Share of the largest singular value of a fit's sensitivities below which a combination is not determined."""
-STEP, LEAST = 1e-4, 0.1
-"""Of differences, by a value, which counts as LEAST at least."""
-ALIKE = 0.9
+STEP, LEAST_VALUE = 1e-4, 0.1
+"""Of differences, by a value, which counts as LEAST_VALUE at least."""
+HIGH_CORRELATION = 0.9
 """Correlation of two estimates from which on they are hard to tell apart."""
 
 Deviations = Callable[[dict[str, float]], np.ndarray]
@@ -72,7 +72,7 @@ class Subset:
         here = predict(self.named)
         slopes = np.zeros((len(here), len(self.names)))
         for i, (name, value) in enumerate(self.named.items()):
-            step = STEP * max(abs(value), LEAST)
+            step = STEP * max(abs(value), LEAST_VALUE)
             slopes[:, i] = (predict(self.named | {name: value + step}) - here) / step
         return here, np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes)
 
@@ -111,15 +111,15 @@ class Choice:
         return mean, np.sqrt(self.weights @ (self.inflation * variances + (means - mean) ** 2))
 
     def hard_to_tell_apart(self) -> list[tuple[str, str, float]]:
-        """Pairs of parameters whose estimates in the fullest subset are ALIKE, and their correlation."""
+        """Pairs of parameters whose estimates in the fullest subset are HIGH_CORRELATION, and their correlation."""
         fullest = max(self.fits, key=lambda fit: len(fit.names))
         size = np.sqrt(np.diag(fullest.covariance))
         pairs = combinations(range(len(size)), 2)
         each = [(i, j, float(fullest.covariance[i, j] / (size[i] * size[j]))) for j, i in pairs]
-        return [(fullest.names[i], fullest.names[j], c) for i, j, c in sorted(each) if abs(c) > ALIKE]
+        return [(fullest.names[i], fullest.names[j], c) for i, j, c in sorted(each) if abs(c) > HIGH_CORRELATION]
 
 
-def fitted(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
+def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
     """All candidates fitted."""
     names = tuple(candidates)
     if not names:
@@ -145,11 +145,11 @@ def chosen(
     deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
 ) -> Choice:
     """Every subset of the candidates fitted and judged; together : sets by name that are left out as a whole, too."""
-    everything = fitted(deviations, candidates)
+    everything = fit_all(deviations, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
     told = [name for name in candidates if name not in blind]
     subsets = [names for size in range(len(told) + 1) for names in combinations(told, size)]
-    fits = [fitted(deviations, {name: candidates[name] for name in names}) for names in subsets]
+    fits = [fit_all(deviations, {name: candidates[name] for name in names}) for names in subsets]
     determined = [fit for fit in fits if not fit.undetermined and fit.freedoms > 0]
     fullest = max(determined, key=lambda fit: (len(fit.names), -fit.chi2))
     inflation = max(fullest.chi2 / fullest.freedoms, 1.0)

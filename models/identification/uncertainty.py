@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.identification.fit import Fit, fit, held
+from models.identification.fit import Fit, fit, fit_with_held
 from models.identification.problem import Problem
 
 LAGS = 4.0
@@ -83,13 +83,13 @@ def uncertainty(solved: Fit, executor: Executor | None = None) -> Uncertainty:
     free = ~solved.at_bound
     inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
     scores = np.einsum("cmp,cm->mp", jacobian, solved.residuals)
-    lags, staying = _lags(solved.residuals)
+    lags, staying = _longest_lags(solved.residuals)
     covariance = np.zeros_like(inner)
     part = np.ix_(free, free)
     if free.any():
         inverse = _inverse(inner[part])
         both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], solved.residuals, lags)
-        covariance[part] = inverse @ _larger(*both) @ inverse
+        covariance[part] = inverse @ _larger_covariance(*both) @ inverse
         covariance[part] += _untold(inner[part])
     return Uncertainty(solved, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
@@ -107,7 +107,7 @@ def _untold(matrix: np.ndarray) -> np.ndarray:
     return 1e12 * blind @ blind.T
 
 
-def _lags(residuals: np.ndarray) -> tuple[int, float]:
+def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
     """The longest lag, and for how many samples residuals stay alike (their integral scale), of the slowest channel."""
     staying = 1.0
     for row in residuals:
@@ -143,7 +143,7 @@ def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.nd
     return total
 
 
-def _larger(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+def _larger_covariance(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
     values, vectors = np.linalg.eigh(two)
     values = np.maximum(values, SINGULAR * values[-1])
@@ -189,4 +189,4 @@ def profile(known: Uncertainty, k: int) -> Profile:
 def _held_inside(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:
     low, high = problem.bounds
     inside = np.clip(values, low + 1e-6 * problem.scale, high - 1e-6 * problem.scale)
-    return held(problem, k, value, inside)
+    return fit_with_held(problem, k, value, inside)

@@ -75,7 +75,7 @@ def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
     return read
 
 
-def named(function: Any, *parts: Any) -> Any:
+def named_closure(function: Any, *parts: Any) -> Any:
     """A closure under a name that no other one of its factory has, made of ``parts``; compile it after that."""
     function.__qualname__ = function.__name__ = "_".join([function.__name__, *(str(part) for part in parts)])
     return function

@@ -13,7 +13,7 @@ import numpy as np
 
 SEED = 20
 RESAMPLES = 1000
-LONG = 2.0
+LONG_JOB_RATIO = 2.0
 """A job that took so many times the least turn needs no warm-up to tell that it fits in once."""
 
 
@@ -37,7 +37,8 @@ def interleave(
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [
-        1 if duration > LONG * least else _repeats(job, least, clock) for job, duration in zip(jobs, known, strict=True)
+        1 if duration > LONG_JOB_RATIO * least else _repeats(job, least, clock)
+        for job, duration in zip(jobs, known, strict=True)
     ]
     order = np.random.default_rng(SEED)
     seconds = np.full((len(jobs), rounds), np.nan)

@@ -25,7 +25,7 @@ GRAVITY = 9.81
 """m/s^2, by which shares are told where a vehicle has another one, or none."""
 BLOCKS = 16
 """Means over parts of the record: what is faster than a block says nothing of its slope."""
-SMALL = 0.003
+NEGLIGIBLE_SHARE = 0.003
 """Share of the weight, or of the moment of an axle's load, below which nothing is said: the drift of 0.1 % is what
 studies of trust are about."""
 RISE, SWING = 0.5, 0.1
@@ -33,13 +33,13 @@ RISE, SWING = 0.5, 0.1
 SCATTER = 1.5
 """Rms of the block means about the slope, gained over the record: a wave as long as the record makes 1.7 of it, and is
 explained by the pitch that makes it."""
-FASTEST = 60.0
+FASTEST_SPEED = 60.0
 """m/s, speed of a vehicle on a grade."""
-STEEP = 0.35
+STEEPEST_GRADE = 0.35
 """rad: no road is steeper (36 %)."""
 TURNS = 3
 """Repeated integrations of the pitch, each with the arms of the one before."""
-LEAST = 0.05
+LEAST_PITCH_SHARE = 0.05
 """Part of a pitch that does not rise steadily, at the least."""
 
 
@@ -107,7 +107,7 @@ class AxleForces:
         rate = self._summed(moments)
         pitch = self._summed(rate)
         for _ in range(0 if self.turn else TURNS):
-            if abs(pitch).max() > STEEP:
+            if abs(pitch).max() > STEEPEST_GRADE:
                 break
             rate = self._summed(moments * np.cos(pitch))
             pitch = self._summed(rate)
@@ -117,7 +117,7 @@ class AxleForces:
     def rise(self) -> np.ndarray:
         """Rate (n,) of the centre of mass from rest, m/s upwards."""
         pitch = self.pitch[1]
-        upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEP else 1.0
+        upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEPEST_GRADE else 1.0
         return self._summed(self.forces @ self.arms[0] * upright - self.parameters.g)
 
     def _summed(self, values: np.ndarray) -> np.ndarray:
@@ -178,7 +178,7 @@ class Steady:
         return np.abs(self.accelerations) > self.known
 
 
-def steady(axles: AxleForces) -> Steady:
+def equilibrium_residual(axles: AxleForces) -> Steady:
     """Residual of the equilibrium over the whole record.
 
     A rise counts only as far as neither a level road nor a climb with the pitch that the forces give explains it.
@@ -187,7 +187,7 @@ def steady(axles: AxleForces) -> Steady:
     times = _blocks(axles.lasted * np.linspace(-0.5, 0.5, len(axles.forces)))
     units = np.array([GRAVITY, axles.arms[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)])
     level = _slope(times, _blocks(axles.rise))
-    climbing = _slope(times, _blocks(axles.rise), _blocks(pitch)) if abs(pitch).max() < STEEP else level
+    climbing = _slope(times, _blocks(axles.rise), _blocks(pitch)) if abs(pitch).max() < STEEPEST_GRADE else level
     risen, turned = (
         _slope_with_error(estimate, unit, gained, axles.lasted)
         for estimate, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
@@ -202,7 +202,7 @@ def steady(axles: AxleForces) -> Steady:
 
 def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
     """A slope, and how well it is known, from the scatter about it."""
-    return estimate[0], SMALL * unit + (gained + SCATTER * estimate[1]) / lasted
+    return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + SCATTER * estimate[1]) / lasted
 
 
 def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
@@ -216,9 +216,9 @@ def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = Non
         climb = pitch - pitch.mean()
         steady_climb = climb @ times / (times @ times)
         curve = climb - steady_climb * times
-        speed = float(np.clip(curve @ values / (curve @ curve), 0.0, FASTEST)) if curve @ curve > 0 else 0.0
+        speed = float(np.clip(curve @ values / (curve @ curve), 0.0, FASTEST_SPEED)) if curve @ curve > 0 else 0.0
         values = values - speed * climb
-        unlike = max(float(np.sqrt((curve @ curve) / (climb @ climb))), LEAST)
+        unlike = max(float(np.sqrt((curve @ curve) / (climb @ climb))), LEAST_PITCH_SHARE)
     slope = float(times @ values / (times @ times))
     return slope, float(np.sqrt(np.mean((values - slope * times) ** 2))) / unlike
 

@@ -7,26 +7,33 @@ import numpy as np
 
 from models.core.finding import Finding, Weight
 from models.core.time_series import sparse
-from models.measured.axle_balance import GRAVITY, SMALL, STEEP, AxleForces, Steady, steady
+from models.measured.axle_balance import (
+    GRAVITY,
+    NEGLIGIBLE_SHARE,
+    STEEPEST_GRADE,
+    AxleForces,
+    Steady,
+    equilibrium_residual,
+)
 from models.measured.ratios import Wrong, counted_from_load, sentence
 
 CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
 """Names of all findings, with those of the samples of a file."""
-LARGE = 0.05
+LARGE_SHARE = 0.05
 """Share beyond which the forces are another vehicle's, or of another unit, if they move it far."""
 HEIGHT = 1.0
 """m: a vehicle that leaves a level road further has no road under it."""
 IMPOSSIBLE = 1e6
 """Weights of the vehicle that no wheel force is: a mark for no value, or a damaged file."""
-LIKE = 0.02
+EXPLAINED_SHARE = 0.02
 """Share by which a mean may differ from what an explanation predicts."""
-OFF = 0.05
+START_LOAD_SHARE = 0.05
 """Share of its static load by which an axle may begin off it."""
 BAND = 1.0, 25.0
 """Hz, between which both axles feel the same road one after the other."""
 LAG = 0.02, 2.0
 """s, between the axles of a vehicle."""
-ALIKE = 0.3
+REPEATED_CORRELATION = 0.3
 """Correlation from which on one axle is said to repeat the other."""
 COPIED = 1e-3
 """Rms of what is left of an axle's changes without the other's, by their own, up to which they are the same."""
@@ -45,7 +52,7 @@ def check(axles: AxleForces) -> list[Finding]:
     if largest > IMPOSSIBLE * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
         return [_error(axles, "weight", text, largest, "N")]
-    for look in (_sparse, _explained, _wrong_means, _balance, _start):
+    for look in (_sparse, _explained, _wrong_means, _balance, _forces_begin_in_motion):
         findings = look(axles)
         if findings:
             return findings + _constant_axle(axles)
@@ -92,13 +99,13 @@ def _explained(axles: AxleForces) -> list[Finding]:
 
 
 def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
-    return bool((np.abs(values - wanted) < LIKE * scale / 2).all())
+    return bool((np.abs(values - wanted) < EXPLAINED_SHARE * scale / 2).all())
 
 
 def _exchanged(axles: AxleForces) -> list[Finding]:
     """Axles whose loads fit crosswise, and not as they are named."""
     as_is, crossed = (np.abs(each / axles.loads - 1).max() for each in (axles.means, axles.means[::-1]))
-    if crossed > LIKE or as_is < 3 * crossed or not steady(axles).seen[1]:
+    if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).seen[1]:
         return []
     text = (
         f"Front and rear are exchanged: {axles.means[0]:.5g} N in front and {axles.means[1]:.5g} N at the rear on "
@@ -110,7 +117,7 @@ def _exchanged(axles: AxleForces) -> list[Finding]:
 
 def _wrong_means(axles: AxleForces) -> list[Finding]:
     """Axles whose mean says by itself that sign or unit is wrong, or that moves the vehicle beyond all roads."""
-    findings, far = [], _travels_too_far(axles, steady(axles)).any()
+    findings, far = [], _travels_too_far(axles, equilibrium_residual(axles)).any()
     for axle, mean, load in zip(axles.signals, axles.means, axles.loads if axles.parameters.g else (), strict=False):
         for_axle = f"the {load:.5g} N that rest on it on average"
         ratio, names = float(mean / load), tuple(s.name for s in axle)
@@ -123,17 +130,17 @@ def _wrong_means(axles: AxleForces) -> list[Finding]:
 
 def _balance(axles: AxleForces) -> list[Finding]:
     """Accelerations that a vehicle cannot keep up: its fall, and its turn."""
-    motion = steady(axles)
+    motion = equilibrium_residual(axles)
     if not motion.seen.any():
         return []
-    beyond = np.abs(motion.shares) > LARGE + motion.known / motion.units
+    beyond = np.abs(motion.shares) > LARGE_SHARE + motion.known / motion.units
     weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
     excess = np.linalg.solve(axles.arms, np.where(motion.seen, motion.accelerations, 0.0))
     share = excess / axles.loads
     told = " and ".join(
         _excess_text(*each)
         for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
-        if abs(each[2]) > SMALL / 2
+        if abs(each[2]) > NEGLIGIBLE_SHARE / 2
     )
     text = (
         f"On average {told} against what rests there: {_motion(axles, motion)}. Check calibration, zero and the "
@@ -147,7 +154,7 @@ def _balance(axles: AxleForces) -> list[Finding]:
 
 def _travels_too_far(axles: AxleForces, motion: Steady) -> np.ndarray:
     """Which of the two steady accelerations (2,) moves the vehicle further in the run than a road does."""
-    return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEP])
+    return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEPEST_GRADE])
 
 
 def _excess_text(name: str, excess: float, share: float) -> str:
@@ -162,11 +169,16 @@ def _motion(axles: AxleForces, motion: Steady) -> str:
     return f"a vehicle free to move {' and '.join(parts)} in {axles.duration:g} s"
 
 
-def _start(axles: AxleForces) -> list[Finding]:
+def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
     """Forces that begin in the middle of a motion, while the run begins at rest."""
     first = axles.forces[0] / axles.loads - 1
     last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
-    if not axles.rests or axles.parameters.g == 0 or np.abs(first).max() < OFF or abs(last) < max(STEEP, _noise(axles)):
+    if (
+        not axles.rests
+        or axles.parameters.g == 0
+        or np.abs(first).max() < START_LOAD_SHARE
+        or abs(last) < max(STEEPEST_GRADE, _noise(axles))
+    ):
         return []
     text = (
         f"The run begins at rest, and the wheel forces {first[0]:+.1%} in front and {first[1]:+.1%} at the rear "
@@ -212,7 +224,7 @@ def _copied(axles: AxleForces) -> list[Finding]:
 def _order(axles: AxleForces) -> list[Finding]:
     """Axles that feel the road in the wrong order."""
     late, alike, other = _delay(axles)
-    if alike < ALIKE or late > 0 or alike < 1.5 * other:
+    if alike < REPEATED_CORRELATION or late > 0 or alike < 1.5 * other:
         return []
     text = (
         f"The rear axle feels the road {-late:.3g} s before the front axle (correlation {alike:.2f}): front and "
@@ -247,7 +259,7 @@ def unchecked(axles: AxleForces) -> str:
         return ""
     late, alike, _ = _delay(axles)
     seen = ""
-    if late > 0 and alike >= ALIKE:
+    if late > 0 and alike >= REPEATED_CORRELATION:
         speed = (axles.parameters.a + axles.parameters.b) / late
         seen = f" (the rear repeats the front {late:.3g} s later, which is right for about {speed:.2g} m/s)"
     tells = "the driven speed tells, or a measured pitch (effect kalman_filter)"
@@ -255,7 +267,7 @@ def unchecked(axles: AxleForces) -> str:
 
 
 def _weights_agree(axles: AxleForces) -> Finding:
-    motion = steady(axles)
+    motion = equilibrium_residual(axles)
     text = (
         f"The mean wheel forces carry the vehicle to {motion.shares[0]:+.2%} of its weight; an error of "
         f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "

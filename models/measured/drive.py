@@ -14,7 +14,7 @@ from models.measured.outliers import without_outliers
 CHANNELS = {"steer": "rad", "speed": "m/s"}
 LEAST_SPEED = 2.0
 """m/s: slip angles are ratios to the speed."""
-LEAST = 16
+FEWEST_SAMPLES = 16
 """Samples of a drive: a filter without phase needs some."""
 
 
@@ -31,11 +31,11 @@ class MeasuredDrive:
 
 def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
     """The drive of a file, or of a stretch (s, s) of its time; InputError for what is no drive."""
-    return _read(path, stretch, path.stat().st_mtime_ns)
+    return _read_drive(path, stretch, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
+def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
     source = open_source(path)
     read = {name: curve(source, name, unit) for name, unit in CHANNELS.items()}
     first = max(times[0] for times, _ in read.values())
@@ -46,8 +46,8 @@ def _read(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
         allowed = f"must rise and lie within the file's time, from {first:g} to {last:g} s"
         raise InputError(path, "drive.stretch", [begin, end], allowed)
     grid = begin + period * np.arange(int((min(end, last) - begin) / period + 1e-6) + 1)
-    if len(grid) < LEAST:
-        raise InputError(path, "rows", len(grid), f"a drive needs at least {LEAST} samples")
+    if len(grid) < FEWEST_SAMPLES:
+        raise InputError(path, "rows", len(grid), f"a drive needs at least {FEWEST_SAMPLES} samples")
     values, left_out = dict[str, np.ndarray](), dict[str, int]()
     for name, (times, raw) in read.items():
         values[name], left_out[name] = bridged(times, raw, grid, f"{path}, {name}")
@@ -62,6 +62,6 @@ def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str)
     """Values (n,) on an even grid, straight across spikes and gaps, and how many samples were left out for that."""
     kept = without_outliers(values)
     known = np.isfinite(kept)
-    if known.sum() < LEAST:
-        raise InputError(place, "", int(known.sum()), f"at least {LEAST} samples must be measured")
+    if known.sum() < FEWEST_SAMPLES:
+        raise InputError(place, "", int(known.sum()), f"at least {FEWEST_SAMPLES} samples must be measured")
     return np.interp(grid, times[known], kept[known]), int(len(kept) - known.sum())

@@ -19,7 +19,7 @@ from models.measured.signal import Signal
 Amounts = dict[str, float]
 """Name of a channel, a transducer or a quantity -> amount in SI."""
 AMOUNTS = ("gain", "bias", "delay", "noise")
-ROOM = 1.25
+FULL_SCALE_RATIO = 1.25
 """Full scale of a quantised channel by its largest value: an amplifier is not driven to its end."""
 
 
@@ -100,7 +100,7 @@ def quantised(values: np.ndarray, bits: int) -> np.ndarray:
     largest = float(np.abs(values).max())
     if largest == 0.0:
         return values
-    each = 2.0 * ROOM * largest / 2**bits
+    each = 2.0 * FULL_SCALE_RATIO * largest / 2**bits
     return each * np.rint(values / each)
 
 

@@ -23,7 +23,7 @@ EXTENSIONS = {
 """Extension of a file that can be read -> its usual format."""
 READABLE = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
 """First bytes of a file that can be read -> its format; any other text is read as CSV."""
-KNOWN = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
+KNOWN_FORMATS = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
 AS_CSV = "save its channels as CSV with a column time [s]"
 BEGINS = {
     "ASAM MDF": "ASAM MDF, which begins with MDF",
@@ -31,7 +31,7 @@ BEGINS = {
     "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
 }
 """Format -> what it is called and how it begins."""
-AGAIN = f"write it anew from the software that has it, or {AS_CSV}"
+WRITE_ANEW = f"write it anew from the software that has it, or {AS_CSV}"
 DECODE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
 UNPACK = "unpack it, and name the file inside"
 
@@ -132,10 +132,10 @@ def format_of(path: Path, head: bytes) -> str:
     if kind is not None:
         if kind.extensions == (".zip",):
             kind = _of_archive(path) or kind
-        raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN}")
+        raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
     if is_text(head):
         return "CSV"
-    allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN}"
+    allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN_FORMATS}"
     raise InputError(path, "byte 0", head[:8].hex(" "), allowed)
 
 
@@ -159,7 +159,9 @@ def by_extension(path: Path) -> str:
     if kind is not None:
         return f", and its extension {path.suffix} is that of {kind.name}: {kind.remedy}"
     usual = BEGINS.get(EXTENSIONS.get(suffix, ""), "")
-    return usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {AGAIN}"
+    return (
+        usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {WRITE_ANEW}"
+    )
 
 
 def is_measurement(path: Path) -> bool:

@@ -22,7 +22,7 @@ BRIDGED = 0.1
 """s: the longest gap in a hub force that is bridged."""
 SPAN = 0.3
 """s of neighbours on either side that the filling is drawn from: several waves of wheel hop and the chassis' roll."""
-MOST = 200
+MOST_NEIGHBOURS = 200
 """Neighbours, about: those close to the gap all count, those farther away every so many."""
 LIMITS: dict[Quantity, float] = {
     "force": 1e6,
@@ -34,7 +34,7 @@ LIMITS: dict[Quantity, float] = {
     "strain": 1.0,
 }
 """SI: ten times and more what the transducers of a vehicle measure (a force of 100 t, 1000 g)."""
-FAR = 1000.0
+FAR_RATIO = 1000.0
 """Times the departure from the median that half of all samples do not exceed. A wrong unit makes all samples large
 alike, and is the business of the checks of weight and motion."""
 MARK = 1e30
@@ -51,7 +51,7 @@ class Gap:
     doubt: float
 
 
-def runs(holds: np.ndarray) -> np.ndarray:
+def true_runs(holds: np.ndarray) -> np.ndarray:
     """First index and end (r, 2) of every run of true values of (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
     return edges.reshape(-1, 2)
@@ -62,11 +62,11 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
     """
-    lost = runs(np.isnan(values)).tolist()
+    lost = true_runs(np.isnan(values)).tolist()
     if not lost:
         return values, []
     out, mean, span = values.copy(), float(np.nanmean(values)), max(round(SPAN / period), 4)
-    every = max(2 * span // MOST, 1)
+    every = max(2 * span // MOST_NEIGHBOURS, 1)
     law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
     gaps = []
     for first, end in lost:
@@ -135,7 +135,7 @@ def _conditional_mean(
 def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, Finding | None]:
     """Values (n,) in SI with NaN for what cannot have been measured, and the finding that says so; times (n,) in s.
 
-    A sample is absurd if it is a mark, or beyond LIMITS and FAR times farther from the median than half of all.
+    A sample is absurd if it is a mark, or beyond LIMITS and FAR_RATIO times farther from the median than half of all.
     """
     if not (np.abs(values) > LIMITS[signal.quantity]).any():
         return values, None
@@ -143,11 +143,11 @@ def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tup
     good = values[~absurd & ~np.isnan(values)]
     if len(good):
         away = np.abs(good - np.median(good))
-        far = np.maximum(FAR * np.median(away), LIMITS[signal.quantity])
+        far = np.maximum(FAR_RATIO * np.median(away), LIMITS[signal.quantity])
         absurd[np.flatnonzero(~absurd & ~np.isnan(values))[away > far]] = True
     if not absurd.any():
         return values, None
-    stretches, count = runs(absurd), int(absurd.sum())
+    stretches, count = true_runs(absurd), int(absurd.sum())
     first, last = stretches[0, 0], stretches[-1, 1] - 1
     written = values[first] / (signal.sign * signal.factor) + signal.zero
     many = f"{count} samples in {len(stretches)} stretch(es) are" if count > 1 else "a sample is"

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-AROUND = 9
+MEDIAN_SAMPLES = 9
 """Samples of the running median; up to four that stand off together are seen."""
-FAR, USUAL = 3.0, 0.99
+FAR_RATIO, USUAL_SHARE = 3.0, 0.99
 """Times the distance from the running median that 99 % of samples keep: 7.7 deviations of Gaussian noise."""
 
 
@@ -12,12 +12,12 @@ def without_outliers(values: np.ndarray) -> np.ndarray:
     """Values (n,) with NaN where they are farther from the running median than noise goes; NaN stays NaN."""
     known = np.flatnonzero(np.isfinite(values))
     kept = values.astype(float, copy=True)
-    if len(known) <= AROUND:
+    if len(known) <= MEDIAN_SAMPLES:
         return kept
     from scipy.ndimage import median_filter
 
-    off = np.abs(values[known] - median_filter(values[known], AROUND, mode="nearest"))
-    usual = float(np.quantile(off, USUAL))
+    off = np.abs(values[known] - median_filter(values[known], MEDIAN_SAMPLES, mode="nearest"))
+    usual = float(np.quantile(off, USUAL_SHARE))
     if usual > 0.0:
-        kept[known[off > FAR * usual]] = np.nan
+        kept[known[off > FAR_RATIO * usual]] = np.nan
     return kept

@@ -17,7 +17,7 @@ NAMES: dict[Quantity, dict[str, float]] = {
     "strain": {"-": 1.0, "um/m": 1e-6, "%": 1e-2},
 }
 """Units that files are written in, and their factors."""
-NEAR = 0.2
+RATIO_DIFFERENCE = 0.2
 """Part by which a ratio may differ from that of two units; a calibration is not wrong by more than GAIN."""
 GAIN = 0.25
 EMPTY = 0.05
@@ -41,7 +41,7 @@ def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
         for taken in units
         if true != taken and {1.0, signal.factor} & {units[true], units[taken]}
     }
-    near = [pair for pair in far if pair[1] <= NEAR]
+    near = [pair for pair in far if pair[1] <= RATIO_DIFFERENCE]
     return ("unit", far[min(near)]) if near else ("size", "")
 
 

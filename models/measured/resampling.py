@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from models.measured.timing import EVEN, GAP
+from models.measured.timing import EVEN_CLOCK_SHARE, GAP
 
 PASS, STOP, ATTENUATION = 0.4, 0.5, 60.0
 """Of the new rate: kept up to here, gone (dB) from here on."""
-SAME = 1e-6
+EQUAL_RATES = 1e-6
 """Relative difference of two rates that are one."""
 
 
-def onto(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
+def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
     """Values (n,) at the times of an even grid (n,), s.
 
     times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
@@ -21,7 +21,7 @@ def onto(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.n
         return np.full(len(grid), np.nan)
     times, values = times[known], values[known]
     new = float(grid[1] - grid[0]) if len(grid) > 1 else source_period
-    if source_period < new * (1.0 - SAME):
+    if source_period < new * (1.0 - EQUAL_RATES):
         samples = _decimated(times, values, source_period, new, grid)
     else:
         samples = np.interp(grid, times, values)
@@ -32,7 +32,7 @@ def onto(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.n
 def _unknown(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
     """Points (n,) that lie in a gap or outside, but for what rounding puts there."""
     right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
-    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN * source_period
+    near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN_CLOCK_SHARE * source_period
     wide = times[right] - times[right - 1] > GAP * source_period
     return ((grid < times[0]) | (grid > times[-1]) | wide) & ~near
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEAST = 0.5
+LEAST_OVERLAP = 0.5
 """Share of the shorter of both that must overlap: farther shifts match by chance."""
-MOST = 2**18
+MOST_SAMPLES = 2**18
 """Samples of the grid on which shifts are searched."""
-STILL = 1e-9
+CONSTANT_VARIANCE = 1e-9
 """Variance of a channel, by its mean square, below which it is constant and tells no shift."""
-FINE = 1e-4
+SHIFT_RESOLUTION = 1e-4
 """Of a step of the grid: how closely the shift is refined."""
 
 
@@ -40,25 +40,25 @@ def time_shift(pairs: Sequence[Pair]) -> Shift:
     moving = [pair for pair in pairs if _varies(pair.run) and _varies(pair.values)]
     if not moving:
         return Shift(0.0, np.nan)
-    step = _step(moving)
-    coarse = _searched(moving, step)
-    return _refined(moving, coarse, step)
+    step = _search_step(moving)
+    coarse = _coarse_shift(moving, step)
+    return _refined_shift(moving, coarse, step)
 
 
 def _varies(values: np.ndarray) -> bool:
     finite = values[np.isfinite(values)]
-    return bool(len(finite) > 2 and np.var(finite) > STILL * np.mean(finite**2))
+    return bool(len(finite) > 2 and np.var(finite) > CONSTANT_VARIANCE * np.mean(finite**2))
 
 
-def _step(pairs: Sequence[Pair]) -> float:
+def _search_step(pairs: Sequence[Pair]) -> float:
     """Step (s) of the search: that of the finer clock, unless the grid would be too long."""
     clocks = [times for pair in pairs for times in (pair.run_times, pair.times)]
     finest = min(float(np.median(np.diff(times))) for times in clocks)
     longest = max(float(times[-1] - times[0]) for times in clocks)
-    return max(finest, longest / MOST)
+    return max(finest, longest / MOST_SAMPLES)
 
 
-def _searched(pairs: Sequence[Pair], step: float) -> float:
+def _coarse_shift(pairs: Sequence[Pair], step: float) -> float:
     """The shift (s), a whole number of steps beside the two starts, at which the mean correlation is largest."""
     first = min(float(pair.run_times[0]) for pair in pairs)
     begin = min(float(pair.times[0]) for pair in pairs)
@@ -93,12 +93,12 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
     sums, means = over(mask, x), over(y, ones)
     safe = np.maximum(count, 1.0)
     spread = (over(mask, x**2) - sums**2 / safe) * (over(y**2, ones) - means**2 / safe)
-    enough = (count >= LEAST * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
+    enough = (count >= LEAST_OVERLAP * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
     likeness = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
     return np.where(enough, likeness, -1.0)
 
 
-def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
+def _refined_shift(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
     """The shift within a step of a coarse one at which the mean correlation is largest, the run read by splines."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
@@ -109,7 +109,7 @@ def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
         return -float(np.mean([_correlation_at_shift(pair, curve, seconds) for pair, curve in curves]))
 
     best = minimize_scalar(
-        apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": FINE * step}
+        apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": SHIFT_RESOLUTION * step}
     )
     seconds = float(best.x) if best.fun <= apart(coarse) else coarse
     return Shift(seconds, -apart(seconds))

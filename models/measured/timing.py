@@ -12,19 +12,19 @@ GAP = 1.5
 """Periods: two samples farther apart have a gap between them."""
 SHUFFLED = 10.0
 """Periods: a sample that is late by no more was only written late; a clock that goes back farther began anew."""
-EVEN = 0.01
+EVEN_CLOCK_SHARE = 0.01
 """Of a period: samples as near to an even clock are on it; farther off, the clock jitters."""
 JITTER = 0.1
 """Of a period: a standard deviation of the steps that is worth a doubt."""
 
 
-FINE = 1e-9
+ROUNDING_SHARE = 1e-9
 """Of a period: what double precision may round off a time without a word."""
 SLIPS = 5
 """Repeated times, or steps that are off, from which on rounding may be what makes them: one is a row written twice."""
 DIGITS = range(1, 9)
 """Of the rate of an even clock: the fewest that explain all rounded times."""
-BEYOND = 1e4
+LARGEST_TIME_RATIO = 1e4
 """Lengths of the whole measurement: a time that is farther from the middle one is no time."""
 SEVERAL = 0.01
 """Part of all samples that may share their time with another one: what is dropped then does no harm."""
@@ -79,7 +79,7 @@ def _no_times(times: np.ndarray) -> np.ndarray:
         return ~finite
     length = len(times) * float(np.median(np.abs(np.diff(times[finite]))))
     with np.errstate(invalid="ignore"):
-        far = np.abs(times - np.median(times[finite])) > BEYOND * length
+        far = np.abs(times - np.median(times[finite])) > LARGEST_TIME_RATIO * length
     return ~finite | (far if length > 0 else False)
 
 
@@ -167,7 +167,7 @@ def _step(times: np.ndarray, rising: np.ndarray) -> float:
     is taken: half of them are alike, and all of these off by the same.
     """
     middle = float(np.median(rising))
-    if np.spacing(np.abs(times).max()) < FINE * middle:
+    if np.spacing(np.abs(times).max()) < ROUNDING_SHARE * middle:
         return middle
     counted = np.rint(rising / middle)
     return float(rising.sum() / counted.sum()) if counted.sum() else middle
@@ -199,12 +199,12 @@ def _spacing(times: np.ndarray) -> float | None:
     if np.count_nonzero(steps == 0) >= SLIPS:
         return float(np.median(steps[steps > 0]))
     middle = float(np.median(steps))
-    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN * middle) < SLIPS:
+    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < SLIPS:
         return None
     for digits in range(7):
         whole = times * 10.0**digits
         if (np.abs(whole - np.rint(whole)) < 1e-6).all():
-            return 10.0**-digits if 10.0**-digits > EVEN * middle else None
+            return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_SHARE * middle else None
     return None
 
 
@@ -229,7 +229,7 @@ def _jitter(times: np.ndarray, period: float, say: Say) -> None:
     steps = np.diff(times)
     deviations = steps[steps <= GAP * period] - period
     spread = float(deviations.std())
-    if spread > EVEN * period:
+    if spread > EVEN_CLOCK_SHARE * period:
         weight: Weight = "doubt" if spread > JITTER * period else "note"
         say(
             "jitter",

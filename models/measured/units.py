@@ -59,15 +59,18 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
     parsed = _parsed(unit, quantity)
     if parsed is None:
         raise InputError(
-            file, place, unit, f"no such unit is known: write {_units_of_quantity(quantity)}{_meant(unit, quantity)}"
+            file,
+            place,
+            unit,
+            f"no such unit is known: write {_units_of_quantity(quantity)}{_intended_unit(unit, quantity)}",
         )
     if not parsed.is_compatible_with(_si(quantity)):
         raise InputError(
             file,
             place,
             unit,
-            f"{_kind(parsed)}, and the channel is mapped as {quantity}: write "
-            f"{_units_of_quantity(quantity)}, or map it as what it is{_meant(unit, quantity)}",
+            f"{_kind_of_quantity(parsed)}, and the channel is mapped as {quantity}: write "
+            f"{_units_of_quantity(quantity)}, or map it as what it is{_intended_unit(unit, quantity)}",
         )
     turned = _has_angle(parsed)
     if turned != (quantity in ("angle", "angular rate")):
@@ -135,7 +138,7 @@ def _parsed(unit: str, quantity: Quantity) -> Any:
         return None
 
 
-def _kind(unit: Any) -> str:
+def _kind_of_quantity(unit: Any) -> str:
     """The kind of quantity that a unit measures, in an engineer's words."""
     if "volt" in str(unit) or "ampere" in str(unit):
         return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
@@ -145,7 +148,7 @@ def _kind(unit: Any) -> str:
     return f"is a unit of {same[0]}" if same else f"is {unit:P}"
 
 
-def _meant(unit: str, quantity: Quantity) -> str:
+def _intended_unit(unit: str, quantity: Quantity) -> str:
     return suggestion(unit, EXAMPLES[quantity])
 
 

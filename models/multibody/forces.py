@@ -18,7 +18,7 @@ import math
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, doubles, row, start
-from models.multibody.moving_vehicle import MovingVehicle, Tree, WheelContact, carried, carrier_frame, in_space
+from models.multibody.moving_vehicle import MovingVehicle, Tree, WheelContact, carried_velocity, carrier_frame, in_space
 from models.multibody.parts import press
 from models.multibody.tree import (
     GROUND,
@@ -45,7 +45,7 @@ from models.multibody.tree import (
     times,
     twist,
 )
-from models.tyre.bristles import FIRST, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, tyre_forces
 
 (
     COUNT,
@@ -195,7 +195,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     carrying = row(tree.links, PER_LINK, int(tyre[CARRYING]))
     if tyre[TOWED] != 0.0:
         axle = _turned_to(carrying, axle)
-    passing = plus(three(spot, RATE), carried(frame, p))
+    passing = plus(three(spot, RATE), carried_velocity(frame, p))
     zeta, upwards = _road_under(waves, count, frame, p)
     load = _load(tyre, zeta - (p[2] - tyre[HEIGHT]), dot(passing, upwards), vehicle.ledger)
     long = math.sqrt(dot(upwards, upwards))
@@ -214,7 +214,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
     pressing = load * long
     patch[A], patch[B] = math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH]
     patch[LOAD], patch[MU] = pressing, tyre[GRIP]
-    patch[FIRST] = patch[FIRST + 1] = patch[FIRST + 2] = 1.0 / tyre[BRISTLES]
+    patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slip[0], slip[1], slip[2], slip[3]
     put(way, CENTRE, p)
@@ -340,7 +340,9 @@ def _push_from_outside(numbers, t, vehicle):
         link = row(vehicle.tree.links, PER_LINK, int(of[PUSHED_BY]))
         force = times(three(of, PUSH_AXIS), control(numbers, controls, FIRST_PUSH + i, knots, t)[0])
         place = plus(three(link, PLACE), out(link, of, PUSHED_AT))
-        speed = plus(plus(three(link, SPEED), cross(three(link, TURNING), place)), carried(vehicle.frame, place))
+        speed = plus(
+            plus(three(link, SPEED), cross(three(link, TURNING), place)), carried_velocity(vehicle.frame, place)
+        )
         vehicle.ledger[DISSIPATED] += dot(force, speed)
         push(link, vehicle.tree.ground, force, place)
 

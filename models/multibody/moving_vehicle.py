@@ -67,7 +67,7 @@ def carrier_frame(q, v):
 
 
 @lean
-def carried(frame, place):
+def carried_velocity(frame, place):
     """Velocity (m/s) that the carrier gives a point at a place (m), both in its axes."""
     return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
 

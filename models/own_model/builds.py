@@ -1,6 +1,7 @@
 """One model in every build: mass matrix and forces at a state, in the coordinates of the description."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import mujoco
@@ -9,13 +10,14 @@ import numpy as np
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import SLIDES
 from models.multibody.plain.joint_elements import PlainTree
+from models.own_model.constraints import Rows, by_differences, plain_constraints, tied
 from models.own_model.coordinates import MujocoState
-from models.own_model.reading import TwinModel, controls, tie_rows
+from models.own_model.reading import TwinModel, controls
 
 PLAIN = "plain"
 BUILDS = (*ENGINES, PLAIN)
 SOFT = "mujoco"
-"""The build whose couplings are soft, as the file's own; those of the others are rigid."""
+"""The build whose constraints are soft, as the file's own; those of the others are rigid."""
 
 
 class Moved(NamedTuple):
@@ -35,25 +37,44 @@ Equations = Callable[[np.ndarray, np.ndarray], Moved]
 
 
 def equations(twin: TwinModel, build: str) -> Equations:
-    """The description in "exudyn", "mujoco" or "plain"; couplings are rigid but in MuJoCo."""
+    """The description in "exudyn", "mujoco" or "plain"; constraints are rigid but in MuJoCo."""
     built: Any = plain_tree(twin) if build == PLAIN else free_model(build, twin.driven)
-    rows, _ = tie_rows(twin.driven.couplings, twin.size)
-    rigid, by_engine = bool(len(rows)) and build != SOFT, build != PLAIN
+    rigid = twin.driven.tied and build != SOFT
+    asked = _asked(twin, built.ties if build != PLAIN else None) if rigid else None
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = built.mass_and_force(0.0, q, v)
-        if rigid:
-            force = _tied(mass, force, built.ties(q, v) if by_engine else rows)
+        if asked is not None:
+            force = tied(mass, force, *asked(q, v))
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
-def _tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Forces (n,) with those of rigid constraints whose derivatives by the coordinates are constant rows (c, n)."""
-    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, rows.T)
-    tied: np.ndarray = force - rows.T @ np.linalg.solve(rows @ compliance, rows @ free)
-    return tied
+def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
+    """How far states are at the most from satisfying a build's own constraints, m or rad: rigid bodies that lie wrong
+    to each other have the same accelerations."""
+    if not twin.driven.tied:
+        return 0.0
+    if build == PLAIN:
+        constraints = plain_constraints(twin)
+        return max(float(np.abs(constraints.gap(q).size).max()) for q, _ in states)
+    built: Any = free_model(build, twin.driven)
+    return max(float(np.abs(built.gaps(q)).max(initial=0.0)) for q, _ in states)
+
+
+def _asked(twin: TwinModel, rows_at: Rows | None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Rows J (c, n) of constraints and J' q' (c,) at a state: from plain equations, or from an engine's J."""
+    if rows_at is None:
+        return plain_constraints(twin).asked
+    if twin.driven.connections:
+        return partial(by_differences, rows_at)
+
+    def constant(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        (rows,) = rows_at([q])
+        return rows, np.zeros(len(rows))
+
+    return constant
 
 
 def plain_tree(twin: TwinModel) -> PlainTree:
@@ -61,12 +82,13 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions)
+    turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions, turns)
 
 
 def expected(twin: TwinModel, build: str) -> Equations:
-    """What a build must do: the file's own model, with rigid couplings unless the build is MuJoCo's."""
-    return as_parsed(twin) if build == SOFT or not twin.driven.couplings else rigid(twin)
+    """What a build must do: the file's own model, with rigid constraints unless the build is MuJoCo's."""
+    return as_parsed(twin) if build == SOFT or not twin.driven.tied else rigid(twin)
 
 
 def as_parsed(twin: TwinModel) -> Equations:
@@ -84,19 +106,28 @@ def as_parsed(twin: TwinModel) -> Equations:
 def rigid(twin: TwinModel) -> Equations:
     """The file's own model as MuJoCo parsed it, its equality constraints made rigid."""
     data = mujoco.MjData(twin.model)
+    asked = _asked(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
+        rows, rest = asked(q, v)
         state = forward(twin, data, q, v)
-        ties = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        others, rows = np.empty(twin.size), np.empty((twin.size, data.nefc))
+        ties, others = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty(twin.size)
         mujoco.mj_mulJacTVec(twin.model, data, others, np.where(ties, 0.0, data.efc_force))
-        for row, unit in zip(rows, np.eye(twin.size), strict=True):
-            mujoco.mj_mulJacVec(twin.model, data, row, unit)
         mass, force = _of_file(twin, data, state, others)
-        force = _tied(mass, force, rows.T[ties] @ state.jacobian)
+        force = tied(mass, force, rows, rest)
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
+
+
+def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
+    """(c, n): derivatives of the file's equality constraints by the coordinates of the description."""
+    state = forward(twin, data, q, np.zeros(twin.size))
+    ties, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty((twin.size, data.nefc))
+    for row, unit in zip(rows, np.eye(twin.size), strict=True):
+        mujoco.mj_mulJacVec(twin.model, data, row, unit)
+    of_constraints: np.ndarray = rows.T[ties] @ state.jacobian
+    return of_constraints
 
 
 def forward(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:

@@ -7,12 +7,23 @@ then said.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import BUILDS, Equations, Moved, State, as_parsed, equations, expected, rigid, sliding
+from models.own_model.builds import (
+    BUILDS,
+    Equations,
+    Moved,
+    State,
+    as_parsed,
+    equations,
+    expected,
+    largest_gap,
+    rigid,
+    sliding,
+)
 from models.own_model.reading import TwinModel
 from models.own_model.states import COUNT, random_states
 
@@ -23,6 +34,8 @@ LOOSEST = 1e-6
 """Bound beyond which nothing is certified, whatever the condition of the mass matrix."""
 SMALL = 1e-6
 """m/s^2, rad/s^2: what accelerations are compared with where none is larger."""
+MET = 1e-10
+"""m, rad: gap up to which a state satisfies the constraints of a build."""
 SINGULAR = "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
 QUIET = 1e-3
 """Share of the largest acceleration of all states, or of gravity, that counts where a state has less: what is there is
@@ -38,7 +51,8 @@ class Agreement:
     """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
-    rad/s^2; bound : what acceleration and mass may differ by.
+    rad/s^2; bound : what acceleration and mass may differ by; gap : how far states are from satisfying the build's own
+    constraints (m, rad).
     """
 
     build: str
@@ -49,11 +63,12 @@ class Agreement:
     difference: float
     size: float
     bound: float
+    gap: float = 0.0
 
     @property
     def alike(self) -> bool:
         """Whether accelerations are the same, and the mass matrix: what no force moves now may be pushed one day."""
-        return max(self.acceleration, self.mass) <= self.bound
+        return max(self.acceleration, self.mass) <= self.bound and self.gap <= MET
 
 
 def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
@@ -61,7 +76,7 @@ def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: 
     states, rows = states_of(twin, count), list[Agreement]()
     for i, build in enumerate(BUILDS):
         true, seen = (moved_at(each, states) for each in (expected(twin, build), equations(twin, build)))
-        rows.append(agreement(build, true, seen, twin))
+        rows.append(replace(agreement(build, true, seen, twin), gap=largest_gap(twin, build, states)))
         told((i + 1) / len(BUILDS))
     return tuple(rows)
 
@@ -72,7 +87,7 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
     RunFailed where none is left.
     """
     states = list[State]()
-    for q, v in zip(*random_states(twin.model, count), strict=True):
+    for q, v in zip(*random_states(twin, count), strict=True):
         tried = (sliding(twin, [(q, factor * v)]) for factor in FASTER)
         states += next((each for each in tried if each), [])
     if not states:
@@ -82,8 +97,8 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
 
 
 def softness(twin: TwinModel, count: int) -> float:
-    """Largest relative difference of accelerations of the file's own model with MuJoCo's soft couplings from those with
-    rigid ones, at states that satisfy them."""
+    """Largest relative difference of accelerations of the file's own model with MuJoCo's soft constraints from those
+    with rigid ones, at states that satisfy them."""
     states = states_of(twin, count)
     return agreement("", moved_at(rigid(twin), states), moved_at(as_parsed(twin), states), twin).acceleration
 

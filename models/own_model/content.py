@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import is_fixed, is_line, is_tie, label, rubs
+from models.own_model.reading import is_fixed, is_line, is_tie, joins, label, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -67,10 +67,13 @@ def _rows(model: mujoco.MjModel, document: Document, wanted: Callable[[str, str,
 
 
 def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
-    """Whether dry friction is that of a hinge or slide, and an equality constraint a coupling of two of them."""
+    """Whether a ball joint has no rotor, dry friction is that of a hinge or slide, and an equality constraint is
+    between bodies, or a coupling of two hinges or slides."""
     if kind == "friction_loss":
         return what == "joint" and rubs(model, number)
-    return kind == "equality" and is_tie(model, number)
+    if kind == "turning_law":
+        return not _has_rotor(model, number)
+    return kind == "equality" and (is_tie(model, number) or joins(model, number))
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
@@ -174,9 +177,13 @@ def _turning_laws(model: mujoco.MjModel) -> Listed:
     """Springs, dampers and rotors about all axes at once."""
     for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
         first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
-        rotor = model.dof_armature[first] and model.jnt_type[j] == BALL
-        if model.jnt_stiffness[j] or model.dof_damping[first] or rotor:
+        if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
             yield "joint", int(j)
+
+
+def _has_rotor(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a ball joint has an armature."""
+    return bool(model.jnt_type[joint] == BALL and model.dof_armature[model.jnt_dofadr[joint]])
 
 
 def _bent_laws(model: mujoco.MjModel) -> Listed:
@@ -261,7 +268,8 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
     ),
     "equality": (
         _equalities,
-        "a soft constraint in MuJoCo, which is built for joints that follow another in proportion alone",
+        "a soft constraint in MuJoCo, which is built between points of bodies, and for joints that follow another in "
+        "proportion",
         _forget_equalities,
     ),
     "actuator": (
@@ -275,7 +283,7 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
         "a spring around bodies or with slack, or a rotor along a way in space",
         _forget_tendons,
     ),
-    "turning_law": (_turning_laws, "a spring, damper or rotor about all axes of a ball or free joint", _forget_turning),
+    "turning_law": (_turning_laws, "a rotor of a ball joint, or what turns it or a free one back", _forget_turning),
     "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
     "fluid": (_medium, "forces of a medium", _forget_medium),
     "flex": (_flexes, "a deformable body", _keep_flexes),

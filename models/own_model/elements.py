@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import is_line, is_tie, label, sites_of
+from models.own_model.reading import CONNECT, by_sites, is_line, is_tie, joins, label, sites_of
 
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
@@ -221,9 +221,34 @@ def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_active0[e], model.eq_data[e, :2] = value[0] != 0.0, value[1:]
 
 
+def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """Whether a constraint between bodies acts (1), and where both ends are; zeros where it does not."""
+    if not joins(model, e):
+        return np.zeros(0)
+    if by_sites(model, e):
+        sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
+        ends = np.concatenate((model.site_pos[sites].ravel(), model.site_quat[sites].ravel()))
+    else:
+        ends = model.eq_data[e, : 6 if model.eq_type[e] == CONNECT else 10]
+    return np.array([1.0, *ends]) * model.eq_active0[e]
+
+
+def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+    model.eq_active0[e] = value[0] != 0.0
+    if not value[0]:
+        return
+    if by_sites(model, e):
+        sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
+        model.site_pos[sites], model.site_quat[sites] = value[1:7].reshape(2, 3), value[7:].reshape(2, 4)
+        model.site_sameframe[sites] = 0
+    else:
+        model.eq_data[e, : len(value) - 1] = value[1:]
+
+
 def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """solref and solimp of a coupling."""
-    return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if is_tie(model, e) else np.zeros(0)
+    """solref and solimp of a constraint."""
+    built = is_tie(model, e) or joins(model, e)
+    return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if built else np.zeros(0)
 
 
 def _write_softness(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
@@ -254,6 +279,7 @@ KINDS = (
     _Kind("tendon", "spring length", "m", *_field("tendon_lengthspring", lambda model, t: t)),
     _Kind("tendon", "armature", "kg", *_field("tendon_armature", lambda model, t: t)),
     _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
+    _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
     _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
     _Kind("actuator", "gear", "", *_of_actuator("actuator_gear", 1)),
     _Kind("actuator", "gain", "", *_of_actuator("actuator_gainprm", 3)),
@@ -268,6 +294,7 @@ DROPPED = (
     "armature",
     "friction loss",
     "coupling",
+    "joint",
     "gain",
     "bias",
 )

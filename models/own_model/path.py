@@ -17,6 +17,8 @@ from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
+from models.own_model.content import ranges
+from models.own_model.limits import limits_struck
 from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
 
@@ -34,8 +36,9 @@ class PathReport:
     """step (s); horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other build from
     the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
-    whether MuJoCo has soft couplings, so that its path is another one: from it the file's is counted then; rubbing :
-    whether there is dry friction: paths are compared as long as it slides."""
+    whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
+    whether there is dry friction: paths are compared as long as it slides; struck : whose limit, which is not
+    built, ends the comparison, empty if none's."""
 
     step: float
     horizon: float
@@ -45,6 +48,7 @@ class PathReport:
     energy: float | None
     soft: bool = False
     rubbing: bool = False
+    struck: str = ""
 
     @property
     def alike(self) -> bool:
@@ -57,14 +61,18 @@ class PathReport:
         """For the terminal."""
         rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state:"]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
-        if self.horizon < DURATION:
+        if self.struck:
+            rows.append(
+                f"  compared up to {self.horizon:.3g} s, where {self.struck} strikes its limit, which is not built"
+            )
+        elif self.horizon < DURATION:
             rows.append(
                 f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBED:g} reaches {ALIKE:g}"
                 f"{', or dry friction sticks' if self.rubbing else ''}"
             )
         for name, size in self.distances.items():
             turned = " (quaternions: distance of the step's error)" if name == FILE and self.quaternions else ""
-            given = " (soft couplings give way)" if name == SOFT and self.soft else ""
+            given = " (soft constraints give way)" if name == SOFT and self.soft else ""
             first = SOFT if name == FILE and self.soft else ENGINES[0]
             rows.append(f"  {name} from {first}: {size:.1e}{turned}{given}")
         if self.energy is not None:
@@ -75,7 +83,7 @@ class PathReport:
 def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     """Paths over 1 s; step (s): the file's unless given."""
     step = DURATION / np.ceil(DURATION / (step or float(twin.model.opt.timestep)) - 1e-9)
-    steps, (q,), (v,) = round(DURATION / step), *random_states(twin.model, 1)
+    steps, (q,), (v,) = round(DURATION / step), *random_states(twin, 1)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
         _march(build, partial(_by_build, twin, build, (q, v), (steps, step)), built, failed)
@@ -83,13 +91,15 @@ def paths(twin: TwinModel, step: float | None = None) -> PathReport:
     first = built.pop(ENGINES[0], None)
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None)
-    soft = bool(twin.driven.couplings)
-    disturbed = _model(twin, PLAIN if soft else ENGINES[1]).march(q + DISTURBED, v, steps, step)
-    rows = _sliding_rows(twin, first[: _rows(first, disturbed, steps)])
+    soft = twin.driven.tied
+    calm = PLAIN if soft and PLAIN in built else ENGINES[0]
+    disturbed = _model(twin, calm).march(q + DISTURBED, v, steps, step)
+    rows = _sliding_rows(twin, first[: _rows(built.get(calm, first), disturbed, steps)])
+    rows, struck = _unlimited_rows(twin, first[:rows])
     base = {FILE: built.get(SOFT, first)} if soft else {}
     distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
     energy = _ledger(twin, first[:rows], step)
-    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions)
+    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
 
 
@@ -112,7 +122,7 @@ def _by_build(twin: TwinModel, build: str, start: tuple[np.ndarray, np.ndarray],
 
 
 def _model(twin: TwinModel, build: str) -> FreeModel:
-    if twin.driven.couplings and build != SOFT:
+    if twin.driven.tied and build != SOFT:
         move = equations(twin, build)
         return Plain(build, lambda time, q, v: move(q, v).acceleration, twin.size)
     if build != PLAIN:
@@ -150,6 +160,15 @@ def _sliding_rows(twin: TwinModel, path: np.ndarray) -> int:
         if not sliding(twin, [(row[:n], row[n:])]):
             return max(2, i - 1)
     return len(path)
+
+
+def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
+    """How many states of a path lie before it strikes a limit, and whose; less one whose step may have met it."""
+    struck = limits_struck(twin) if ranges(twin.model) else lambda q: ()
+    for i, row in enumerate(path):
+        if names := struck(row[: twin.size]):
+            return max(2, i - 1), names[0]
+    return len(path), ""
 
 
 def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:

@@ -11,10 +11,19 @@ import mujoco
 import numpy as np
 
 from models.engines.free_vehicle import Driven
-from models.engines.native_parts import Coupling, DryFriction, GroundSpring, LineSpring, joint_parts
+from models.engines.native_parts import (
+    Connection,
+    Coupling,
+    DryFriction,
+    GroundSpring,
+    LineSpring,
+    TurningSpring,
+    joint_parts,
+)
 from models.own_model.coordinates import BALL, FREE, SLIDE, Coordinates
 from models.vehicles.spatial import FREEDOMS, PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
+CONNECT, WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 TURNS: tuple[Freedom, ...] = ("rx", "ry", "rz")
 OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL: TURNS, FREE: FREEDOMS}
 
@@ -49,8 +58,10 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
     gravity = np.zeros(3) if _disabled(model, "GRAVITY") else np.array(model.opt.gravity)
     loads = tuple(_lifted(model, design, gravity))
     lines = tuple(line_springs(model, design))
-    ties, parts = (tuple(dry_frictions(model)), tuple(couplings(model))), joint_parts(vehicle)
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties)
+    ties = tuple(dry_frictions(model)), tuple(couplings(model)), tuple(connections(model, design))
+    parts = joint_parts(vehicle)
+    turns = tuple(turning_springs(model, design))
+    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns)
     return TwinModel(name, model, driven, Coordinates(model, design))
 
 
@@ -162,7 +173,8 @@ def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             held = stiffness * float(model.qpos0[place + i] - model.qpos_spring[place + i])
             if stiffness or damping or inertia:
                 numbers = (stiffness, damping, held, inertia)
-                yield JointElement(label(model, "joint", j), ((_moved(j), freedom),), (1.0,), *numbers)
+                name = f"{label(model, 'joint', j)} {freedom if free else ''}".rstrip()
+                yield JointElement(name, ((_moved(j), freedom),), (1.0,), *numbers)
 
 
 def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[float]]:
@@ -201,6 +213,31 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
 
 
+def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
+    """Springs and dampers of how ball and free joints turn; of how free ones shift is in ``joint_elements``."""
+    springs, dampers, numbers = not _disabled(model, "SPRING"), not _disabled(model, "DAMPER"), moving(model)
+    for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL, FREE)):
+        body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE
+        stiffness = float(model.jnt_stiffness[j]) * springs
+        damping = float(model.dof_damping[model.jnt_dofadr[j] + 3 * free]) * dampers
+        if not (stiffness or damping):
+            continue
+        place, axes = int(model.jnt_qposadr[j]) + 3 * free, design.xmat[body].reshape(3, 3).copy()
+        rest = _matrix(model.qpos_spring[place : place + 4])
+        above = int(model.body_parentid[body])
+        first = _massive(above) if above in numbers else None
+        yield TurningSpring(
+            label(model, "joint", j), (first, _massive(body)), (rest if free else axes @ rest, axes), stiffness, damping
+        )
+
+
+def _matrix(quaternion: np.ndarray) -> np.ndarray:
+    """(3, 3) of a quaternion."""
+    numbers = np.empty(9)
+    mujoco.mju_quat2Mat(numbers, quaternion)
+    return numbers.reshape(3, 3)
+
+
 def rubs(model: mujoco.MjModel, joint: int) -> bool:
     """Whether a hinge or slide has dry friction."""
     several = model.jnt_type[joint] in (BALL, FREE)
@@ -234,6 +271,50 @@ def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
         offset, ratio = model.eq_data[e, :2].tolist()
         softness = tuple(model.eq_solref[e].tolist()), tuple(model.eq_solimp[e].tolist())
         yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
+
+
+def joins(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint keeps points of bodies together, or bodies as they lie to each other."""
+    return int(model.eq_type[equality]) in (CONNECT, WELD)
+
+
+def by_sites(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint is between two sites, and not between bodies."""
+    return bool(model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
+
+
+def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
+    """Equality constraints between points of two bodies, or with their axes, that act."""
+    if _disabled(model, "EQUALITY"):
+        return
+    numbers = moving(model)
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and joins(model, e)):
+        things = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        bodies = [int(model.site_bodyid[thing]) if by_sites(model, e) else thing for thing in things]
+        first, second = (_massive(b) if b in numbers else None for b in bodies)
+        if first == second:
+            continue
+        (start, turned), (end, other) = _frames(model, design, e)
+        axes = (turned, other) if model.eq_type[e] == WELD else None
+        softness = tuple(model.eq_solref[e].tolist()), tuple(model.eq_solimp[e].tolist())
+        ends = (first, _vector(start)), (second, _vector(end))
+        yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
+
+
+def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Points (3,) and axes (3, 3) of both ends of a constraint in the design position: they lie alike where it is met.
+
+    A weld between bodies has its point of the second one first.
+    """
+    things, data = (model.eq_obj1id[equality], model.eq_obj2id[equality]), model.eq_data[equality]
+    if by_sites(model, equality):
+        return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
+    points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
+    if model.eq_type[equality] == WELD:
+        points, axes = points[::-1], [_matrix(data[6:10]), np.eye(3)]
+    turns = [design.xmat[b].reshape(3, 3) for b in things]
+    places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
+    return [(place, turn @ own) for place, turn, own in zip(places, turns, axes, strict=True)]
 
 
 def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,10 +1,12 @@
-"""Random states of a model, every coordinate within its range, or as its couplings want it."""
+"""Random states of a model, every coordinate within its range, or as its constraints want it."""
 
 import mujoco
 import numpy as np
 
+from models.core.errors import RunFailed
+from models.own_model.constraints import plain_constraints, satisfying
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import couplings, tie_rows
+from models.own_model.reading import TwinModel, tie_rows
 
 COUNT = 100
 SEED = 26
@@ -12,19 +14,45 @@ ANGLE, SHIFT, SPEED, TILT = np.pi, 0.5, 1.0, 1.2
 """rad, m, and rad/s or m/s: what a coordinate without a range may reach; TILT (rad): the three angles of what turns
 without limit, the second of which is singular at a quarter turn."""
 
+STEEPEST = 1.45
+"""rad: how near the middle one of three angles comes to a quarter turn."""
+NEARER = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
+"""Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
+UNMET = "constraints cannot be satisfied all at once by coordinates in their ranges"
 
-def random_states(model: mujoco.MjModel, count: int = COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+
+def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates and rates (count, n), uniform in the ranges: the same for the same count and seed.
 
-    Those that couplings tie go to the nearest place, and the nearest rate, that satisfies them.
+    Those that constraints tie go to the nearest place, and the nearest rate, that satisfies them. RunFailed where no
+    state does.
     """
-    draw, (low, high) = np.random.default_rng(seed), bounds(model)
+    draw, (low, high) = np.random.default_rng(seed), bounds(twin.model)
     q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-SPEED, SPEED, (count, len(low)))
-    rows, offsets = tie_rows(tuple(couplings(model)), model.nv)
+    if twin.driven.connections:
+        return _connected(twin, q, v)
+    rows, offsets = tie_rows(twin.driven.couplings, twin.size)
     if not len(rows):
         return q, v
     nearest = np.linalg.pinv(rows).T
     return q - (q @ rows.T - offsets) @ nearest, v - v @ rows.T @ nearest
+
+
+def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States (count, n) that satisfy constraints between bodies, from random ones: towards the design position where
+    none is near."""
+    constraints, (low, high) = plain_constraints(twin), limits(twin.model)
+    middle = np.clip(0.0, low, high)
+
+    def nearest(place: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        for share in NEARER:
+            state = satisfying(constraints, middle + share * (place - middle), rate)
+            if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
+                return state
+        raise RunFailed("twin", UNMET)
+
+    states = [nearest(*each) for each in zip(q, v, strict=True)]
+    return np.array([place for place, _ in states]), np.array([rate for _, rate in states])
 
 
 def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
@@ -35,11 +63,30 @@ def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
         if model.jnt_type[j] in (FREE, BALL):
             turn = first + (3 if model.jnt_type[j] == FREE else 0)
-            reach = model.jnt_range[j, 1] if model.jnt_limited[j] else np.inf
+            reach = model.jnt_range[j, 1] - model.jnt_margin[j] if model.jnt_limited[j] else np.inf
             high[first:turn], high[turn : turn + 3] = SHIFT, min(TILT, reach / np.sqrt(3.0))
             low[first : turn + 3] = -high[first : turn + 3]
         elif model.jnt_limited[j]:
-            low[first], high[first] = model.jnt_range[j] - model.qpos0[place]
+            margin = min(float(model.jnt_margin[j]), 0.5 * float(np.ptp(model.jnt_range[j])))
+            low[first], high[first] = model.jnt_range[j] - model.qpos0[place] + (margin, -margin)
         elif model.jnt_type[j] == SLIDE:
             low[first], high[first] = -SHIFT, SHIFT
+    return low, high
+
+
+def limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates (n,) of the file's ranges, infinite where there is none.
+
+    The middle one of three angles keeps away from a quarter turn all the same.
+    """
+    low, high = bounds(model)
+    for j in range(model.njnt):
+        first, several = int(model.jnt_dofadr[j]), model.jnt_type[j] in (FREE, BALL)
+        free = model.jnt_type[j] == FREE
+        if not model.jnt_limited[j] or free:
+            of = slice(first, first + (6 if free else 3 if several else 1))
+            low[of], high[of] = -np.inf, np.inf
+        if several:
+            middle = first + (4 if free else 1)
+            low[middle], high[middle] = max(low[middle], -STEEPEST), min(high[middle], STEEPEST)
     return low, high

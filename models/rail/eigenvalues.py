@@ -8,19 +8,19 @@ import numpy as np
 from models.rail.equations import Equations, slopes
 from models.rail.wheelset import Wheelset
 
-SLOW = 0.2
+SLOW_SPEED = 0.2
 """Speed (m/s) at which a free wheelset moves without any effect of its inertia on the wavelength."""
 
 
-def free(wheelset: Wheelset) -> Wheelset:
+def free_wheelset(wheelset: Wheelset) -> Wheelset:
     """A copy of the wheelset without suspension."""
     return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 
 
 def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset by the slowest oscillation of all its motions."""
-    roots = values(kind, free(wheelset), SLOW)
-    return 2.0 * math.pi * SLOW / min(roots[roots.imag > 0.0], key=abs).imag
+    roots = values(kind, free_wheelset(wheelset), SLOW_SPEED)
+    return 2.0 * math.pi * SLOW_SPEED / min(roots[roots.imag > 0.0], key=abs).imag
 
 
 def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:

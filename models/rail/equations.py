@@ -48,11 +48,11 @@ from models.rail.wheelset import GRAVITY, Wheelset
 
 STATES = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
-STIFF, LIMIT_OF_RK4 = 2.5, 2.785
+ALLOWED_STEP_RATE, LIMIT_OF_RK4 = 2.5, 2.785
 """Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
-MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
+DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
-FASTEST = 200.0
+FASTEST_SPEED = 200.0
 """m/s"""
 LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
@@ -222,7 +222,7 @@ class Equations:
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise InputError("", "law", self.law, "is not known", tuple(LAWS))
-        number("speed", self.speed, "a speed in m/s from -200 to 200", -FASTEST, FASTEST)
+        number("speed", self.speed, "a speed in m/s from -200 to 200", -FASTEST_SPEED, FASTEST_SPEED)
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
@@ -365,12 +365,12 @@ class Equations:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
-        if not 0.0 < number("step", step, "a step in s") * self._fastest <= STIFF:
+        if not 0.0 < number("step", step, "a step in s") * self._fastest <= ALLOWED_STEP_RATE:
             raise InputError(
                 "",
                 "step",
                 step,
-                f"must be above 0 and at most {STIFF / self._fastest:.3g} s: the "
+                f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest:.3g} s: the "
                 f"fastest motion has a rate of {self._fastest:.4g} 1/s",
             )
         if not divides(step, number("duration", duration, "a time in s")):
@@ -384,7 +384,7 @@ class Equations:
 def slopes(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
     """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order over
     so many times the usual way."""
-    columns, moved = [], wide * MOVED
+    columns, moved = [], wide * DIFFERENCE_STEPS
     for k in range(STATES):
         a, b, c, d = (rates(state + part * moved[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
         columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * moved[k]))

@@ -32,9 +32,9 @@ from models.contact.inputs import Array, number, quantity
 from models.core.errors import InputError
 from models.rail.rolling_radius_table import RollingRadiusTable
 
-SMALL = 1e-6
+SERIES_LIMIT = 1e-6
 """Argument below which arctan z / z is its series to rounding."""
-SAME = 1e-9
+AMPLITUDE_TOLERANCE = 1e-9
 """Share of an amplitude within which two waves are the same, or an amplitude is that of the table's ends."""
 NODES = 720
 """Phases of the first harmonic."""
@@ -93,7 +93,7 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, near: float | N
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
     first, last = table.ends
-    if 0.0 <= 2.0 * amplitude - (last - first) <= SAME * amplitude:
+    if 0.0 <= 2.0 * amplitude - (last - first) <= AMPLITUDE_TOLERANCE * amplitude:
         amplitude = (last - first) / 2.0
     if 2.0 * amplitude > last - first:
         allowed = f"is half of peak to peak, and the table goes from {first:g} to {last:g}: it cannot hold the wave"
@@ -125,7 +125,7 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
         points += [float(low + share * (high - low)) for share in _roots(begin, middle, end)]
     if len(places) == 1:
         points = [float(places[0])]
-    apart = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > SAME * amplitude]
+    apart = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > AMPLITUDE_TOLERANCE * amplitude]
     return [points[k] for k in apart]
 
 
@@ -182,7 +182,7 @@ def _times(way: Array, slope: Array) -> Array:
     """Time (n,) across pieces of dr: ``way``, length by the sum of the speeds at both ends; slope of dr."""
     root = np.sqrt(np.abs(slope))
     angle = root * way
-    small, rising = angle < SMALL, slope > 0.0
+    small, rising = angle < SERIES_LIMIT, slope > 0.0
     safe = np.where(small, 1.0, root)
     across = np.where(rising, np.arctan(angle), np.arctanh(np.where(rising, 0.0, np.minimum(angle, 1.0 - 1e-16))))
     return 2.0 * np.where(small, way, across / safe)
@@ -209,7 +209,9 @@ def _idle(table: RollingRadiusTable, amplitude: float) -> float | None:
     y, zero = table.displacements, table.differences == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], zero.astype(int), [0]])))
     stretches = [(float(y[a]), float(y[b - 1])) for a, b in edges.reshape(-1, 2)]
-    wide = [(low + high) / 2.0 for low, high in stretches if high - low >= 2.0 * amplitude * (1.0 - SAME)]
+    wide = [
+        (low + high) / 2.0 for low, high in stretches if high - low >= 2.0 * amplitude * (1.0 - AMPLITUDE_TOLERANCE)
+    ]
     return min(wide, key=abs) if wide else None
 
 

@@ -17,7 +17,7 @@ def nadal(friction: float, angle: float = FLANGE_ANGLE) -> float:
     return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
 
 
-def shares(force: np.ndarray, bound: np.ndarray) -> np.ndarray:
+def bound_shares(force: np.ndarray, bound: np.ndarray) -> np.ndarray:
     """Magnitudes of forces by their bounds, of one shape: 0 without any force; infinite without a bound."""
     force = np.abs(force)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -22,7 +22,7 @@ CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
 """Cells along x, and along y over the narrowest patch; along y at most."""
 MARGINS = (1.4, 2.0, 3.0)
 """Sides of the grid by those of the areas that the simplified theory finds."""
-FAR = 1e-3
+UNKNOWN_HEIGHT = 1e-3
 """Height (m) where a distance is not known."""
 PRECISION, ITERATIONS = 1e-6, 30
 """Relative, of the vertical load and of the approach."""
@@ -117,7 +117,7 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along its normal, on the common contour."""
     known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
-    heights = np.full((y.size, x.size), FAR)
+    heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
     heights[over] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[over][:, None])
     return heights
 

@@ -23,7 +23,7 @@ SPACING, OF_KNOTS = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
 SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
 """Lateral displacements (m) at which first contact is looked for."""
-APART, CLOSE = 3e-3, 1e-6
+CONTACT_JUMP, DISPLACEMENT_STEP = 3e-3, 1e-6
 """Way (m) on the wheel that first contact must jump between displacements that are so close (m)."""
 RIDGE = 1e-5
 """Height (m) of the gap between both places of a jump from which on the patches are two."""
@@ -136,14 +136,14 @@ def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Arra
 
 def _ridge(side: WheelAndRail, before: tuple[float, float], after: tuple[float, float]) -> float | None:
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
-    while abs(after[1] - before[1]) > APART:
+    while abs(after[1] - before[1]) > CONTACT_JUMP:
         middle = (before[0] + after[0]) / 2.0
         touch = _first_contact(side, middle)
         if touch is None:
             return None
         here, places, gap = touch
         low, high = sorted((before[1], after[1]))
-        if after[0] - before[0] < CLOSE:
+        if after[0] - before[0] < DISPLACEMENT_STEP:
             between = (places > low) & (places < high)
             return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
         if abs(here - before[1]) > abs(here - after[1]):

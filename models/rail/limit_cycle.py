@@ -25,7 +25,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, WheelsetPath, Y
 from models.rail.linear import critical_speed
 from models.rail.wheelset import Wheelset
@@ -49,19 +49,19 @@ RETURNS = [k for k in range(STATES) if k != ANGLE]
 SPEED, PERIOD = len(RETURNS), len(RETURNS) + 1
 """Columns of the slopes after those of the states."""
 AMPLITUDE, RATE = RETURNS.index(Y), RETURNS.index(Y_RATE)
-STILL = [k for k in range(len(RETURNS)) if k != RATE]
+SECTION_COORDINATES = [k for k in range(len(RETURNS)) if k != RATE]
 """The section's coordinates."""
-NOTHING = 1e-5
+DECAYED_DISPLACEMENT = 1e-5
 """Displacement (m) below which a motion has died out."""
 MARCH, MARCHES = 2.0, 20
 """Seconds of one march towards the cycle, and how many there are at most."""
-STEADY = 2e-3
+AMPLITUDE_CHANGE = 2e-3
 """Relative change of the amplitude from cycle to cycle from which Newton's method takes over."""
-FIRST = (0.1, 0.2, 0.4)
+FIRST_AMPLITUDES = (0.1, 0.2, 0.4)
 """Amplitudes at which a branch may begin, by the clearance of the flanges: of the smallest that leads to an orbit."""
 INNER, OUTER = 12, 0.03
 """Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
-LARGEST = 2.0
+LARGEST_AMPLITUDE = 2.0
 """Amplitude at which a branch ends, by the clearance."""
 
 
@@ -102,7 +102,7 @@ class Orbit:
         """Largest magnitude of the Floquet multipliers."""
         by_states, back = self.slopes[:, : len(RETURNS)], self.slopes[:, PERIOD]
         returned = by_states - np.outer(back, by_states[RATE]) / back[RATE]
-        return float(np.abs(np.linalg.eigvals(returned[np.ix_(STILL, STILL)])).max())
+        return float(np.abs(np.linalg.eigvals(returned[np.ix_(SECTION_COORDINATES, SECTION_COORDINATES)])).max())
 
     @property
     def stable(self) -> bool:
@@ -117,7 +117,8 @@ class Orbit:
 def guess_near_state(
     equations: Equations, state: Array, period: float, step: float, executor: Executor | None = None
 ) -> Orbit:
-    """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
+    """A guess for ``solved_orbit``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at
+    most."""
     start = state.copy()
     start[Y_RATE] = 0.0
     return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
@@ -139,7 +140,7 @@ def beginning(equations: Equations, amplitude: float, step: float, executor: Exe
     state = at.rest.copy()
     state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
     guess = guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step, executor)
-    return solved(guess, "speed", executor=executor)
+    return solved_orbit(guess, "speed", executor=executor)
 
 
 def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
@@ -168,7 +169,7 @@ def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int, execut
     ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
     guess = replace(last, equations=ahead, state=state, period=last.period + share * (last.period - before.period))
     try:
-        return solved(guess, "speed", executor=executor)
+        return solved_orbit(guess, "speed", executor=executor)
     except RunFailed:
         if halvings == 0:
             raise
@@ -176,7 +177,7 @@ def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int, execut
     return _onwards(last, middle, amplitude, halvings - 1, executor)
 
 
-def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:
+def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:
     """The orbit near a guess, with the speed or the amplitude of the guess, and its slopes if it is to be precise.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
@@ -200,7 +201,7 @@ def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Ex
 
 def refined(orbit: Orbit, unknown: Unknown, executor: Executor | None = None) -> Orbit:
     """The orbit at half the step, with the changes that halving made."""
-    half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
+    half = solved_orbit(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
     return replace(
         half,
         error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
@@ -224,7 +225,7 @@ def _linearised(orbit: Orbit, executor: Executor | None) -> Orbit:
         [(replace(eq, speed=eq.speed + sign * SHIFT), state, T) for sign in signs],
         [(eq, state, T * (1.0 + sign * SHIFT)) for sign in signs],
     ]
-    ends = each_of(partial(_ends, steps=orbit.steps), pairs, executor)
+    ends = block_results(partial(_ends, steps=orbit.steps), pairs, executor)
     columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
     return replace(orbit, slopes=np.array(columns).T)
 
@@ -237,7 +238,7 @@ def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
     """One correction by the slopes; the lateral rate stays zero."""
     returned = orbit.slopes.copy()
     returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
-    free = [k for k in STILL if k != AMPLITUDE]
+    free = [k for k in SECTION_COORDINATES if k != AMPLITUDE]
     columns = [*free, AMPLITUDE if unknown == "amplitude" else SPEED, PERIOD]
     *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
     state, speed = orbit.state.copy(), orbit.speed
@@ -263,13 +264,13 @@ def attained(
     for _ in range(MARCHES):
         path = equations.run(state, MARCH, step)
         y, state = path.states[:, Y], path.states[-1]
-        if np.abs(y[-y.size // 4 :]).max() < NOTHING:
+        if np.abs(y[-y.size // 4 :]).max() < DECAYED_DISPLACEMENT:
             return None
         tops = maxima(y)
-        if tops.size > 2 and np.ptp(y[tops[-2:]]) < STEADY * y[tops[-1]]:
+        if tops.size > 2 and np.ptp(y[tops[-2:]]) < AMPLITUDE_CHANGE * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
             guess = guess_near_state(equations, path.states[tops[-1]], period, step, executor)
-            return solved(guess, "amplitude", executor=executor)
+            return solved_orbit(guess, "amplitude", executor=executor)
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 
@@ -288,19 +289,19 @@ def bifurcation(
     NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.
     """
     clearance = equations.wheelset.flange_clearance
-    for share in FIRST:
+    for share in FIRST_AMPLITUDES:
         try:
             first = beginning(equations, share * clearance, step, executor)
             break
         except RunFailed:
-            if share == FIRST[-1]:
+            if share == FIRST_AMPLITUDES[-1]:
                 raise
     inner = np.linspace(first.amplitude, clearance, INNER)[1:]
     outer = (clearance * (1.0 + OUTER * k) for k in count(1))
     yield refined(first, "speed", executor)
     for amplitudes in (inner, outer):
         for orbit in branch(first, amplitudes, executor):
-            if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST * clearance:
+            if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
                 return
             first = orbit
             yield refined(orbit, "speed", executor)

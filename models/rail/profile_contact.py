@@ -62,17 +62,17 @@ class LaidProfile(NamedTuple):
     knots: Array
 
 
-COARSE = 5
+COARSE_NODES = 5
 """Nodes from one to the next that is always looked at."""
 MARGIN = 2e-5
 """Depth (m) below the rail up to which the nodes between are looked at as well: two radii of 13 mm rise by 5e-6."""
-FAR = 1e-3
+FAR_HEIGHT = 1e-3
 """Height (m) over the rail at which no slope of a rail leaves less than the margin."""
 SWEEPS = 6
 """Times that the patches' shares are found anew; each makes the error of the last some hundred times less."""
 SHARPEST = 500.0
 """Curvature (1/m) of a patch that only one node lies in."""
-_LEAST = 1e-40
+_LEAST_DEPTH_SQUARE = 1e-40
 """m^2: sums of squares of depths far below an atom's are none."""
 
 
@@ -87,11 +87,11 @@ def profile_on_rail(side, pose, profile, modulus, touches):
     y, z, roll, yaw = pose
     seen = _seen(side * y, z + head.level, side * roll, side * yaw)  # the left wheel is the right one in a mirror
     knot, before = 0, -1.0
-    for j in range(0, int(head.nodes), COARSE):
+    for j in range(0, int(head.nodes), COARSE_NODES):
         node = _node(profile.nodes[j], seen, head, profile.knots, knot)
         knot = node[-1]
         if max(before, node[0]) > -MARGIN:
-            for i in range(max(0, j - COARSE), j):
+            for i in range(max(0, j - COARSE_NODES), j):
                 fine = _node(profile.nodes[i], seen, head, profile.knots, knot)
                 if fine[0] > 0.0:
                     _add(profile.nodes[i], fine, i * head.spacing, sums)
@@ -134,7 +134,7 @@ def _node(node, seen, head, knots, knot):
     cubic = knots[knot]
     t = here - cubic.y
     over = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
-    if over < -FAR:
+    if over < -FAR_HEIGHT:
         return -1.0, place_x, place_y, place_z, 0.0, knot
     slope = cubic.c1 + t * (2.0 * cubic.c2 + 3.0 * t * cubic.c3)
     return over / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
@@ -169,7 +169,7 @@ def _patch(side, sums, seen, touch):
     """One touch from its zone's sums."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
     whole = sums.w2
-    if whole <= _LEAST:
+    if whole <= _LEAST_DEPTH_SQUARE:
         return
     middle, size = sums.s1 / whole, math.hypot(sums.n_y, sums.n_z)
     depth, n_y, n_z = 3.5 / 3.0 * sums.w3 / whole, sums.n_y / size, sums.n_z / size

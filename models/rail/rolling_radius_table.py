@@ -22,7 +22,7 @@ from models.core.tables import METRES, read_table
 
 COLUMNS = {"y": METRES, "dr": METRES}
 """Of a file: displacement to the right, rolling radius of the right wheel less that of the left one."""
-LEAST = 3
+FEWEST_ROWS = 3
 """Rows of a table."""
 
 
@@ -40,9 +40,11 @@ class RollingRadiusTable:
 
     def __post_init__(self) -> None:
         y, dr = (quantity(name, getattr(self, name), "finite lengths") for name in ("displacements", "differences"))
-        if y.ndim != 1 or y.shape != dr.shape or y.size < LEAST:
+        if y.ndim != 1 or y.shape != dr.shape or y.size < FEWEST_ROWS:
             shapes = [list(y.shape), list(dr.shape)]
-            raise InputError(self.source, "table", shapes, f"must be two columns of {LEAST} rows or more, as long")
+            raise InputError(
+                self.source, "table", shapes, f"must be two columns of {FEWEST_ROWS} rows or more, as long"
+            )
         if y[0] > y[-1]:
             y, dr = y[::-1], dr[::-1]
         self._check_order(y)
@@ -112,7 +114,7 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, COLUMNS, least=LEAST)
+    table = read_table(path, COLUMNS, least=FEWEST_ROWS)
     return RollingRadiusTable(table["y"], table["dr"], str(path))
 
 
@@ -134,7 +136,7 @@ def rolling_radii_of(
             if rows and shift > 0.0:
                 break
             rows = []
-    if len(rows) < LEAST:
+    if len(rows) < FEWEST_ROWS:
         raise InputError("", "displacements", None, "both wheels touch their rails at fewer than three of them")
     y, of_right, of_left = np.array(rows).T
     return RollingRadiusTable(y, of_right - of_left)

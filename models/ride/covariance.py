@@ -18,7 +18,7 @@ from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import ACCURACY, TOLD, Growth, MarginalParts, growth, split_marginal
+from models.ride.marginal import ACCURACY, ZERO_MARGIN, Growth, MarginalParts, growth, split_marginal
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 """What an output can be."""
@@ -265,7 +265,7 @@ def verdicts(
     rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.
     """
     direct = sum((d**2).sum(axis=1) for d in D) * fastest
-    white = direct > (TOLD * accuracy) ** 2 * variance + floor
+    white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
     each = [_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
     return tuple(status for status, _ in each), tuple(reason for _, reason in each)
 

@@ -84,13 +84,13 @@ def _system(
     return DelayedSystem(A, tuple(B), delays, C, tuple(D), vehicle.names, excitation.independent)
 
 
-NOTHING = 1e-10
+NEGLIGIBLE_SHARE = 1e-10
 """Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which there is none."""
 
 
 def singular(mass: np.ndarray) -> bool:
     """Whether nothing inert moves with some motion."""
-    return bool(_split(mass)[1].size)
+    return bool(_range_and_kernel(mass)[1].size)
 
 
 @dataclass(frozen=True)
@@ -111,19 +111,19 @@ class VehicleStates:
 
 def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
     """States of a vehicle whose mass may be singular; InputError where nothing holds a body without mass."""
-    Y, Z = _split(vehicle.mass)
-    V, E = (Z @ part for part in _split(Z.T @ vehicle.damping @ Z))
+    Y, Z = _range_and_kernel(vehicle.mass)
+    V, E = (Z @ part for part in _range_and_kernel(Z.T @ vehicle.damping @ Z))
     n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
     q_a, v_a, q_b = np.split(np.eye(2 * a + b), [a, 2 * a])
     q, direct = Y @ q_a + V @ q_b, np.zeros((n, n))
     if E.shape[1]:
         elastic = E.T @ vehicle.stiffness
-        direct = E @ _solved(elastic @ E, E.T)
+        direct = E @ _solved_for(elastic @ E, E.T)
         q = q - direct @ (vehicle.stiffness @ q)
     # forces by the state and by g, on what is inert and on what dampers hold back
     force = np.hstack([-vehicle.stiffness @ q - vehicle.damping @ Y @ v_a, np.eye(n) - vehicle.stiffness @ direct])
-    slow = _solved(V.T @ vehicle.damping @ V, V.T @ force)
-    inert = _solved(Y.T @ vehicle.mass @ Y, Y.T @ (force - vehicle.damping @ V @ slow))
+    slow = _solved_for(V.T @ vehicle.damping @ V, V.T @ force)
+    inert = _solved_for(Y.T @ vehicle.mass @ Y, Y.T @ (force - vehicle.damping @ V @ slow))
     A, B = np.split(np.vstack([np.hstack([v_a, np.zeros((a, n))]), inert, slow]), [2 * a + b], axis=1)
     back = np.linalg.inv(np.hstack([Y, V, E]))
     return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
@@ -160,27 +160,29 @@ def _direct(read: Rows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.n
     """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
     seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
     size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
-    told = abs(seen) > NOTHING * (size + abs(read.road_rate_factors) @ abs(noise))
-    worse = abs(read.acceleration_factors @ (q @ B)) > NOTHING * (abs(read.acceleration_factors) @ abs(q) @ abs(B))
+    told = abs(seen) > NEGLIGIBLE_SHARE * (size + abs(read.road_rate_factors) @ abs(noise))
+    worse = abs(read.acceleration_factors @ (q @ B)) > NEGLIGIBLE_SHARE * (
+        abs(read.acceleration_factors) @ abs(q) @ abs(B)
+    )
     return np.where(worse, np.inf, np.where(told, seen, 0.0))
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """matrix^-1 right; InputError where nothing holds a body without mass."""
     if not len(matrix):
         return right
-    if np.linalg.cond(matrix) > 1 / NOTHING:
+    if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:
         raise InputError("", "effects", None, "nothing holds what is left without mass")
     return np.linalg.solve(matrix, right)
 
 
-def _split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _range_and_kernel(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Bases of what a symmetric matrix acts on and of what it does not; single coordinates where it is diagonal."""
     if not len(matrix):
         return matrix, matrix
     scale = np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2 / np.outer(scale, scale))
-    if values[0] > NOTHING:
+    if values[0] > NEGLIGIBLE_SHARE:
         return np.eye(len(matrix)), np.zeros((len(matrix), 0))
-    on = values > NOTHING
+    on = values > NEGLIGIBLE_SHARE
     return vectors[:, on] / scale[:, None], vectors[:, ~on] / scale[:, None]

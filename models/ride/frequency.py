@@ -30,7 +30,7 @@ from models.vehicles.linear_vehicle import LinearVehicle, poles
 
 POINTS = 16
 """Gauss points of a panel."""
-LOW, HIGH = 0.02, 1e12
+LOWEST_RATIO, HIGHEST_RATIO = 0.02, 1e12
 """Ends of the first and of the last panel, by the lowest and the highest frequency of vehicle and road. Not lower: near
 zero the stiffness of a free vehicle is all rounding, so that the first panel is not halved for ever either."""
 TOLERANCE = 1e-11
@@ -192,7 +192,7 @@ def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.
     natural = np.sqrt(squares[squares > 1e-8 * squares.max()])
     corners = speed * abs(np.linalg.eigvals(excitation.F))
     marks = np.concatenate([natural, corners[corners > 0]])
-    low, high = LOW * marks.min(), HIGH * marks.max()
+    low, high = LOWEST_RATIO * marks.min(), HIGHEST_RATIO * marks.max()
     doublings = np.geomspace(low, high, int(np.ceil(np.log2(high / low))))
     return np.unique(np.concatenate([[0.0], doublings, natural]))
 

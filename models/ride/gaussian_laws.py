@@ -55,7 +55,7 @@ def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[floa
     """Mean force (N), gain (N/m) and variance (N^2) that the gain leaves out, of the curve over travel (m)."""
     force, gain = of_curve(spring.travel_force, mean, deviation)
     x = deviation * POINTS
-    law = _at(spring.travel_force, mean + x)
+    law = _curve_at(spring.travel_force, mean + x)
     return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
 
 
@@ -64,7 +64,7 @@ def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float
     force, gain = of_curve(spring.rate_force, 0.0, deviation)
     gain += of_friction(spring.friction, spring.friction_rate, deviation)
     x = deviation * POINTS
-    law = _at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
+    law = _curve_at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
     return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
 
 
@@ -73,7 +73,7 @@ WEIGHTS = np.exp(-(POINTS**2) / 2.0) / np.exp(-(POINTS**2) / 2.0).sum()
 """Of expectations over the normal distribution: good to 1e-4 for laws with corners, enough for what is left out."""
 
 
-def _at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
+def _curve_at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
     """The curve at many arguments."""
     if curve is None:
         return np.zeros_like(x)

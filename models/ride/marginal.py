@@ -20,7 +20,7 @@ from models.core.errors import InputError
 ACCURACY = 1e-10
 """Relative accuracy of a system matrix where nothing else is known: formulas reach 1e-15, engines that differentiate
 curves with corners 1e-11. A motion with a rate below this share of the fastest one (some 1e-8 1/s) counts as free."""
-TOLD = 1e3
+ZERO_MARGIN = 1e3
 """What should vanish is told from zero if it is this many times larger than the accuracy allows."""
 
 
@@ -78,7 +78,7 @@ def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
     """
     balanced, scale, norm = _balanced(A)
     V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
-    if zeros and accuracy * norm > FREE:
+    if zeros and accuracy * norm > FREE_ROUNDING:
         _refuse(norm)
     U, rest, undamped = _undamped_first(form[zeros:, zeros:], 10 * accuracy * norm)
     k = zeros + undamped
@@ -104,7 +104,7 @@ def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
     )
 
 
-FREE = 1e-3
+FREE_ROUNDING = 1e-3
 """A motion is not called free because of rounding where rounding comes to more than this (1/s): in a thousand seconds
 a vehicle comes to rest."""
 
@@ -230,8 +230,8 @@ def growth(
     """Growth of y = C x along the marginal motions under noise through B_i (n, k) with delays tau_i (s).
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
-    last one may stop. C (p, n). Products no larger than TOLD times their accuracy are zero, unless the motion, if it is
-    not free but dies out too slowly to tell, would still add to the ``variance`` (p,) of all others.
+    last one may stop. C (p, n). Products no larger than ZERO_MARGIN times their accuracy are zero, unless the motion,
+    if it is not free but dies out too slowly to tell, would still add to the ``variance`` (p,) of all others.
     """
     join = np.hstack if independent else sum
     carried = [np.eye(split.marginal) if independent else expm(-split.M * delay) for delay in delays]
@@ -242,7 +242,7 @@ def growth(
     )
     seen = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.marginal)
-    z, least = split.zeros, TOLD * accuracy
+    z, least = split.zeros, ZERO_MARGIN * accuracy
     most = least * variance * 2 * accuracy * split.fastest
     rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least, most)
     swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least, most)

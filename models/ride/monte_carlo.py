@@ -26,12 +26,13 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 MODES = 8
-"""Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where REACH is full."""
-REACH = 2.0
+"""Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where LARGEST_RATE_TIMES_CELL
+is full."""
+LARGEST_RATE_TIMES_CELL = 2.0
 """Fastest rate of vehicle or road times the cell, at most."""
 TERMS = 30
 """Of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
-STEADY = 1e-6
+SLOWEST_DECAY = 1e-6
 """Rate (1/s) below which a motion does not die out in any run."""
 FORGOTTEN = 9.0
 """Slowest rate times the time that copies, begun at zero, run before they count: e^-18 of a variance is missing."""
@@ -142,7 +143,7 @@ class _Cells:
         self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
         self.finite = np.array([status == FINITE for status in stationary(system(slowest)).status])
         fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
-        self.length, self.shifts = path_cell(excitation.lengths, REACH / fastest)
+        self.length, self.shifts = path_cell(excitation.lengths, LARGEST_RATE_TIMES_CELL / fastest)
         self.at_rest, self.per_speed = (
             2.0 * self.at_unit_speed.A - self.at_double_speed.A,
             self.at_double_speed.A - self.at_unit_speed.A,
@@ -151,7 +152,7 @@ class _Cells:
     def to_forget(self, speed: float) -> int:
         """Cells at a constant speed after which a copy has forgotten its beginning."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
-        if slowest < STEADY:
+        if slowest < SLOWEST_DECAY:
             said = "has a motion that does not die out: a copy never forgets its beginning"
             raise InputError("", "vehicle", None, said)
         return int(np.ceil(FORGOTTEN / slowest * speed / self.length))

@@ -14,22 +14,22 @@ import numpy as np
 
 from models.ride.copies_kernel import POWERS, Curves, Laws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
-from models.ride.statistical_linearisation import bent, statistically_linear
+from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, Kinematics, linearise, preloads
 
-REACH, STEEPEST = 0.25, 0.5
+LARGEST_RATE_TIMES_STEP, STEEPEST = 0.25, 0.5
 """Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.
 Deviations of a quarter car are then too large by 0.05 to 0.1 %, by the covariance of the steps themselves."""
 BLOCK = 200
 """Steps between two portions of road."""
-EVERY = 4
+STEPS_PER_READING = 4
 """Steps from one reading of the outputs to the next, which know of each other anyway."""
 SETTLE = 9.0
 """Slowest rate times the time that copies, begun at rest, run before they count."""
-HELD = 1e-6
+SLOWEST_DECAY_SHARE = 1e-6
 """Share of the largest decay rate below which a motion counts as one that nothing pulls back."""
 
 
@@ -115,11 +115,11 @@ def copies_in_time(
         march.over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * BLOCK))
         if left <= BLOCK:
             break
-    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY))
+    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, STEPS_PER_READING))
     return Copies(march.plain.names, moments, road.step, counted * road.step, settling)
 
 
-AGAIN = 0.5
+RERUN_SHARE = 0.5
 """Share of the copies that run again in longer steps."""
 
 
@@ -128,9 +128,9 @@ def coarser_variances(
 ) -> np.ndarray:
     """Variances (k, p) about the means of the first copies, on their own roads in steps 2 or 4 ``times`` as long."""
     copies = len(fine.moments[0])
-    kept, road = max(1, math.ceil(AGAIN * copies)), RoadPath(excitation, speed, fine.step / 2.0)
+    kept, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine.step / 2.0)
     settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
-    block, every = BLOCK // times, EVERY // times
+    block, every = BLOCK // times, STEPS_PER_READING // times
     march = CopiesMarch(vehicle, speed, times * fine.step, kept)
     for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
         left = settling + counted - number * block
@@ -149,13 +149,13 @@ class CopiesMarch:
     """Copies of a vehicle at rest, stepped over roads; ``sums`` (4, p, copies): of powers of its outputs so far."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
-        springs = bent(vehicle)
+        springs = nonlinear_springs(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
         self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
         self.sums = np.zeros((POWERS, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def over(self, roads: np.ndarray, first: int, every: int = EVERY) -> None:
+    def over(self, roads: np.ndarray, first: int, every: int = STEPS_PER_READING) -> None:
         """Go on over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step ``first``."""
         if self.states is None:
             self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
@@ -165,22 +165,22 @@ class CopiesMarch:
 
 def usual_step(vehicle: SpatialVehicle, speed: float, replaced: LinearVehicle) -> float:
     """Step (s) for a vehicle that ``replaced`` stands for, by statistical linearisation."""
-    return min(REACH / float(abs(poles(replaced)).max()), followed(vehicle, speed))
+    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(replaced)).max()), followed(vehicle, speed))
 
 
 def forgotten(replaced: LinearVehicle) -> float:
     """Time (s) after which copies have forgotten their beginning."""
     decay = abs(poles(replaced).real)
-    return SETTLE / float(decay[decay > HELD * decay.max()].min())
+    return SETTLE / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
 def followed(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that follows the vehicle with its springs as steep as they get."""
-    steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in bent(vehicle)})
+    steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in nonlinear_springs(vehicle)})
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _steps_to_first_output(settling: int, completed: int, every: int = EVERY) -> int:
+def _steps_to_first_output(settling: int, completed: int, every: int = STEPS_PER_READING) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
     return settling - completed if completed <= settling else (settling - completed) % every
 

@@ -60,7 +60,7 @@ class RoadPath:
             fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
             drawn = normal(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
             drawn = np.concatenate(
-                [met[-1:] if len(met) else _start(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
+                [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )
             for before, after in pairwise(drawn):
                 after += move @ before
@@ -120,7 +120,7 @@ def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.nd
     return move, _root(covariance)
 
 
-def _start(F: np.ndarray, G: np.ndarray) -> np.ndarray:
+def _stationary_root(F: np.ndarray, G: np.ndarray) -> np.ndarray:
     """Root of the stationary covariance; zeros if the road is a random walk."""
     if np.linalg.eigvals(F).real.max() >= 0.0:
         return np.zeros_like(F)

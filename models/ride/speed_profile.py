@@ -75,7 +75,7 @@ NODES = 5
 """Points of Gauss's integral in a cell, good to the power 2 NODES of its length."""
 POINTS, WEIGHTS = (half / 2.0 for half in (np.polynomial.legendre.leggauss(NODES) + np.array([[1.0], [0.0]])))
 """Points and weights of the integral from 0 to 1."""
-CLOSE = 1e-11
+EQUAL_CUTS = 1e-11
 """Cuts (s) nearer to one another than this are one: 1e-9 m of road at most."""
 
 SHRINKING = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
@@ -124,8 +124,8 @@ def nodes(profile: SpeedProfile, ends: np.ndarray, distances: Sequence[float]) -
     more = np.sort(np.concatenate([_passing(profile, path, distances), shrinking]))
     more = more[(more > ends_after[0]) & (more < ends_after[-1])]
     after = np.searchsorted(ends_after, more)
-    apart = np.minimum(ends_after[after] - more, more - ends_after[after - 1]) > CLOSE
-    apart &= np.diff(more, prepend=-np.inf) > CLOSE
+    apart = np.minimum(ends_after[after] - more, more - ends_after[after - 1]) > EQUAL_CUTS
+    apart &= np.diff(more, prepend=-np.inf) > EQUAL_CUTS
     cuts = np.sort(np.concatenate([ends_after, more[apart]]))
     time = cuts[:-1, None] + np.diff(cuts)[:, None] * POINTS
     weight = np.diff(cuts)[:, None] * WEIGHTS * profile.speed(time)

@@ -24,9 +24,9 @@ from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 
-SETTLED = 1e-12
+GAIN_TOLERANCE = 1e-12
 """Largest relative change of a gain at which the fixed point is reached."""
-MOST = 400
+MOST_ROUNDS = 400
 TRAVEL, RATE = 0.02, 0.3
 """Deviations (m, m/s) with which the first gains are taken: slopes at rest may leave a vehicle undamped."""
 GAUSSIAN = "it is nearly Gaussian"
@@ -36,7 +36,7 @@ GRADES = ((0.01, 0.02, GAUSSIAN), (0.05, 0.06, GAUSSIAN), (0.1, 0.06, NOT_GAUSSI
 Monte Carlo of quarter cars: dampers of two slopes and more, dry friction, stops, alone and together, on five levels of
 road at two speeds. Kurtosis, 3 for Gaussian ones, was 2.5 to 3.3 in the first two and up to 4 in the
 third."""
-BEYOND = 0.15
+EXTRAPOLATION_ERROR = 0.15
 """The error found beyond, with stops that are met at every second wave; kurtosis went up to 6."""
 NEWTON = 60
 HARMONIC = 2.0
@@ -80,7 +80,7 @@ class StatisticallyLinear:
     @property
     def contraction(self) -> float:
         """Factor by which changes shrank from one iteration to the next, the worst while they were above rounding."""
-        seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * SETTLED]
+        seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * GAIN_TOLERANCE]
         return max(seen[len(seen) // 2 :], default=0.0)
 
     @property
@@ -90,7 +90,7 @@ class StatisticallyLinear:
         return self.changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
 
 
-def bent(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
+def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
     """The springs that have curves or friction."""
     return tuple(spring for spring in vehicle.springs if spring.bent)
 
@@ -133,7 +133,7 @@ class _Search:
 
     def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
-        self.springs = bent(vehicle)
+        self.springs = nonlinear_springs(vehicle)
         kinds: tuple[PartKind, ...] = ("travel", "travel rate")
         watched = [PartOutput(f"{kind} of {s.name}", kind, s.name) for kind in kinds for s in self.springs]
         self.watched = replace(vehicle, outputs=(*vehicle.outputs, *watched))
@@ -148,17 +148,17 @@ class _Search:
         gains, position = self._gains(first), np.zeros(len(self.plain.mass))
         changes: list[float] = []
         part = 1.0
-        while not changes or changes[-1] > SETTLED:
+        while not changes or changes[-1] > GAIN_TOLERANCE:
             moments, position = self._spring_moments(gains, position)
             wanted = self._gains(moments)
             changes.append(_largest_gain_change(wanted, gains))
-            if len(changes) >= MOST:
+            if len(changes) >= MOST_ROUNDS:
                 raise RunFailed(
                     "statistical linearisation",
-                    f"gains still change by {changes[-1]:.1e} after {MOST} "
+                    f"gains still change by {changes[-1]:.1e} after {MOST_ROUNDS} "
                     "iterations: the vehicle has no one way to move on this road",
                 )
-            if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > SETTLED:
+            if len(changes) > 1 and changes[-1] > 0.9 * changes[-2] and changes[-1] > GAIN_TOLERANCE:
                 part = max(0.5 * part, 0.1)
             gains = gains + part * (wanted - gains)
         return self._result(gains, moments, position, changes)
@@ -297,11 +297,11 @@ def _sentence(name: str, share: float, status: str) -> str:
         if share <= most:
             return said + f"its deviation is good to {100 * error:.0f} %, and {shape}"
     return said + (
-        f"the covariance is no longer good (deviations were found up to {100 * BEYOND:.0f} % off, and far "
+        f"the covariance is no longer good (deviations were found up to {100 * EXTRAPOLATION_ERROR:.0f} % off, and far "
         "from Gaussian): take Monte Carlo"
     )
 
 
 def promised(share: float) -> float:
     """Relative error that the deviation of an output with this left-out share was found to keep."""
-    return next((error for most, error, _ in GRADES if share <= most), BEYOND)
+    return next((error for most, error, _ in GRADES if share <= most), EXTRAPOLATION_ERROR)

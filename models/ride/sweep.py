@@ -74,7 +74,7 @@ def sweep(
             plain = excited(linear, excitation, speed)
             system = weighted(plain, filters or {})
             states = len(plain.A) - len(plain.B) * len(excitation.F)
-            point = _quick(system, states, excitation, speed, shared, accuracy) if fast else ASKED
+            point = _fast_variances(system, states, excitation, speed, shared, accuracy) if fast else ASKED_FOR
             if isinstance(point, str):
                 direct[point] += 1
                 point = _direct(system, speed, accuracy)
@@ -87,7 +87,7 @@ def sweep(
     return Sweep(tuple(excitations), np.array(speeds), system.names, units, variance, status, reason, direct)
 
 
-ASKED = "asked for"
+ASKED_FOR = "asked for"
 """Reason of a direct answer that was wanted."""
 Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 """Variance, status and reason of every output."""
@@ -102,7 +102,7 @@ def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
     return exact.variance, exact.status, exact.reason
 
 
-def _quick(
+def _fast_variances(
     system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
 ) -> Answer | str:
     """Variances by the fast route, or the reason why that cannot be trusted here."""
@@ -213,7 +213,7 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
         of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
         inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
     condition = vehicle_modes.condition * path.condition * behind.condition
-    return _summed(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
+    return _variance_sum(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 
 def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -221,7 +221,7 @@ def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -
     return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
 
 
-def _summed(
+def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> Modal | str:
     """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""

@@ -29,7 +29,7 @@ from models.ride.sweep import sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
-REACH = 1.0
+LARGEST_RATE_TIMES_STEP = 1.0
 """Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
 BLOCK = 128
 """Steps whose responses are made at once."""
@@ -72,7 +72,7 @@ def varying_speed(
     weightings: Mapping[str, str] | None = None,
     instants: Sequence[float] | np.ndarray = (),
     accuracy: float = ACCURACY,
-    reach: float = REACH,
+    reach: float = LARGEST_RATE_TIMES_STEP,
 ) -> VaryingSpeed:
     """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
 
@@ -97,7 +97,7 @@ def varying_speed(
     form = road_in_path(vehicle, excitation, weightings)
     status = stationary(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
     if first == 0.0:
-        P = _at_rest(form)
+        P = _standing_covariance(form)
     else:
         P = stationary(at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
@@ -134,9 +134,9 @@ def quasi_stationary(
         over = sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
         deviations[moving] = over.deviation[0]
     if not moving.all():
-        deviations[~moving] = np.sqrt(_all_variances(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[
-            : len(form.names)
-        ]
+        deviations[~moving] = np.sqrt(
+            _all_variances(form, _standing_covariance(form), 0.0, [FINITE] * len(form.names))
+        )[: len(form.names)]
     return deviations[which]
 
 
@@ -203,7 +203,7 @@ class _Queue:
         place = profile.path(time) - distance
         met = profile.time(place) if distance else time
         before = np.isneginf(met)
-        self.waiting = _met_before(form, axle, -place[before])
+        self.waiting = _delayed_responses(form, axle, -place[before])
         self.met = _Met(responses, axle, met[~before], ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
@@ -224,7 +224,7 @@ def _product(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.nd
     return (first * weight[:, None]).reshape(n, -1) @ second.reshape(n, -1).T
 
 
-def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
+def _delayed_responses(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
     """Responses (n, q, k) of a vehicle at rest to noise that the axle met ``behind`` (m) its place, long ago."""
     F, G = form.excitation.F, form.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
@@ -250,7 +250,7 @@ def _state_at_rest(form: RoadInPath) -> np.ndarray:
     return np.vstack([-np.linalg.solve(form.A, inputs), np.eye(inputs.shape[1])])
 
 
-def _at_rest(form: RoadInPath) -> np.ndarray:
+def _standing_covariance(form: RoadInPath) -> np.ndarray:
     """Covariance of (y, f) where the vehicle stands, at rest."""
     road = form.excitation
     stationary, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.road.profile import SLACK, Profile, SplineProfile
+from models.road.profile import OVERRUN_SHARE, Profile, SplineProfile
 
 RULES = ("mirrored", "refused")
 RUN_IN = 5.0
@@ -45,7 +45,7 @@ def continued(profile: Profile, rule: str, needed: float, file: object = "") -> 
         raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", RULES)
     if not math.isfinite(needed):
         raise InputError(file, "distance", needed, "must be a finite distance in m")
-    if not isinstance(profile, SplineProfile) or needed <= profile.end + SLACK * (profile.end - profile.start):
+    if not isinstance(profile, SplineProfile) or needed <= profile.end + OVERRUN_SHARE * (profile.end - profile.start):
         return profile
     if rule == "refused":
         allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed:.6g} m"

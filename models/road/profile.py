@@ -17,7 +17,7 @@ from models.road import kernels
 
 Samples = tuple[np.ndarray, np.ndarray]
 
-SLACK = 1e-9
+OVERRUN_SHARE = 1e-9
 """Part of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
 
 
@@ -223,7 +223,7 @@ class SplineProfile:
 
     def _check(self, first: float, last: float) -> None:
         """Refuse arc lengths outside the road: a spline carried on beyond its points is no road at all."""
-        slack = SLACK * (self.end - self.start)
+        slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
         if not (first >= begin - slack and last <= end + slack):
             allowed = f"the road is defined from s = {begin:.6g} m to {end:.6g} m; declare how it goes on"

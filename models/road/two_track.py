@@ -28,7 +28,7 @@ MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
 """Corners of the paper, rad/m."""
 LEVEL = 1.6e-5
 """S0 of the paper, m: what a bad scan of it lets one read; neither exponent nor split between the two is certain."""
-LEFT_RIGHT = ("modelled", "uncorrelated", "equal")
+TRACK_CORRELATIONS = ("modelled", "uncorrelated", "equal")
 FRONT_REAR = ("delayed", "uncorrelated", "equal")
 CASES = {
     1: ("modelled", "uncorrelated"),
@@ -129,7 +129,7 @@ def excitation(
     InputError : an unknown word; axles not numbered from the front, wheels of one axle at different x; wheels both on
         and beside the centre line where left and right are uncorrelated
     """
-    _check_word("left_right", left_right, LEFT_RIGHT)
+    _check_word("left_right", left_right, TRACK_CORRELATIONS)
     _check_word("front_rear", front_rear, FRONT_REAR)
     behind = _lengths(wheels)
     F, G, mean, roll = _filters(road)

@@ -16,7 +16,7 @@ from models.machine.compiled import njit
 
 Rule = Literal["held", "mean", "cubic"]
 """How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
-HALF = np.pi
+HALF_TURN = np.pi
 """Turn (rad) from sample to sample beyond which nobody can tell the way it went; the series of Magnus ends there."""
 UNIT = 1e-6
 """Largest departure of a quaternion's norm from 1."""
@@ -85,8 +85,8 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
     "mean" : the mean of both neighbours; "cubic" : the integral of the cubic through four neighbours and the
     second Magnus term h^2/12 (w0 x w1), the part of the turning that comes from a turning axis. Needs 2 samples,
     for "cubic" 4. Raises ValueError for fewer, for a rate that is not finite, and InputError for a period or a rule
-    that is none and for rates that turn a body farther than HALF from one sample to the next, unless they are held.
-    """
+    that is none and for rates that turn a body farther than HALF_TURN from one sample to the next, unless they are
+    held."""
     if not 0.0 < period < np.inf:
         raise InputError("", "period", period, "must be above 0, in s")
     if rule not in get_args(Rule):
@@ -108,9 +108,9 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
 def _check_turned(rates: np.ndarray, period: float) -> None:
     """Refuse rates that say too little of what lies between their samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
-    if fastest * period > HALF:
+    if fastest * period > HALF_TURN:
         samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"
-        raise InputError("", "rates", fastest, f"must be at most {HALF / period:.4g} rad/s {samples}")
+        raise InputError("", "rates", fastest, f"must be at most {HALF_TURN / period:.4g} rad/s {samples}")
 
 
 def integrals(values: np.ndarray, period: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from models.sensors.rotations import from_cardan, matrix, skew
 Formula = Literal["auto", "spatial", "plane"]
 LINE = 1e-3
 """Second spread by the first one below which sensors lie on a line: on a car some millimetres, no better known."""
-FLAT = 0.1
+FLAT_SPREAD_RATIO = 0.1
 """Third spread by the second one below which "auto" takes the formula for sensors in a plane."""
 PLANE = 1e-6
 """The same below which they lie in a plane to rounding, and there is no choice."""
@@ -114,7 +114,7 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
             None,
             "the sensors lie on a line, about which the body could turn unseen: put one of them elsewhere",
         )
-    flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE, FLAT))
+    flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE, FLAT_SPREAD_RATIO))
     if formula == "spatial" and flat:
         raise InputError(
             "",

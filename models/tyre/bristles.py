@@ -7,10 +7,10 @@ the cornering stiffness while nothing slides, is proportional to the load. k is 
 the cornering stiffness of the ride vehicle, to the net's own digits. The aligning moment of small slip has the arm 3 pi
 a / 32 behind the centre. A camber's, a path's and a steering wheel's turning spin the patch, and are felt as such.
 
-Slip is relative to the speed u at which the tread runs through the patch, |u| below ``SLOW`` counting as that: there
-bristles act like dampers, so a tyre at rest creeps, by as much less as SLOW is small. Between SLOW and -SLOW the
-forces of rolling forwards and backwards are mixed, so that nothing jumps. Both have no power, nor has a mixture.
-"""
+Slip is relative to the speed u at which the tread runs through the patch, |u| below ``FADING_SPEED`` counting as that:
+there bristles act like dampers, so a tyre at rest creeps, by as much less as FADING_SPEED is small. Between
+FADING_SPEED and -FADING_SPEED the forces of rolling forwards and backwards are mixed, so that nothing jumps. Both have
+no power, nor has a mixture."""
 
 from functools import cache
 
@@ -25,10 +25,10 @@ from models.machine.compiled import lean
 from models.machine.records import records, stacked
 from models.machine.stack import start
 
-SLOW = 0.1
+FADING_SPEED = 0.1
 """Speed (m/s) of the tread below which slip is relative to it."""
 THREE, ORDER = KINDS["three"], MARCHES["second-order"]
-FIRST = 7
+FIRST_FLEXIBILITY = 7
 """Place of the first flexibility among a contact's numbers."""
 UNIT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
 """A contact that sticks all over and whose side force is C."""
@@ -62,12 +62,12 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
     w = len(contacts)
     patches, answers = records(start(contacts), w, CONTACT), records(start(answer), w, FORCES)
     lines, along = strips_in(strips), cells_in(cells, middle)
-    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), SLOW
+    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, slides[i, 3])
     _creepages(1.0, patches, slides)
     forces_within(patches, lines, along, THREE, ORDER, room, answers)
-    if slowest < SLOW:
+    if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
         _creepages(-1.0, patches, slides)
         forces_within(patches, lines, along, THREE, ORDER, room, backwards)
@@ -78,7 +78,7 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
 def _creepages(sign, patches, slides):
     """Creepages of tyres that roll forwards (sign 1) or backwards (-1)."""
     for i in range(len(patches)):
-        patch, speed = patches[i], max(abs(slides[i, 3]), SLOW)
+        patch, speed = patches[i], max(abs(slides[i, 3]), FADING_SPEED)
         patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed
         patch.spin = sign * slides[i, 2] / speed
 
@@ -87,7 +87,7 @@ def _creepages(sign, patches, slides):
 def _mix(slides, backwards, answers):
     """Forces of rolling forwards with their share, and those of rolling backwards, seen from ahead, with theirs."""
     for i in range(len(answers)):
-        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / SLOW)), answers[i], backwards[i]
+        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), answers[i], backwards[i]
         answer.fx = share * answer.fx - (1.0 - share) * behind.fx
         answer.fy = share * answer.fy + (1.0 - share) * behind.fy
         answer.mz = share * answer.mz - (1.0 - share) * behind.mz

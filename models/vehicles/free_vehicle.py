@@ -20,7 +20,7 @@ CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"
 SPECK = 1e-9
 """Mass (kg) of a rotor: Exudyn divides by the mass of whatever has inertia."""
 PLANE: tuple[Freedom, ...] = ("x", "y", "rz")
-REST: tuple[Freedom, ...] = ("z", "rx", "ry")
+RESTING_COORDINATES: tuple[Freedom, ...] = ("z", "rx", "ry")
 
 
 def free_vehicle(
@@ -35,7 +35,10 @@ def free_vehicle(
     chassis = chassis_of(vehicle)
     _check_headings(vehicle, chassis.name)
     x, y, _ = chassis.position
-    bodies = [Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE), Body(SWAY, 0.0, (x, y, 0.0), REST, parent=CARRIER)]
+    bodies = [
+        Body(CARRIER, 0.0, (0.0, 0.0, 0.0), PLANE),
+        Body(SWAY, 0.0, (x, y, 0.0), RESTING_COORDINATES, parent=CARRIER),
+    ]
     bodies += [
         replace(body, freedoms=(), parent=SWAY) if body.name == chassis.name else body
         for body in guided(vehicle, chassis.name).bodies

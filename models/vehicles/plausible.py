@@ -19,7 +19,7 @@ from models.vehicles.spatial_linear import Kinematics, mass, preloads, slopes_at
 GRAVITY = 9.81
 MASS = 30.0, 60e3
 """kg, of everything."""
-LIGHT = 0.7
+LEAST_SPRUNG_RATIO = 0.7
 """Sprung by unsprung mass at the least: the axle of an empty trailer."""
 SHARE = 0.03
 """Of the weight, that an axle carries at the least, where there are several."""
@@ -33,7 +33,7 @@ DAMPING = 0.005, 5.0
 """Of the critical one, of a damper beside its spring under its static load."""
 PRESSED = 5e-4, 0.25
 """m, of a tyre under its static load."""
-FAR = 0.7
+FARTHEST_STRUT = 0.7
 """m, from a strut to its wheel sideways or along, beyond the track of a rigid axle: levers bring it inwards."""
 WHEELBASE = 0.5, 25.0
 TRACK = 0.3, 4.0
@@ -123,7 +123,11 @@ def _masses(figures: VehicleFigures) -> Iterator[Finding]:
             "kg",
         )
     unsprung = sum(figures.vehicle.body(name).mass for name in figures.wheels)
-    if figures.wheels and not _is_unusual(figures.total, MASS) and figures.total - unsprung < LIGHT * unsprung:
+    if (
+        figures.wheels
+        and not _is_unusual(figures.total, MASS)
+        and figures.total - unsprung < LEAST_SPRUNG_RATIO * unsprung
+    ):
         yield _query(
             "mass",
             f"bodies[{figures.carried.name}].mass",
@@ -203,13 +207,13 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
             )
         for strut in struts:
             apart = _distance_from_wheel(strut, wheel, tyres)
-            if apart > FAR:
+            if apart > FARTHEST_STRUT:
                 point = strut.first_point if strut.first_body == wheel else strut.second_point
                 yield _query(
                     "strut",
                     f"springs[{strut.name}]",
                     f"its point {[round(x, 4) for x in point]} lies "
-                    f"{apart:.3g} m from the wheel or axle {wheel!r}; usual are at most {FAR:g} m",
+                    f"{apart:.3g} m from the wheel or axle {wheel!r}; usual are at most {FARTHEST_STRUT:g} m",
                     apart,
                     "m",
                 )

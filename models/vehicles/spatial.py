@@ -289,7 +289,7 @@ class Limits:
         return bool(self.massless or self.rigid or self.locked)
 
 
-NONE = Limits()
+NO_LIMITS = Limits()
 
 SpatialOutput = PointOutput | TurnOutput | PartOutput | TyreOutput
 
@@ -316,7 +316,7 @@ class SpatialVehicle:
     drags: tuple[Drag, ...] = ()
     outputs: tuple[SpatialOutput, ...] = ()
     gravity: float = 0.0
-    limits: Limits = NONE
+    limits: Limits = NO_LIMITS
     joint_elements: tuple[JointElement, ...] = ()
     ranges: tuple[tuple[tuple[str, Freedom], float, float], ...] = ()
     notes: tuple[str, ...] = ()

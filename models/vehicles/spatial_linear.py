@@ -26,7 +26,7 @@ from models.vehicles.spatial import (
     Vector,
 )
 
-NOTHING = 1e-10
+NEGLIGIBLE_TRAVEL = 1e-10
 """Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
@@ -433,4 +433,4 @@ def _free(coordinates: Sequence[tuple[str, str]], vehicle: SpatialVehicle, limit
         for s in vehicle.springs
         if s.name in limits.rigid
     ]
-    return kept @ null_space(np.array(rows), rcond=NOTHING) if rows else kept
+    return kept @ null_space(np.array(rows), rcond=NEGLIGIBLE_TRAVEL) if rows else kept

@@ -4,12 +4,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from models.core.strict import LARGEST, Strict, quantity
+from models.core.strict import LARGEST_QUANTITY, Strict, quantity
 from models.vehicles.spatial import Freedom
 
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+Number = Annotated[float, Field(ge=-LARGEST_QUANTITY, le=LARGEST_QUANTITY)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST_QUANTITY)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST_QUANTITY)]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 NotNegativeTriple = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
 Names = Annotated[list[str], Field(min_length=2, max_length=2)]

@@ -21,10 +21,10 @@ from models.measured.units import factor_between
 from studies.command.comparison import channels_of
 from studies.command.differences import Quantity
 
-OVER = "time [s]"
+TIME_AXIS = "time [s]"
 DOUBTED = 0.5
 """Correlation below which a time shift is in doubt."""
-SHOWN = 4
+SHOWN_CHANNELS = 4
 """Channels in the figure, those of the largest relative error."""
 HEADS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
 
@@ -92,7 +92,7 @@ class Overlay:
         """Lines for the screen."""
         head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
         rows = [
-            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {each.relative:>9.2%} {each.peak:>11.4g}  "
+            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {_share(each.relative):>9} {each.peak:>11.4g}  "
             f"{each.at:.6g} s{_within_error_text(each)}"
             for each in self.matches
         ]
@@ -105,6 +105,11 @@ class Overlay:
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
         doubt = "" if alike >= DOUBTED else "; in doubt, as both are hardly alike: name it with --shift"
         return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
+
+
+def _share(relative: float) -> str:
+    """A relative error; what does not move has none."""
+    return f"{relative:.2%}" if np.isfinite(relative) else "-"
 
 
 def _within_error_text(match: Match) -> str:
@@ -129,7 +134,7 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
     Raises InputError for a file without any channel
     of the run, and for a unit that does not fit.
     """
-    timed = ((name, each) for name, each in channels_of(run.data) if each.over == OVER and len(each.grid) > 3)
+    timed = ((name, each) for name, each in channels_of(run.data) if each.over == TIME_AXIS and len(each.grid) > 3)
     ours = {name: each for name, each in timed if np.isfinite(each.values).all()}
     if not ours:
         raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
@@ -189,7 +194,7 @@ def _match(name: str, pair: Pair, unit: str, shift: float, run: Result) -> Match
     return Match(name, unit, times[inside], read, pair.values[inside], np.nan if stated is None else stated.error)
 
 
-def runs_of(place: Path) -> dict[str, Result]:
+def saved_results(place: Path) -> dict[str, Result]:
     """The saved results of a file or a folder, by their names; InputError where there are none."""
     if not place.exists():
         raise InputError(place, "", None, "no such file or folder")
@@ -201,7 +206,7 @@ def runs_of(place: Path) -> dict[str, Result]:
 
 def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
     """Lay a measurement over the run or the runs of a folder, save ``compare.csv`` and figures, say it in lines."""
-    overlays = {name: overlay(run, measurement, shift) for name, run in runs_of(run_path).items()}
+    overlays = {name: overlay(run, measurement, shift) for name, run in saved_results(run_path).items()}
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("run", *HEADS))
@@ -209,7 +214,7 @@ def report(run_path: Path, measurement: Path, folder: Path, shift: float | None 
             for m in each.matches:
                 writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
     for name, each in overlays.items():
-        draw(
+        draw_overlay(
             each,
             f"{measurement.name} over {name}",
             folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
@@ -230,11 +235,11 @@ def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
     return [*([f"  {name}"] if count > 1 else []), *overlay.lines()]
 
 
-def draw(overlay: Overlay, title: str, path: Path) -> None:
+def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
     """Draw measurement and run, and below their difference, of the channels of the largest relative error."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
-    shown = overlay.matches[:SHOWN]
+    shown = overlay.matches[:SHOWN_CHANNELS]
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, below), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
@@ -243,7 +248,7 @@ def draw(overlay: Overlay, title: str, path: Path) -> None:
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         below.plot(match.times, match.error, color=BLUE)
         below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
-        below.set(title=f"rms error {match.rms:.3g} {unit}, {match.relative:.1%}", xlabel="time of the run [s]")
+        below.set(title=f"rms error {match.rms:.3g} {unit}, {_share(match.relative)}", xlabel="time of the run [s]")
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})

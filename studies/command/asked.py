@@ -11,14 +11,14 @@ from typing import Any, get_args
 
 from models.core.errors import InputError
 from models.core.finding import Finding, lines
-from models.core.systems import DEFAULT, SYSTEMS, listed, load
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, listed, load
 from models.measured.file_kinds import is_measurement
 
 STUDIES = Path(__file__).parents[1]
 SCENES = STUDIES / "scenes"
-KNOWN = SYSTEMS | listed(STUDIES, STUDIES.name)
+KNOWN_SYSTEMS = SYSTEMS | listed(STUDIES, STUDIES.name)
 """Systems of scenes: those of the models, and studies that have scenes of their own (folders with a ``scene``)."""
-ANY = "any"
+ANY_SYSTEM = "any"
 """System of a study that runs scenes of all systems."""
 
 
@@ -32,7 +32,7 @@ def studies() -> tuple[str, ...]:
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
     """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
-    return load(scene_path(name), changes or (), KNOWN)
+    return load(scene_path(name), changes or (), KNOWN_SYSTEMS)
 
 
 def scene_path(name: str) -> Path:
@@ -70,7 +70,7 @@ def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
 
 def plan_of(scene: Any) -> Any:
     """The module that describes and checks scenes of this one's system."""
-    return import_module(KNOWN[scene.system].plan)
+    return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 
 def findings_of(scene: Any) -> tuple[Finding, ...]:
@@ -119,14 +119,14 @@ def _files(table: Any) -> Iterator[str]:
 
 def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
     """The engines that were asked for; none for a system that no engine computes. option : where they were named."""
-    engines = KNOWN[system].engines
+    engines = KNOWN_SYSTEMS[system].engines
     if name is not None and not engines:
         raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
         return engines
     if ":" in name:
         return _registered_outside(name, system, option)
-    named = (*engines, *KNOWN[system].on_request)
+    named = (*engines, *KNOWN_SYSTEMS[system].on_request)
     if name not in named:
         raise InputError(option, "", name, "no such engine", (*named, "all"))
     return (name,)
@@ -134,8 +134,8 @@ def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple
 
 def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
-    if system != DEFAULT:
-        raise InputError(option, "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
+    if system != DEFAULT_SYSTEM:
+        raise InputError(option, "", name, f"can run scenes of {DEFAULT_SYSTEM} only, and this one is of {system}")
     from models.engines.outside import register
 
     register(name)
@@ -149,8 +149,8 @@ def study_of(scene: Any) -> Any:
     if scene.study not in studies():
         raise InputError(scene.file, "study", scene.study, "no such study", studies())
     module = import_module(f"studies.{scene.study}")
-    systems = getattr(module, "SYSTEM", DEFAULT)
-    if systems not in (ANY, scene.system):
+    systems = getattr(module, "SYSTEM", DEFAULT_SYSTEM)
+    if systems not in (ANY_SYSTEM, scene.system):
         allowed = f"is a study of system {systems!r}; this scene's system is {scene.system!r}"
         raise InputError(scene.file, "study", scene.study, allowed)
     if hasattr(module, "Options"):

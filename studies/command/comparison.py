@@ -12,16 +12,16 @@ import numpy as np
 from models.core.discretisation import errors_of
 from models.core.errors import InputError
 from models.core.result import Result, load
-from models.core.told import SAID, Results
+from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
 from studies.command.differences import Difference, Quantity
 
 SUFFIXES = (".nc", ".csv")
-SHOWN = 20
+SHOWN_QUANTITIES = 20
 """Quantities that are printed, those that differ most; ``compare.csv`` has them all."""
 KINDS = ("system", "mode")
 """Attributes of a result that must be the same."""
-NEAR = 1e-9
+EQUAL_PLACES = 1e-9
 """Places so near, by the largest of them, are the same."""
 
 
@@ -37,17 +37,17 @@ def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:
         a, b = (dict(_quantities(file)) for file in files)
         notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
         differences += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _sorted(differences, first, second), notes
+    return _by_share(differences, first, second), notes
 
 
 def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
     """Differences between two results in memory, which messages and notes call by ``names``."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
-    return _sorted(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
+    return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
-def _sorted(differences: list[Difference], first: object, second: object) -> list[Difference]:
+def _by_share(differences: list[Difference], first: object, second: object) -> list[Difference]:
     """The largest share first; raises InputError where there is none."""
     if not differences:
         raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
@@ -76,6 +76,9 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
     if earlier.is_file():
         return [("", earlier, later)], []
     first, second = _files(earlier), _files(later)
+    for folder, files in ((earlier, first), (later, second)):
+        if not files:
+            raise InputError(folder, "", None, "holds no results (.nc or .csv): name the folder of a run")
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
         return [("", next(iter(first.values())), next(iter(second.values())))], []
@@ -109,7 +112,11 @@ def results_of(first: Path, second: Path) -> dict[str, Result]:
     """The results that are compared, by their files: those of tables are the netCDF files beside them."""
     files = [file for _, *pair in _pairs(first, second)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
-    return {name: run for name, run in results if run is not None and all(said in run.data.attrs for said in SAID)}
+    return {
+        name: run
+        for name, run in results
+        if run is not None and all(said in run.data.attrs for said in DOUBT_ATTRIBUTES)
+    }
 
 
 def _result(path: Path) -> Result | None:
@@ -204,7 +211,7 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> D
     for label, other in zip(first.labels, second.labels, strict=False):
         if label != other:
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
-    near = NEAR * np.abs(first.grid).max(initial=0.0)
+    near = EQUAL_PLACES * np.abs(first.grid).max(initial=0.0)
     if first.grid.shape == second.grid.shape and np.allclose(first.grid, second.grid, rtol=0.0, atol=near):
         return Difference(
             name,
@@ -279,7 +286,7 @@ def _lines(differences: list[Difference]) -> list[str]:
     differ = [each for each in differences if each.largest > 0.0]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit"]
-    shown = [each for each in differences[:SHOWN] if each.largest > 0.0]
+    shown = [each for each in differences[:SHOWN_QUANTITIES] if each.largest > 0.0]
     same, more = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
@@ -307,10 +314,10 @@ def _figure(first: Path, second: Path, differences: list[Difference], results: R
     equal."""
     from models.drawing.figures import (
         BLUE,
+        COLUMN_WIDTH,
         DARK,
-        TITLE,
+        TITLE_TEXT,
         VERMILION,
-        WIDE,
         heading,
         legend_below,
         save,
@@ -320,18 +327,18 @@ def _figure(first: Path, second: Path, differences: list[Difference], results: R
 
     differ = [each for each in differences if each.largest != 0][:3]
     shown = differ or differences[:1]
-    share = 0.95 * WIDE / len(shown) - 0.3
-    figure, axes = subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
+    share = 0.95 * COLUMN_WIDTH / len(shown) - 0.3
+    figure, axes = subplots(2 if differ else 1, len(shown), figsize=(COLUMN_WIDTH, 4.8), sharex="col", squeeze=False)
     for top, each in zip(axes[0], shown, strict=True):
         top.plot(each.grid, each.first, color=DARK, linewidth=2.0, label=str(first))
         top.plot(each.grid, each.second, color=VERMILION, linewidth=1.0, label=str(second))
-        top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE))
+        top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE_TEXT))
     for below, each in zip(axes[-1], differ, strict=False):
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)
         below.plot(each.at, each.gap[each.row], "o", color=BLUE, markersize=5)
         error = ", rms within the stated error" if each.within else ""
         told = f"difference [{each.unit or '-'}], largest {each.largest:.3g} at the mark{error}"
-        below.set_title(wrapped(told, share, TITLE))
+        below.set_title(wrapped(told, share, TITLE_TEXT))
     for lowest, each in zip(axes[-1], shown, strict=True):
         lowest.set_xlabel(each.over)
     legend_below(figure, axes[0, 0], columns=1)

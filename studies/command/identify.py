@@ -19,7 +19,7 @@ from models.identification.uncertainty import Profile, Uncertainty, profile, unc
 
 STAGES = "stages"
 """Folder of finished stages, from which ``--resume`` goes on."""
-NAMED = 0.3
+NAMED_SHARE = 0.3
 """Share of a combination from which on a parameter is named in it."""
 Tell = Callable[[str, float], None]
 
@@ -81,7 +81,7 @@ def report(
     drawn = list(profiles_of(scene, known, every, tell))
     answer = as_dict(known, drawn)
     write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
-    draw(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
+    draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
     return {
         "scene": f"{scene.title}, identified from {measurement}",
         "folder": str(folder),
@@ -176,7 +176,7 @@ def _combined(known: Uncertainty) -> list[str]:
 
     def told(vector: np.ndarray) -> str:
         order = np.argsort(-np.abs(vector))
-        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= NAMED)
+        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= NAMED_SHARE)
 
     (best, first), (worst, last) = combinations[0], combinations[-1]
     return [
@@ -186,7 +186,7 @@ def _combined(known: Uncertainty) -> list[str]:
     ]
 
 
-def draw(known: Uncertainty, title: str, path: Path) -> None:
+def draw_fit(known: Uncertainty, title: str, path: Path) -> None:
     """Every channel with the model at the estimates, the error below it."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 

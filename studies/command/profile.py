@@ -13,11 +13,11 @@ from pathlib import PurePath
 from types import FrameType
 from typing import Any
 
-EVERY = 0.004
+SAMPLING_PERIOD = 0.004
 """s between two looks."""
 BEGIN, IMPORTS, KERNELS = "start of Python", "imports", "compiling and loading kernels"
-FIGURES, SAVING, REST = "figures", "saving", "everything else"
-BESIDE = "marching beside the engines"
+FIGURES, SAVING, EVERYTHING_ELSE = "figures", "saving", "everything else"
+BESIDE_ENGINES = "marching beside the engines"
 """A controller, wheels in steps of their own, or equations that belong to no engine."""
 LIBRARIES = {
     "numba": KERNELS,
@@ -53,10 +53,10 @@ class Watch:
     def _sample_stack(self) -> None:
         """Give the time since the last look to what is seen now: a call that lets no thread in ends before a look."""
         last = time.perf_counter()
-        while not self._over.wait(EVERY):
+        while not self._over.wait(SAMPLING_PERIOD):
             now = time.perf_counter()
             frame = sys._current_frames().get(self._main or 0)
-            self.seconds[REST if frame is None else part_of(frame)] += now - last
+            self.seconds[EVERYTHING_ELSE if frame is None else part_of_run(frame)] += now - last
             last = now
 
     def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
@@ -68,7 +68,7 @@ class Watch:
         return summary | {"profile": spent, "table": [*summary.get("table", []), *lines(spent)]}
 
 
-def part_of(frame: FrameType) -> str:
+def part_of_run(frame: FrameType) -> str:
     """Which part of a run a stack of calls belongs to, by its innermost frame that tells."""
     engine, forces = "", False
     for name, path in _calls(frame):
@@ -85,9 +85,9 @@ def part_of(frame: FrameType) -> str:
         within = _engine(path)
         engine = engine or within
         if name in MARCHES and (within or path.stem == "march"):
-            part = f"marching in {engine}" if engine else BESIDE
+            part = f"marching in {engine}" if engine else BESIDE_ENGINES
             return f"forces asked for by {engine}" if engine and forces else part
-    return f"building in {engine}" if engine else REST
+    return f"building in {engine}" if engine else EVERYTHING_ELSE
 
 
 def _calls(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
@@ -109,4 +109,4 @@ def lines(spent: dict[str, float]) -> list[str]:
     """The table that is printed: seconds and shares, the largest first."""
     whole = sum(spent.values())
     rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]
-    return [f"  where {whole:.1f} s went, by a look every {1000 * EVERY:.0f} ms", *rows]
+    return [f"  where {whole:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from itertools import takewhile
 from typing import Any
 
-LONGEST = 8
+LONGEST_LIST = 8
 """A list of more entries is a curve: of that, the largest magnitude and the rms are taken."""
-SKIPPED = ("seconds", "folder", "scene", "table", "failed", "results")
+SKIPPED_KEYS = ("seconds", "folder", "scene", "table", "failed", "results")
 """What is no answer: how long it took, text, and what the numbers are of."""
 FRAMES = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
@@ -26,7 +26,7 @@ def _scalars(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(value, dict):
         unit = f" [{value['unit']}]" if isinstance(value.get("unit"), str) and value["unit"] else unit
         for key, inner in value.items():
-            if key not in SKIPPED:
+            if key not in SKIPPED_KEYS:
                 yield from _scalars(name if key in FRAMES else _joined_name(name, str(key)), unit, inner)
     elif isinstance(value, list):
         yield from _list(name, unit, value)
@@ -35,12 +35,14 @@ def _scalars(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
 
 
 def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
-    if len(values) > LONGEST and all(isinstance(value, dict) for value in values):
-        columns = {key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED}
+    if len(values) > LONGEST_LIST and all(isinstance(value, dict) for value in values):
+        columns = {
+            key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED_KEYS
+        }
         yield from _scalars(
             name, unit, {key: numbers for key, numbers in columns.items() if all(map(_is_number, numbers))}
         )
-    elif len(values) > LONGEST:
+    elif len(values) > LONGEST_LIST:
         numbers = [float(value) for value in values if _is_number(value)]
         if numbers:
             yield f"{_joined_name(name, 'largest')}{unit}", max(map(abs, numbers))

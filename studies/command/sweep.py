@@ -33,11 +33,11 @@ from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import Crew
 from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
 from studies.command.summary_numbers import summary_scalars
-from studies.command.sweep_figure import Columns, Swept, draw, has_several_values, present_numbers
+from studies.command.sweep_figure import Columns, Swept, draw_sweep, has_several_values, present_numbers
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
-MOST = 10_000
+MOST_POINTS = 10_000
 """Points of a sweep."""
 
 Record = dict[str, Any]
@@ -145,8 +145,8 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
         if not _writable(value):
             allowed = "must be a finite number, a text, true, false or a list of these"
             raise InputError("--sweep", key, str(value), allowed)
-    if not 2 <= len(values) <= MOST:
-        raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST:,} make a sweep")
+    if not 2 <= len(values) <= MOST_POINTS:
+        raise InputError("--sweep", key, rest, f"gives {len(values)} value(s): 2 to {MOST_POINTS:,} make a sweep")
     if len(set(map(_value_text, values))) < len(values):
         raise InputError("--sweep", key, rest, "gives a value twice")
     return key, values
@@ -166,8 +166,8 @@ def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
         ends, n = (float(first), float(last)), int(count)
     except ValueError:
         raise InputError("--sweep", "", text, "FROM and TO must be numbers and N a whole number of points") from None
-    if not np.isfinite(ends).all() or not 2 <= n <= MOST:
-        raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {MOST:,}")
+    if not np.isfinite(ends).all() or not 2 <= n <= MOST_POINTS:
+        raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {MOST_POINTS:,}")
     values = np.linspace(*ends, n).tolist()
     whole = all(re.fullmatch(r"\s*[+-]?\d+\s*", end) for end in (first, last)) and all(v == int(v) for v in values)
     return tuple(int(value) for value in values) if whole else tuple(values)
@@ -202,7 +202,7 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
         records = _records(job, progress, crew)
         swept = _sweep_columns(job, records)
         _save(job.folder, swept)
-        pages = draw(swept, job.folder)
+        pages = draw_sweep(swept, job.folder)
     reasons = {
         f"{job.key}={value}{f', {who}' if who else ''}": reason
         for value, failed in zip(job.values, swept.failures, strict=True)

@@ -13,10 +13,10 @@ from models.core.told import Results
 from models.drawing.figures import (
     BAD,
     COLOURS,
+    COLUMN_WIDTH,
     GREY,
     LABELS,
     ORANGE,
-    WIDE,
     heading,
     legend_below,
     panels,
@@ -24,7 +24,7 @@ from models.drawing.figures import (
     wrapped,
 )
 
-ACROSS, DOWN, PAGES = 2, 5, 5
+PANELS_ACROSS, PANELS_DOWN, MOST_PAGES = 2, 5, 5
 """Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
 DECADES = 30.0
 """Ratio of the largest to the least value from which on an axis is logarithmic."""
@@ -79,11 +79,11 @@ def _results_of_engine(results: Results, engine: str) -> Results:
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
 
 
-def draw(swept: Swept, folder: Path) -> list[str]:
+def draw_sweep(swept: Swept, folder: Path) -> list[str]:
     """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
     changing = _changing(swept.columns)
-    size, names = ACROSS * DOWN, list[str]()
-    shown = list(changing.items())[: size * PAGES] or [("no number changes", {})]
+    size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
+    shown = list(changing.items())[: size * MOST_PAGES] or [("no number changes", {})]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
         _page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
@@ -114,7 +114,7 @@ def has_several_values(column: list[Any]) -> bool:
 
 
 def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
-    figure, axes = panels(len(shown), min(ACROSS, len(shown)), 2.3)
+    figure, axes = panels(len(shown), min(PANELS_ACROSS, len(shown)), 2.3)
     at, ticks = _axis_places(swept.values)
     for axis, (what, curves) in zip(axes, shown, strict=True):
         _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
@@ -158,7 +158,7 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED, **foot)
-    axis.set_title(wrapped(_with_unit(quantity), 0.47 * WIDE, 9), fontsize=9)
+    axis.set_title(wrapped(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
 def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:

@@ -6,10 +6,11 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.own_model.certificate import ALIKE, Agreement, certificate, softness, states_of
+from models.own_model.certificate import ALIKE, MET, Agreement, certificate, softness, states_of
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
+from models.own_model.limits import limits_struck
 from models.own_model.path import PathReport, paths
 from models.own_model.states import COUNT
 from models.own_model.urdf import Misread, misread
@@ -37,7 +38,7 @@ class Wanted:
 class Examined:
     """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
     MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
-    lines on what accuracy costs; constraints : lines on dry friction and couplings."""
+    lines on what accuracy costs; constraints : lines on dry friction and constraints."""
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
@@ -137,17 +138,23 @@ def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
 
 
 def _constraints(file: ModelFile, count: int) -> Iterator[str]:
-    """What is soft in MuJoCo, and how far that is from the law that the other builds have."""
+    """Limits that states strike, what is soft in MuJoCo, and how far that is from the law of the other builds."""
     twin = file.twin
+    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.limited else []
+    if any(beyond):
+        names = dict.fromkeys(name for struck in beyond for name in struck)
+        yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
     if frictions := twin.driven.frictions:
         yield (
             f"dry friction of {len(frictions)} joints: compared at {len(states_of(twin, count))} of {count} states, at "
             "which all of them slide, with faster rates where they would not; where they stick, MuJoCo's gives way"
         )
-    if ties := twin.driven.couplings:
+    if twin.driven.tied:
+        kinds = {"couplings of joints": twin.driven.couplings, "joints between bodies": twin.driven.connections}
+        told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
         yield (
-            f"{len(ties)} couplings of joints: rigid in Exudyn and the plain equations, which are held to the file with"
-            f" rigid ones; soft in MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
+            f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
+            f"MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
         )
 
 
@@ -180,9 +187,11 @@ def _file_lines(each: Examined) -> list[str]:
         f"  {verdict(each)}",
     ]
     for row in each.agreements:
+        off = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
+        apart = f"  its constraints are {row.gap:.1e} (m, rad) apart where those of the file meet"
         rows.append(
             f"    {row.build:7s} mass {row.mass:.1e}  forces {row.force:.1e}  accelerations {row.acceleration:.1e}"
-            f"{'' if row.alike else f'  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}'}"
+            f"{apart if row.gap > MET else ''}{off if max(row.acceleration, row.mass) > row.bound else ''}"
         )
     for build, elements in each.explained.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
@@ -190,7 +199,7 @@ def _file_lines(each: Examined) -> list[str]:
     rows += [f"  {lost.sentence()}" for lost in each.misread]
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
     if each.file.limited:
-        rows.append(f"  limits off, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
+        rows.append(f"  limits not built, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
     rows += [f"  {note}" for note in (*each.constraints, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
     return rows + [f"  {line}".rstrip() for line in each.price]

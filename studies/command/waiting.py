@@ -14,11 +14,11 @@ from typing import Any
 
 from models.core.waiting import MARCHES
 
-DELAY, EVERY = 1.0, 0.1
+BAR_DELAY, BAR_PERIOD = 1.0, 0.1
 """s until a bar is shown, and between two looks."""
-SLOW = 0.4
+SLOW_COMPILATION = 0.4
 """s of one compilation from which on it is told: loading what was compiled before takes less."""
-KNOWN = 0.01
+KNOWN_SHARE = 0.01
 """Share of a work from which on its time left is told."""
 COMPILING = {
     "pitch-plane": 5.0,
@@ -72,7 +72,7 @@ class Kernels:
 
     def busy(self) -> bool:
         """Whether a kernel is being compiled that the bar shows."""
-        return self.depth > 0 and time.monotonic() - self.since > SLOW
+        return self.depth > 0 and time.monotonic() - self.since > SLOW_COMPILATION
 
 
 @dataclass
@@ -113,7 +113,7 @@ class Waiting:
 
 def _remaining(share: float, seconds: float) -> float | None:
     """s left of a work of which a share took so many seconds."""
-    return seconds * (1.0 - share) / share if share > KNOWN else None
+    return seconds * (1.0 - share) / share if share > KNOWN_SHARE else None
 
 
 def _time_left_text(seconds: float | None, spent: float) -> str:
@@ -127,7 +127,7 @@ def _duration_text(seconds: float) -> str:
 
 @contextmanager
 def waiting(text: str, system: str = "") -> Iterator[Tell]:
-    """A bar on the terminal for the block, if it takes longer than DELAY; what it gives is to be told what is done.
+    """A bar on the terminal for the block, if it takes longer than BAR_DELAY; what it gives is to be told what is done.
 
     Nothing is written, and no thread runs, where stderr is no terminal.
     """
@@ -146,11 +146,11 @@ def waiting(text: str, system: str = "") -> Iterator[Tell]:
 
 
 def _draw(now: Waiting, over: threading.Event) -> None:
-    """Draw the bar until the work is over, from DELAY on."""
-    while not over.wait(EVERY):
+    """Draw the bar until the work is over, from BAR_DELAY on."""
+    while not over.wait(BAR_PERIOD):
         now.kernels.attach()
         now.state()  # which sees when a march begins
-        if time.monotonic() - now.begun > DELAY:
+        if time.monotonic() - now.begun > BAR_DELAY:
             break
     else:
         return
@@ -166,5 +166,5 @@ def _draw(now: Waiting, over: threading.Event) -> None:
             text, share, left = now.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
-            if over.wait(EVERY):
+            if over.wait(BAR_PERIOD):
                 return

@@ -14,7 +14,7 @@ from studies.pictures.shapes import PaintedSurface
 
 NEAREST = 0.05
 """m: what is nearer to the eye, or behind it, is not drawn."""
-LIGHT = np.array([0.35, 0.5, 0.8])
+LIGHT_DIRECTION = np.array([0.35, 0.5, 0.8])
 """Towards the lamp: to the spectator's right, back to him, up."""
 HAZE = 70.0
 """m: how far one sees until the sky's lower colour hides two thirds."""
@@ -87,7 +87,7 @@ def _shaded(
     sizes = [len(surface.corners) for surface in surfaces]
     colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)
     kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
-    towards = LIGHT @ camera.axes / np.linalg.norm(LIGHT)
+    towards = LIGHT_DIRECTION @ camera.axes / np.linalg.norm(LIGHT_DIRECTION)
     light = DIM + (1.0 - DIM) * (0.5 + 0.5 * normals[kept] @ towards)
     clear = np.exp(-1.0 / (HAZE * near[kept]))[..., None]
     return corners[kept], near[kept], clear * light[..., None] * colours[kept, None] + (1.0 - clear) * haze

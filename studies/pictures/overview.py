@@ -13,7 +13,18 @@ import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 
 from models.core.result import Result
-from models.drawing.figures import COLOURS, DARK, GREY, LABELS, PALE, SMALL, WIDE, heading, save, subplot_mosaic
+from models.drawing.figures import (
+    COLOURS,
+    COLUMN_WIDTH,
+    DARK,
+    GREY,
+    LABELS,
+    PALE,
+    SMALL_TEXT,
+    heading,
+    save,
+    subplot_mosaic,
+)
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 
@@ -28,12 +39,12 @@ SCENE: dict[str, Any] = {
 STEPS = (1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)
 STABLE = {"exudyn": STEPS, "mujoco": STEPS[2:], "reference": STEPS[2:]}
 """Steps, s, which all divide ``GRID``; and of each curve those at which its method is stable."""
-GRID, FINE = 1e-2, 5e-5
+GRID, REFERENCE_STEP = 1e-2, 5e-5
 """s: spacing of the times at which forces are compared, and step of what is taken for the truth."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
-USUAL = {"exudyn": ("GeneralizedAlpha", "usual solver", 1e-2), "mujoco": ("Euler", "usual solver", 2e-3)}
+ENGINE_DEFAULTS = {"exudyn": ("GeneralizedAlpha", "usual solver", 1e-2), "mujoco": ("Euler", "usual solver", 2e-3)}
 """What an engine does if not told otherwise: method, name, step (s)."""
-SHOWN = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1.5)}
+CURVE_STYLES = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1.5)}
 """Line and width of each curve, so that all are seen where they lie on one another."""
 
 
@@ -41,7 +52,7 @@ def draw(path: Path) -> Path:
     """Run, draw, save ``path`` and return it."""
     alike = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
     figure, axes = subplot_mosaic(
-        [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(WIDE, 4.5), height_ratios=(1, 1.5)
+        [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(COLUMN_WIDTH, 4.5), height_ratios=(1, 1.5)
     )
     _draw_overview(axes["idea"])
     _forces(axes["force"], alike)
@@ -59,7 +70,7 @@ def _run(engine: str, method: str, step: float) -> Result:
 
 def _forces(axis: Any, runs: dict[str, Result]) -> None:
     for engine, result in runs.items():
-        line, width = SHOWN[engine]
+        line, width = CURVE_STYLES[engine]
         axis.plot(
             result.times, 1e-3 * result[FORCE], line, color=COLOURS[engine], linewidth=width, label=LABELS[engine]
         )
@@ -83,15 +94,15 @@ def _gaps(axis: Any, runs: dict[str, Result]) -> None:
 
 def _prices(axis: Any) -> None:
     """Largest error of the force by its largest value over force calls: classical Runge-Kutta, and usual solvers."""
-    truth = _run("reference", "RK4", FINE)
-    curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in USUAL.items()}
+    truth = _run("reference", "RK4", REFERENCE_STEP)
+    curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
     for engine, (method, name) in curves.items():
         points = [_price(_run(engine, method, step), truth, step) for step in STABLE[engine]]
         calls, errors = zip(*points, strict=True)
         axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
-        axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL)
-    for engine, (method, _, step) in USUAL.items():
+        axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL_TEXT)
+    for engine, (method, _, step) in ENGINE_DEFAULTS.items():
         place = _price(_run(engine, method, step), truth, step)
         axis.plot(*place, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
@@ -99,7 +110,7 @@ def _prices(axis: Any) -> None:
 
 def _price(result: Result, truth: Result, step: float) -> tuple[float, float]:
     """Force calls of a run, and the largest error of its force at common times by the largest force."""
-    rows, fine = round(GRID / step), round(GRID / FINE)
+    rows, fine = round(GRID / step), round(GRID / REFERENCE_STEP)
     error = np.abs(result[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
     return float(result.counts()["force calls"]), float(error)
 

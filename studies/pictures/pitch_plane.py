@@ -13,7 +13,7 @@ from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
 from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, Strut, of_exudyn, of_mujoco
-from studies.pictures.road import AHEAD, PassingRoad
+from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
@@ -28,7 +28,7 @@ PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
-    run = {"duration": float(np.ceil(duration + AHEAD / SPEED)), "step": 1e-3}
+    run = {"duration": float(np.ceil(duration + DRAWN_ROAD / SPEED)), "step": 1e-3}
     scene = scene_of(
         {
             "title": "pitch plane",

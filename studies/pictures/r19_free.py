@@ -16,7 +16,7 @@ from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
 from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, of_exudyn, of_mujoco
-from studies.pictures.road import AHEAD, PassingRoad
+from studies.pictures.road import DRAWN_ROAD, PassingRoad
 from studies.pictures.shapes import PAINT, Colour, PaintedSurface, ball, box, extruded, tyred_wheel
 
 SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
@@ -41,7 +41,7 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
     vehicle = reporting(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
     steps = int(np.ceil(duration / road.step))
-    table = road.table(steps + int(AHEAD / SPEED / road.step), SEED)
+    table = road.table(steps + int(DRAWN_ROAD / SPEED / road.step), SEED)
     rows = np.rint(times / road.step).astype(int)
     motions = [_motion(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
     return stage(vehicle, road, table), motions

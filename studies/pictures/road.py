@@ -6,11 +6,11 @@ import numpy as np
 
 from studies.pictures.shapes import Colour, PaintedSurface, box, faceted, floor, patches
 
-LIGHT: Colour = (0.60, 0.61, 0.63)
+LIGHT_GREY: Colour = (0.60, 0.61, 0.63)
 DARK: Colour = (0.54, 0.55, 0.57)
 GRASS: Colour = (0.55, 0.64, 0.46)
 LINE: Colour = (0.97, 0.97, 0.95)
-AHEAD = 45.0
+DRAWN_ROAD = 45.0
 """m of road that are drawn to both sides of the vehicle."""
 TILE = 0.5
 
@@ -33,8 +33,8 @@ class PassingRoad:
 
     def at(self, time: float) -> list[PaintedSurface]:
         """Road, lines along both its edges and the grass at a time (s)."""
-        first = np.floor((self.speed * time - AHEAD) / TILE)
-        stations = np.arange(first, first + 2.0 * AHEAD / TILE)
+        first = np.floor((self.speed * time - DRAWN_ROAD) / TILE)
+        stations = np.arange(first, first + 2.0 * DRAWN_ROAD / TILE)
         across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE) + 1)
         x, y = np.meshgrid(TILE * stations - self.speed * time, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
@@ -48,7 +48,7 @@ class PassingRoad:
             for x in starts
             for y in (-side, side)
         ]
-        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), grass, *marks]
+        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT_GREY), grass, *marks]
 
     def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""

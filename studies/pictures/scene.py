@@ -13,14 +13,14 @@ from models.core.strict import Strict
 
 MOST_FRAMES = 3000
 """Two minutes of film; each frame takes a fifth of a second to draw."""
-LONGEST = 120.0
+LONGEST_RUN = 120.0
 """s of a run: however few frames show it, all its steps are computed."""
 
 
 class Film(Strict):
     """[film]: how long a run is shown, and how."""
 
-    duration: float = Field(gt=0, le=LONGEST, description="s of the run that are shown")
+    duration: float = Field(gt=0, le=LONGEST_RUN, description="s of the run that are shown")
     slow_motion: float = Field(default=1.0, gt=0, le=1000, description="seconds of film per second of the run")
     frames_per_second: int = Field(default=25, ge=1, le=60, description="of the film")
     format: Literal["mp4", "gif", "png"] = Field(default="mp4", description="png: stills only")

@@ -9,7 +9,7 @@ Colour = tuple[float, float, float]
 PAINT: Colour = (0.16, 0.42, 0.72)
 RUBBER: Colour = (0.16, 0.16, 0.17)
 RIM: Colour = (0.78, 0.79, 0.8)
-FAR = 150.0
+FLOOR_DISTANCE = 150.0
 """m to the edges of a floor."""
 
 
@@ -92,7 +92,7 @@ def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
 
     up : 1 where z is up, -1 where it is down.
     """
-    lines = FAR * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
+    lines = FLOOR_DISTANCE * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
     x, y = np.meshgrid(up * lines, lines, indexing="ij")
     return faceted(patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 

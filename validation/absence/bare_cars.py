@@ -11,7 +11,7 @@ from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
 from models.systems.handling.run import build
 from validation.absence import hand_built_handling, handling
-from validation.absence.of_systems import bare
+from validation.absence.of_systems import bare_scene
 
 STEP, SPEED = 1e-3, 15.0
 """Step of the runs (s); speed (m/s)."""
@@ -20,7 +20,7 @@ Job = Callable[[], tuple[np.ndarray, ...]]
 
 def start() -> tuple[Handling, np.ndarray, np.ndarray]:
     """The car of the bare scene, and a start of which nothing is left at rest: it drifts, turns, bounces and rolls."""
-    car = bare("handling").handling(handling.ROLLING)
+    car = bare_scene("handling").handling(handling.ROLLING)
     q, v = car.straight(SPEED)
     q[3:6], v[1], v[2] = (0.01, 0.01, 0.002), 0.1, 0.02
     return car, q, v

@@ -19,7 +19,7 @@ from models.vehicles.spatial_linear import linearise, wheels
 from validation.absence import ride
 from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, numbers
 from validation.absence.hand_built_ride import march as march_written
-from validation.absence.of_systems import bare
+from validation.absence.of_systems import bare_scene
 
 STEP = 1e-3
 """Step of the runs (s)."""
@@ -30,9 +30,9 @@ BY_HAND = {"exudyn": exudyn_run, "mujoco": mujoco_run}
 
 def scene() -> tuple[SpatialVehicle, RoadPath]:
     """The vehicle of the bare scene without its anti-roll bars, an effect of a vehicle's file, and its road."""
-    bare_scene = bare("ride")
-    vehicle = replace(vehicle_of(bare_scene), bars=())
-    return vehicle, road_path(excitation_of(bare_scene, wheels(vehicle)), ride.SPEED, STEP)
+    bare = bare_scene("ride")
+    vehicle = replace(vehicle_of(bare), bars=())
+    return vehicle, road_path(excitation_of(bare, wheels(vehicle)), ride.SPEED, STEP)
 
 
 def rides(engine: str, steps: int) -> tuple[Job, Job]:

@@ -12,7 +12,7 @@ from models.systems.braking.scene import BrakingScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 STOP = "stop"
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "braking",
     "road": {"stretches": [{"left": "snow"}]},
@@ -49,7 +49,7 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
     """Counts of what a braking run is made of."""
     from models.brake.controllers import CONTROLLERS
-    from models.brake.pressure import still
+    from models.brake.pressure import resting_chambers
     from models.systems.braking.measured_pressures import MeasuredPressures
 
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
@@ -64,7 +64,7 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
         "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
         "time constants": int((chambers.fill > 0.0).sum() + (chambers.empty > 0.0).sum()),
-        "kept commands": (len(still(chambers, vehicle.sample).commands) - 2) * plane.wheels,
+        "kept commands": (len(resting_chambers(chambers, vehicle.sample).commands) - 2) * plane.wheels,
         "slow fillings": chambers.slow.size,
         "volumes": chambers.volumes.size,
         "push-outs": int((brakes.push_out > 0.0).sum()),

@@ -8,7 +8,7 @@ import numpy as np
 from models.systems.contact.scene import ContactScene
 
 ENGINES = ("reference",)
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "contact",
     "ellipse": {"a": 5e-3, "b": 4e-3},

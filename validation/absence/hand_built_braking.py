@@ -21,7 +21,7 @@ from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import controller_of, ready
 from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion
 from validation.absence.braking import STOP
-from validation.absence.of_systems import bare
+from validation.absence.of_systems import bare_scene
 
 CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12
 MOST_PARTS = 64
@@ -93,7 +93,7 @@ class Known(NamedTuple):
     ends: np.ndarray
 
 
-def room() -> Known:
+def step_workspace() -> Known:
     """Room for a step."""
     wheels = {name: np.zeros(4) for name in Known._fields}
     others = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
@@ -207,7 +207,7 @@ def rests(now, first, step, truck):
 
 
 @inlined
-def moved(now, time, known):
+def moved_state(now, time, known):
     """Move the state from the start of a step on by a time (s)."""
     state, first, accelerations = now.state, known.first, now.accelerations
     for a in range(3):
@@ -229,14 +229,14 @@ def go(now, torques, step, truck, known):
     now.accelerations[0], now.accelerations[1], now.accelerations[2] = accelerations
     rest = rests(now, first, step.time, truck)
     if rest >= 0.0:
-        moved(now, rest, known)
+        moved_state(now, rest, known)
         now.state[3:], now.turning[:] = 0.0, 0.0
         return rest
-    moved(now, 0.5 * step.time, known)
+    moved_state(now, 0.5 * step.time, known)
     settle(now, step.regular, False, truck, known)
     if not rounds(now, torques, step.time, truck, known):
         return -1.0
-    moved(now, step.time, known)
+    moved_state(now, step.time, known)
     turning = report_of(now.report).turning
     for i in range(4):
         now.turning[i] = turning[i]
@@ -318,7 +318,7 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
         now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORTED, 4)))
         now.state[3] = speed
         stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORTED, 4))))
-        n = march(now, torque, vehicle.substeps, grid, truck, room(), stop)
+        n = march(now, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return BrakingPath(
             stop.times[:n],
@@ -342,7 +342,7 @@ Job = Callable[[], BrakingPath]
 
 def stops(speed: float) -> tuple[Job, Job]:
     """Stops of a bare vehicle from a speed (m/s), built beforehand, and of the written one."""
-    scene = bare(
+    scene = bare_scene(
         "braking", brakes={"supply": SUPPLY}, procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER}}
     )
     vehicle, start = ready(scene, STOP)

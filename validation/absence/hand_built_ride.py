@@ -129,7 +129,7 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
         for name, part in CORNERS.items()
     }
     centre, size = _text(np.array(car.centre)), 2 + road.size
-    whole = WHOLE.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
+    whole = VEHICLE_XML.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
     model = mujoco.MjModel.from_xml_string(whole)
     model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
     model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
@@ -235,7 +235,7 @@ CORNERS = {
 """,
 }
 """What each corner adds to the body's sites, to the world and to the actuators."""
-WHOLE = """
+VEHICLE_XML = """
 <mujoco>
   <compiler angle="radian"/>
   <option timestep="{step!r}" gravity="0 0 0" integrator="RK4">

@@ -8,7 +8,7 @@ from models.systems.handling.scene import HandlingScene
 
 ENGINES = ("mujoco", "exudyn")
 ROLLING = "rolling"
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "handling",
     "manoeuvres": {ROLLING: {"speed": 15.0, "duration": 0.01}},

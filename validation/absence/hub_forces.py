@@ -17,7 +17,7 @@ from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
 STEPS, STEP, PERIOD = 20, 1e-3, 2e-3
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "hub-forces",
     "vehicle": {"file": "r19_free"},
@@ -26,8 +26,8 @@ BARE: dict[str, Any] = {
     "angles": {"file": "angles.csv"},
     "forces": {"file": "forces.csv", "frame": "inertial"},
 }
-QUIET: dict[str, Any] = {"noise": "none"}
-ON_ROAD: dict[str, Any] = {"road": {}, "angles": QUIET, "forces": QUIET | {"frame": "inertial"}}
+NO_NOISE: dict[str, Any] = {"noise": "none"}
+ON_ROAD: dict[str, Any] = {"road": {}, "angles": NO_NOISE, "forces": NO_NOISE | {"frame": "inertial"}}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "virtual_measurement": ({}, ON_ROAD),
     "force_noise": (ON_ROAD, ON_ROAD | {"forces": {"frame": "inertial"}}),

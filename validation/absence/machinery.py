@@ -14,11 +14,11 @@ from models.systems.wheelset.of_scene import equations_of
 from validation.absence import braking, hand_built_wheelset, hub_forces, wheelset
 from validation.absence.bare_cars import cars
 from validation.absence.bare_rides import copies, rides
-from validation.absence.of_systems import bare
+from validation.absence.of_systems import bare_scene
 from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "effects"
-STEP, SHORT = 5e-4, 40
+STEP, SHORT_RUN_STEPS = 5e-4, 40
 """Step of the wheelset's runs (s); steps of the shorter one of two that are counted."""
 
 
@@ -36,7 +36,7 @@ def arrays(job: Callable[[], Any]) -> int:
 def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
     """Runs of a bare wheelset and of one written out for linear creep on cones alone, whose path passes the same
     checks: both give states and contacts."""
-    equations, times = equations_of(bare("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
+    equations, times = equations_of(bare_scene("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
     start = equations.displaced(1e-3)
     theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
 
@@ -59,7 +59,9 @@ def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, flo
     return float(gap), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
 
 
-def made_by_more(job: Callable[[int], Callable[[], Any]], short: int = SHORT, long: int = 10 * SHORT) -> int:
+def arrays_per_steps(
+    job: Callable[[int], Callable[[], Any]], short: int = SHORT_RUN_STEPS, long: int = 10 * SHORT_RUN_STEPS
+) -> int:
     """Arrays that more steps of a job make; job(steps) gives it."""
     jobs = [job(steps) for steps in (short, long)]
     for warm in jobs:
@@ -70,25 +72,25 @@ def made_by_more(job: Callable[[int], Callable[[], Any]], short: int = SHORT, lo
 
 def made_by_wheelset(which: int) -> int:
     """Arrays that more steps of the bare wheelset (0) or the written one (1) make."""
-    return made_by_more(lambda steps: wheelsets(steps)[which])
+    return arrays_per_steps(lambda steps: wheelsets(steps)[which])
 
 
 def made_by_ride() -> int:
     """Arrays that more steps of a bare ride make, in MuJoCo, where all its forces are compiled, and as copies."""
-    return made_by_more(lambda steps: rides("mujoco", steps)[0]) + made_by_more(lambda steps: copies(steps)[0])
+    return arrays_per_steps(lambda steps: rides("mujoco", steps)[0]) + arrays_per_steps(lambda steps: copies(steps)[0])
 
 
 def made_by_car() -> int:
     """Arrays that more steps of a bare car of a scene of handling make in MuJoCo."""
-    return made_by_more(lambda steps: cars(steps)[0])
+    return arrays_per_steps(lambda steps: cars(steps)[0])
 
 
 def made_by_hubs(engine: str) -> int:
     """Arrays that more steps of a bare vehicle driven by its hub forces make."""
-    scene = bare("hub-forces")
+    scene = bare_scene("hub-forces")
     most = hub_forces.STEPS
     most = hub_forces.STEPS
-    return made_by_more(lambda steps: hub_forces.job(scene, engine, steps), most // 4, most)
+    return arrays_per_steps(lambda steps: hub_forces.job(scene, engine, steps), most // 4, most)
 
 
 def made_by_braking(engine: str) -> tuple[int, int]:
@@ -96,7 +98,7 @@ def made_by_braking(engine: str) -> tuple[int, int]:
     from models.systems.braking.run import run
 
     slow, fast = (
-        bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
+        bare_scene("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
         for speed in (1.0, 3.0)
     )
     samples, counts = [], []

@@ -31,7 +31,7 @@ CHANNELS = [
     ),
 ]
 FILE: dict[str, Any] = {"file": "recording.csv", "channels": CHANNELS}
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "measured",
     "vehicle": {"file": "r19_free"},

@@ -40,9 +40,9 @@ def file_of(system: str) -> Any:
     return import_module(FILES[system])
 
 
-def bare(system: str, **instead: Any) -> Any:
+def bare_scene(system: str, **instead: Any) -> Any:
     """The bare scene of a system, with some tables in place of its own."""
-    table = {**file_of(system).BARE, **instead}
+    table = {**file_of(system).BARE_SCENE, **instead}
     return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_folder(system).name))
 
 
@@ -83,10 +83,10 @@ def controlled(system: str) -> tuple[str, ...]:
 def pair(system: str, effect: str) -> tuple[Any, Any]:
     """The bare scene, or that with what an effect needs, and the same with the effect."""
     if effect in by_hand(system):
-        less, more = (bare(system, **tables) for tables in by_hand(system)[effect])
+        less, more = (bare_scene(system, **tables) for tables in by_hand(system)[effect])
         return less, more
     needs = module_of(system, effect).NEEDS
-    return with_effects(bare(system), *needs), with_effects(bare(system), *needs, effect)
+    return with_effects(bare_scene(system), *needs), with_effects(bare_scene(system), *needs, effect)
 
 
 def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
@@ -95,7 +95,7 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
-def added(system: str, effect: str, quick: bool = False) -> Counts:
+def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
     """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
     both."""
     before, after = (
@@ -115,7 +115,7 @@ def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
 @cache
 def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
     """Counts of a bare scene with some effects, or with tables of its own, as text."""
-    scene = with_effects(bare(system, **json.loads(tables)), *needs)
+    scene = with_effects(bare_scene(system, **json.loads(tables)), *needs)
     return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
 
@@ -132,11 +132,11 @@ def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
     for system in systems:
         if file_of(system).ENGINES[0] == "reference":
             with _removed(system, modules_of[system]):
-                counts_and_paths(system, bare(system), quick=True)
+                counts_and_paths(system, bare_scene(system), quick=True)
     engines, bares = _loaded(["exudyn", "mujoco"]), dict[str, Any]()
     for system in systems:  # all of them before any effect, as two systems may have a module in common
         with _removed(system, modules_of[system]):
-            bares[system] = counts_and_paths(system, bare(system)), _loaded(modules_of[system])
+            bares[system] = counts_and_paths(system, bare_scene(system)), _loaded(modules_of[system])
     return {"engines": engines, "systems": {system: _probed(system, *bares[system]) for system in systems}}
 
 
@@ -148,9 +148,9 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
     modules = _modules(system)
     adds, missing = dict[str, Counts](), []
     for name in controlled(system):
-        adds[name] = added(system, name)
+        adds[name] = added_counts(system, name)
         missing += [module for module in modules[name] if not _loaded([module])]
-    last = counts_and_paths(system, bare(system))
+    last = counts_and_paths(system, bare_scene(system))
     callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
     return {
         "imported": imported,
@@ -194,7 +194,7 @@ def rows(quick: bool) -> list[Row]:
         return [
             row
             for system in FILES
-            for row in _present(system, {name: added(system, name, quick) for name in controlled(system)[::3]})
+            for row in _present(system, {name: added_counts(system, name, quick) for name in controlled(system)[::3]})
         ]
     seen_there = measured_counts()
     present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]

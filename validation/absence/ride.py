@@ -51,21 +51,21 @@ FOREIGN = (
 FILTERS = (("body centre", "Wk"), ("left occupant", "Wd"))
 ENGINES = ("reference",)
 SPEED = 20.0
-BARE: dict[str, Any] = {
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "ride",
     "vehicle": {"file": "seven_freedoms"},
     "road": {"left_right": "equal", "front_rear": "equal"},
     "speeds": {"values": [SPEED]},
 }
-NARROW: dict[str, Any] = {"left_right": "equal", "front_rear": "equal"}
+ONE_TRACK: dict[str, Any] = {"left_right": "equal", "front_rear": "equal"}
 BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "curves": (
         {"vehicle": {"file": "quarter_car_nonlinear", "small_motion": True}},
         {"vehicle": {"file": "quarter_car_nonlinear"}},
     ),
     "varying_speed": ({}, {"speeds": None, "drive": {"time": [0.0, 0.5], "speed": [18.0, 22.0]}}),
-    "measured_road": ({}, {"road": {**NARROW, "file": "road.csv", "track_width": 1.5}}),
+    "measured_road": ({}, {"road": {**ONE_TRACK, "file": "road.csv", "track_width": 1.5}}),
 }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from models.rail import equations as eq
 from models.rail import wheel_forces as forces
-from models.rail.eigenvalues import free
+from models.rail.eigenvalues import free_wheelset
 from models.rail.equations import Equations
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
@@ -20,13 +20,13 @@ from validation.common.rows import Row, System, behaves
 SYSTEM: System = "effects"
 SPEED, SHIFT = 60.0, 3e-3
 ENGINES = ("reference", "exudyn", "mujoco")
-FREE = {name: 0.0 for name in Wheelset.model_fields if name.startswith(("stiffness", "damping"))}
-BARE: dict[str, Any] = {
+FREE_WHEELSET = {name: 0.0 for name in Wheelset.model_fields if name.startswith(("stiffness", "damping"))}
+BARE_SCENE: dict[str, Any] = {
     "title": "bare",
     "system": "wheelset",
     "contact": {"law": "linear"},
     "speeds": {"values": [SPEED]},
-    "wheelset": {"override": {**FREE, "flange_stiffness": 0.0, "contact_damping": 0.0}},
+    "wheelset": {"override": {**FREE_WHEELSET, "flange_stiffness": 0.0, "contact_damping": 0.0}},
     "run": {"duration": 0.01, "step": 5e-4, "displacement": 1e-3, "speeds": [SPEED]},
 }
 """A free wheelset on cones without flanges."""
@@ -76,7 +76,7 @@ def springs(wheelset: Wheelset) -> tuple[int, int]:
 
 def rows() -> list[Row]:
     """All counts, each beside its positive control."""
-    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN, free(CHOSEN))]
+    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN, free_wheelset(CHOSEN))]
     return [
         behaves(
             "absent.wheelset.fastsim",

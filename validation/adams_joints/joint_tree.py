@@ -110,7 +110,7 @@ class JointTree:
 def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
     """The chain whose hinges stay apart on a path; Refused where none does."""
     trees = [JointTree(mechanism, axes) for axes in _layouts(mechanism)]
-    apart = [_apart(tree, path) for tree in trees]
+    apart = [_least_hinge_cosine(tree, path) for tree in trees]
     best = int(np.argmax(apart))
     if apart[best] < NEAREST:
         raise Refused("joint tree", "the body turns so far that two hinges of its ball fall into one in every layout")
@@ -136,7 +136,7 @@ def _layouts(m: Mechanism) -> list[np.ndarray]:
     return [np.roll(base, shift, axis=1) for shift in range(3)]
 
 
-def _apart(tree: JointTree, path: BodyMotion) -> float:
+def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
     """Least cosine of the second hinge of a ball or a rod on a path; 1 where there is none."""
     if tree.mechanism.kind not in ("spherical", "free", "distance"):
         return 1.0

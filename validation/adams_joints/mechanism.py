@@ -26,7 +26,7 @@ JOINTS: dict[str, Kind] = {
     "SPHERICAL": "spherical",
     "HOOKE": "universal",
 }
-CLOSE = 1e-6
+ASSEMBLY_TOLERANCE = 1e-6
 """m and rad within which a joint must be assembled at the start; angles in files have six digits or more."""
 NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 
@@ -120,9 +120,9 @@ class _Reading:
         part = parts.get(of.whole("PART"))
         if part is None:
             raise of.refuse(", PART", of.whole("PART"), "is no part of the file")
-        frame = _turned(part.numbers("REULER", (0.0, 0.0, 0.0)))
+        frame = _turned_axes(part.numbers("REULER", (0.0, 0.0, 0.0)))
         place = part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ of.numbers("QP", (0.0, 0.0, 0.0))
-        return Marker(part.number, place, frame @ _turned(of.numbers("REULER", (0.0, 0.0, 0.0))))
+        return Marker(part.number, place, frame @ _turned_axes(of.numbers("REULER", (0.0, 0.0, 0.0))))
 
     def marker(self, of: Statement, number: int) -> Marker:
         if number not in self.markers:
@@ -190,7 +190,7 @@ class _Reading:
             raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
         ends, length = self.pair(joint, int(match[1]), int(match[2])), float(match[3])
         apart = float(np.linalg.norm(ends[1].place - ends[0].place))
-        if abs(apart - length) > CLOSE or length <= 0.0:
+        if abs(apart - length) > ASSEMBLY_TOLERANCE or length <= 0.0:
             raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {apart:g} m")
         return "distance", ends, apart
 
@@ -251,13 +251,13 @@ def _evaluated(of: Statement, text: str) -> Callable[[float, float], float]:
     return lambda travel, rate: float(eval(code, {"__builtins__": {}}, {**names, "travel": travel, "rate": rate}))
 
 
-def _turned(angles: np.ndarray) -> np.ndarray:
+def _turned_axes(angles: np.ndarray) -> np.ndarray:
     """Axes (3, 3) as columns after turns about z, the new x and the new z."""
     return Rotation.from_euler("ZXZ", angles).as_matrix()
 
 
 def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
-    return bool(np.linalg.norm(np.cross(a, b)) < CLOSE)
+    return bool(np.linalg.norm(np.cross(a, b)) < ASSEMBLY_TOLERANCE)
 
 
 def _cross(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
@@ -273,10 +273,10 @@ def _check_assembled(joint: Statement, kind: Kind, ground: Marker, body: Marker)
     apart, z = body.place - ground.place, ground.axes[:, 2]
     if kind in ("prismatic", "cylindrical"):
         apart = apart - z * (z @ apart)
-    if np.linalg.norm(apart) > CLOSE:
+    if np.linalg.norm(apart) > ASSEMBLY_TOLERANCE:
         raise joint.refuse("", apart.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
     if kind == "universal":
-        if abs(z @ body.axes[:, 2]) > CLOSE:
+        if abs(z @ body.axes[:, 2]) > ASSEMBLY_TOLERANCE:
             raise joint.refuse("", None, "has arms that are not square to each other at the start")
     elif kind != "spherical" and not (_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
         raise joint.refuse("", None, "has z axes that are not parallel at the start")

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 
-PASSED_OVER = ("ADAMS", "GRAPHICS", "REQUEST", "OUTPUT", "RESULTS", "VARIABLE", "END", "LIST", "INTEGRATOR")
+IGNORED_STATEMENTS = ("ADAMS", "GRAPHICS", "REQUEST", "OUTPUT", "RESULTS", "VARIABLE", "END", "LIST", "INTEGRATOR")
 """Statements that change no motion; a force that reads a VARIABLE is refused where it names it."""
 KEYS = {
     "UNITS": ("FORCE", "MASS", "LENGTH", "TIME"),
@@ -84,7 +84,7 @@ def read_statements(path: str | Path) -> list[Statement]:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
-    statements = [_statement(str(path), number, text) for number, text in _joined(lines) if not _passed(text)]
+    statements = [_statement(str(path), number, text) for number, text in _statements(lines) if not _passed(text)]
     for statement in (each for each in statements if each.name == "UNITS"):
         for key, (value, *_) in statement.values.items():
             if value.upper() != SI[key]:
@@ -92,7 +92,7 @@ def read_statements(path: str | Path) -> list[Statement]:
     return statements
 
 
-def _joined(lines: list[str]) -> list[tuple[int, str]]:
+def _statements(lines: list[str]) -> list[tuple[int, str]]:
     """Number of the first line and text of every statement."""
     joined: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
@@ -105,7 +105,7 @@ def _joined(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def _passed(text: str) -> bool:
-    return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in PASSED_OVER
+    return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in IGNORED_STATEMENTS
 
 
 def _statement(file: str, line: int, text: str) -> Statement:
@@ -115,7 +115,7 @@ def _statement(file: str, line: int, text: str) -> Statement:
         raise InputError(file, f"line {line}", text[:40], f"is not supported; read are {', '.join(KEYS)}")
     values: dict[str, list[str]] = {}
     key = ""
-    for part in _parts(head.group(3)):
+    for part in _between_commas(head.group(3)):
         named = _KEY.fullmatch(part)
         if named:
             key = named.group(1).upper()
@@ -132,7 +132,7 @@ def _statement(file: str, line: int, text: str) -> Statement:
     return statement
 
 
-def _parts(text: str) -> list[str]:
+def _between_commas(text: str) -> list[str]:
     """Text between the commas that stand outside of brackets."""
     parts, depth = [""], 0
     for sign in text:

@@ -84,6 +84,6 @@ def _digits(cell: str) -> int:
     return len(cell.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
 
 
-def starts_alike(mechanism: Mechanism, output: OutputFile) -> bool:
+def starts_with_mechanism(mechanism: Mechanism, output: OutputFile) -> bool:
     """Whether the file begins where the mechanism does."""
     return bool(np.abs(output.columns["Pos"][0] - mechanism.centre).max() <= 1e-5)

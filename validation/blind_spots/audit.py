@@ -1,17 +1,18 @@
-"""The audit: runs cases and tests once, then spoils each shared function in a process that is forked for it.
+"""The audit: runs scenes, cases and tests once, then spoils each shared function in a process that is forked for it.
 
 All processes run the same rewritten modules (``planting``), whose machine code is kept in the audit's folder: ready
 after the first run, whichever function is spoiled. First judge the cases with independent rows and the tests on
 independent grounds; all others are asked only about functions that no judge has noticed. A stopped audit goes on from
-its folder: ``functions.json`` with the names of all functions, ``trace`` with what cases and tests ran, ``judges.csv``
-and ``others.csv`` with a line for each function that is done, and ``blind_spots.csv``, the table made of both.
+its folder: ``functions.json`` with the names of all functions, ``trace`` with what scenes, cases and tests ran,
+``judges.csv`` and ``others.csv`` with a line for each function that is done, and ``blind_spots.csv``, the table made of
+both.
 """
 
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -20,7 +21,7 @@ from importlib import import_module
 from pathlib import Path
 from queue import Queue
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from models.core.errors import InputError
 from models.core.result import provenance
@@ -28,7 +29,8 @@ from models.core.whole_files import write_whole
 from validation.blind_spots import memory
 from validation.blind_spots.rewriting import ROOT, can_be_spoiled
 from validation.blind_spots.shared import candidates, compiled_functions, shared_functions
-from validation.blind_spots.table import JOINED, Line, is_independent, read, uncovered, write
+from validation.blind_spots.sides import Run, runs, sides
+from validation.blind_spots.table import JOINED, NOT_AUDITED, Line, is_independent, kind_of, read, uncovered, write
 from validation.cases import CASES
 
 STARTUP = Path(__file__).with_name("startup")
@@ -48,9 +50,27 @@ PATIENCE = 1200
 LOST = 120
 """Seconds of the processor after which one with a fault has, as a stop whose wheels never come to rest."""
 Told = dict[str, Any]
+Noticed = tuple[str, str, str]
+"""Ids of rows, of tests, and of those that are independent."""
 Progress = Callable[[str, float], None]
-Job = tuple[list[str], list[str]]
-"""Cases and tests."""
+
+
+class Job(NamedTuple):
+    """What a process runs: cases and tests, or scenes in engines."""
+
+    cases: list[str]
+    tests: list[str]
+    runs: Sequence[Run] = ()
+
+    @property
+    def name(self) -> str:
+        """Its only case or file of tests, or its only run."""
+        return (*self.cases, *self.tests, *(f"{scene} in {engine}" for scene, engine in self.runs))[0]
+
+    @property
+    def trace(self) -> str:
+        """Name of the file of its trace."""
+        return self.name.rpartition("/")[2].replace(".py", "").replace(".toml", "").replace(" ", "_") + ".jsonl"
 
 
 @dataclass(frozen=True)
@@ -119,8 +139,7 @@ class Probes:
     def run(self, job: Job, out: Path, faults: dict[int, float], sound: Collection[str]) -> str:
         """Run cases and tests with some faults, by place; returns how that ended."""
         out.write_text("")
-        cases, tests = job
-        told: Told = {"cases": cases, "tests": tests, "out": str(out), "faults": faults, "sound": sorted(sound)}
+        told: Told = {**job._asdict(), "out": str(out), "faults": faults, "sound": sorted(sound)}
         told |= {"patience": LOST, "budgets": BUDGETS} if faults else {"patience": PATIENCE, "budgets": [PATIENCE] * 2}
         probe = self.idle.get()
         assert probe.stdin and probe.stdout
@@ -133,19 +152,23 @@ class Probes:
 
 @dataclass(frozen=True)
 class Asked:
-    """Who is asked about a function: the judges of a trace, or all others."""
+    """Who is asked about a function: the judges of a trace, or all others.
+
+    engines : that share a function of Python, by its name.
+    """
 
     probes: Probes
     traced: Traced
     judges: bool
+    engines: Mapping[str, tuple[str, ...]]
 
     def line_of(self, function: str) -> Line:
         """Spoil one function, run those asked in which it gives numbers, and tell what notices."""
-        traced, commit = self.traced, str(provenance("")["commit"])
+        traced = self.traced
         callers, ended = traced.callers(function, self.judges), unspoiled(function, traced)
         if ended or not callers:
-            return Line(function, ended or "whole", len(callers), len(callers), "", "", "", commit)
-        job = ([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
+            return self.line(function, ended or "whole", len(callers), len(callers))
+        job = Job([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
         with TemporaryDirectory() as place:
             out = Path(place) / "told.jsonl"
             ended = self.probes.run(job, out, {traced.functions.index(function): FAULT}, traced.sound)
@@ -155,7 +178,12 @@ class Asked:
         ids = ({id for id, _ in rows}, {id for id, _ in tests}, {*independent})
         noticed, failed, grounded = (JOINED.join(sorted(each)) for each in ids)
         left = len(callers) - len(told)
-        return Line(function, ended, len(callers), left, noticed, failed, grounded, commit)
+        return self.line(function, ended, len(callers), left, (noticed, failed, grounded))
+
+    def line(self, function: str, ended: str, calling: int = 0, left: int = 0, noticed: Noticed = ("", "", "")) -> Line:
+        """A line of a function, of this commit; noticed : by what."""
+        commit = str(provenance("")["commit"])
+        return Line(function, ended, calling, left, *noticed, commit, kind_of(function, self.engines))
 
 
 def audit(folder: Path, progress: Progress) -> list[Line]:
@@ -165,15 +193,15 @@ def audit(folder: Path, progress: Progress) -> list[Line]:
     """
     functions = prepare(folder)
     with Probes(folder) as probes:
+        engines = trace_of_sides(probes, functions, progress)
         traced = trace(probes, functions, jobs(with_grounds=True), progress)
-        shared = in_order(shared_functions(traced.numbers))
-        lines = measured(folder / JUDGES, shared, Asked(probes, traced, judges=True), progress)
+        shared = in_order(shared_functions(engines))
+        lines = measured(folder / JUDGES, shared, Asked(probes, traced, True, engines), progress)
         write(lines.values(), folder / TABLE)
         traced = trace(probes, functions, jobs(with_grounds=False), progress)
-        shared = in_order(shared_functions(traced.numbers))
-        doubtful = [name for name in shared if name not in lines or not lines[name].is_covered]
-        more = measured(folder / OTHERS, doubtful, Asked(probes, traced, judges=False), progress)
-    whole = [lines[name].with_others(more[name]) if name in lines else more[name] for name in doubtful]
+        doubtful = [name for name in shared if not lines[name].is_covered]
+        more = measured(folder / OTHERS, doubtful, Asked(probes, traced, False, engines), progress)
+    whole = [lines[name].with_others(more[name]) for name in doubtful]
     whole += [line for name, line in lines.items() if name not in doubtful]
     write(whole, folder / TABLE)
     return whole
@@ -185,31 +213,32 @@ def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers
     by : what the names of the cases and test files that are asked are like; the fewer, the shorter the trace. Raises
     InputError where no function or judge is like that, or as ``audit`` does.
     """
-    functions = prepare(folder)
-    asked = [job for job in jobs(with_grounds=True) if fnmatchcase(called(job), by)]
+    functions = prepare(folder, only)
+    asked = [job for job in jobs(with_grounds=True) if fnmatchcase(job.name, by)]
     if not asked:
         raise InputError("", "by", by, "no case, and no test file that names independent grounds, is called so")
-    if not any(fnmatchcase(name, only) for name in functions):
-        raise InputError("--only", "", only, "no shared function is called so: module:name, as in 'models.tyre.*'")
     with Probes(folder, workers) as probes:
+        engines = trace_of_sides(probes, functions, progress)
         traced = trace(probes, functions, asked, progress)
-        run = [name for name in shared_functions(traced.numbers) if by == "*" or traced.callers(name, judges=True)]
-        wanted = [name for name in in_order(run) if fnmatchcase(name, only)]
-        lines = measured(folder / JUDGES, wanted, Asked(probes, traced, judges=True), progress)
-    write(lines.values(), folder / TABLE)
+        run = [name for name in shared_functions(engines) if by == "*" or traced.callers(name, judges=True)]
+        wanted = [name for name in in_order(run) if name in functions]
+        lines = measured(folder / TABLE, wanted, Asked(probes, traced, True, engines), progress)
     return list(lines.values())
 
 
 def measured(path: Path, functions: list[str], asked: Asked, progress: Progress) -> dict[str, Line]:
-    """Lines of some functions, by name: as the file keeps them, or measured now, and then kept."""
-    done = {line.function: line for line in read(path)}
-    left = [name for name in functions if name not in done]
-    total = len(done) + len(left)
-    for line in asked.probes.map(asked.line_of, left):
-        done[line.function] = line
-        write(done.values(), path)
-        progress(line.function, len(done) / total)
-    return done
+    """Lines of some functions, by name: as the file keeps them, or measured now, and then kept.
+
+    The file has a line for each of them from the start on, which says that it is not audited until it is.
+    """
+    lines = {name: asked.line(name, NOT_AUDITED) for name in functions} | {line.function: line for line in read(path)}
+    left = [name for name, line in lines.items() if line.ended == NOT_AUDITED]
+    write(lines.values(), path)
+    for done, line in enumerate(asked.probes.map(asked.line_of, left), len(lines) - len(left) + 1):
+        lines[line.function] = line
+        write(lines.values(), path)
+        progress(line.function, done / len(lines))
+    return lines
 
 
 def in_order(functions: list[str]) -> list[str]:
@@ -237,12 +266,17 @@ def judged_cases() -> list[str]:
     return [name for name, system in systems.items() if system not in UNJUDGED]
 
 
-def prepare(folder: Path) -> list[str]:
-    """The names of all functions, kept in the folder; raises InputError where it holds others."""
+def prepare(folder: Path, only: str = "*") -> list[str]:
+    """The functions whose ``module:name`` is like ``only``, kept in the folder; no others are rewritten.
+
+    Raises InputError where there are none, or where the folder holds others.
+    """
     (folder / TRACE).mkdir(parents=True, exist_ok=True)
-    path, functions = folder / FUNCTIONS, candidates()
+    path, functions = folder / FUNCTIONS, [name for name in candidates() if fnmatchcase(name, only)]
+    if not functions:
+        raise InputError("--only", "", only, "no shared function is called so: module:name, as in 'models.tyre.*'")
     if path.is_file() and json.loads(path.read_text()) != functions:
-        raise InputError(str(path), "", "other functions", "an audit goes on with the sources that it began with")
+        raise InputError(str(path), "", "other functions", "an audit goes on with the functions that it began with")
     write_whole(path, json.dumps(functions))
     return functions
 
@@ -252,20 +286,27 @@ def jobs(with_grounds: bool) -> list[Job]:
     those too that name none."""
     files = sorted((ROOT / "tests").glob("test_*.py"))
     chosen = [str(each.relative_to(ROOT)) for each in files if not with_grounds or "mark.grounds(" in each.read_text()]
-    return [([name], []) for name in judged_cases()] + [([], [file]) for file in chosen]
-
-
-def called(job: Job) -> str:
-    """The case or the file of tests of a job of the trace."""
-    cases, tests = job
-    return (*cases, *tests)[0]
+    return [Job([name], []) for name in judged_cases()] + [Job([], [file]) for file in chosen]
 
 
 def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
-    """The trace, read from the folder, or made now."""
+    """The trace of cases and tests, read from the folder, or made now."""
+    lines = traced_lines(probes, functions, jobs, progress)
+    return Traced(functions, {line.get("case") or line["test"]: line for line in lines})
+
+
+def trace_of_sides(probes: Probes, functions: list[str], progress: Progress) -> dict[str, tuple[str, ...]]:
+    """Engines that share a function of Python, by its name; nothing is run where all functions are compiled."""
+    if {*functions} <= {*compiled_functions()}:
+        return {}
+    return sides(traced_lines(probes, functions, [Job([], [], [run]) for run in runs()], progress))
+
+
+def traced_lines(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> list[Told]:
+    """Lines of what some jobs ran, with functions by name: of their traces in the folder, which are made if missing."""
 
     def run_once(job: Job) -> Path:
-        path = probes.folder / TRACE / f"{Path(called(job)).stem}.jsonl"
+        path = probes.folder / TRACE / job.trace
         if not path.is_file():
             probes.run(job, path.with_suffix(".part"), {}, ())
             path.with_suffix(".part").rename(path)
@@ -275,16 +316,10 @@ def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progr
     for path in probes.map(run_once, jobs):
         paths.append(path)
         progress(f"trace of {path.stem}", len(paths) / len(jobs))
-    return traced_of(functions, sorted(paths))
-
-
-def traced_of(functions: list[str], paths: list[Path]) -> Traced:
-    """The trace as kept, with functions by name."""
-    lines = [line for path in paths for line in lines_of(path)]
+    lines = [line for path in sorted(paths) for line in lines_of(path)]
     for line in lines:
-        for kind in ("ran", "numbers"):
-            line[kind] = {functions[place] for place in line[kind]}
-    return Traced(functions, {line.get("case") or line["test"]: line for line in lines})
+        line |= {kind: {functions[place] for place in line[kind]} for kind in ("ran", "numbers")}
+    return lines
 
 
 def lines_of(path: Path) -> list[Told]:

@@ -1,11 +1,11 @@
-"""A process of an audit: runs cases and tests, and tells what of each failed and which functions it ran.
+"""A process of an audit: runs cases, tests and scenes, and tells what of each failed and which functions it ran.
 
 It reads jobs from its standard input and imports the cases that they name, and what the named tests import, each once,
 without a fault. For each job it starts a fork of itself, in which nothing is left of an earlier fault, and answers how
-that has ended. A job is a line of JSON: "cases" and "tests" (what pytest is given); "out", a file to which a line of
-JSON is added for each case and test that has ended; "faults", by the place of the function; "sound", ids that fail
-without a fault; "patience", seconds of the processor after which the fork is stopped; and "budgets", seconds of the
-processor after which nothing more begins: if something independent has noticed, and if not.
+that has ended. A job is a line of JSON: "cases", "tests" (what pytest is given) and "runs" (``sides.Run``); "out", a
+file to which a line of JSON is added for each of them that has ended; "faults", by the place of the function; "sound",
+ids that fail without a fault; "patience", seconds of the processor after which the fork is stopped; and "budgets",
+seconds of the processor after which nothing more begins: if something independent has noticed, and if not.
 """
 
 import json
@@ -24,6 +24,7 @@ from numba.core import event
 
 from validation.blind_spots import memory
 from validation.blind_spots.rewriting import ROOT
+from validation.blind_spots.sides import prepared
 from validation.blind_spots.table import is_independent
 
 IMPORT = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", re.MULTILINE)
@@ -102,6 +103,17 @@ def run_case(name: str, log: Told) -> None:
     log.end({"case": name, "rows": lines}, failed)
 
 
+def run_scene(scene: str, engine: str, log: Told) -> None:
+    """Run a scene in an engine; a run that is refused or fails shares nothing."""
+    from models.systems import run
+
+    read = prepared(scene)
+    log.begin()
+    with suppress(Exception):
+        run(read, engine)
+        log.end({"run": [scene, engine]}, [])
+
+
 def is_of_numba(error: BaseException) -> bool:
     """Whether numba refuses a function: the fault is then the audit's, and no row has noticed anything."""
     return type(error).__module__.startswith("numba.")
@@ -146,11 +158,13 @@ class Watching:
 
 
 def work(job: dict[str, Any]) -> None:
-    """Tests first, which are quicker, and then cases."""
+    """Runs, which have a job of their own, or tests, which are quicker, and then cases."""
     signal.setitimer(signal.ITIMER_PROF, job["patience"])
     for place, fault in job["faults"].items():
         memory.FAULTS[int(place)] = fault
     told = Told(job)
+    for scene, engine in job["runs"]:
+        run_scene(scene, engine, told)
     if job["tests"]:
         pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
     for name in job["cases"]:

@@ -5,13 +5,14 @@ they run every engine and read what it gives. A module belongs to one engine alo
 where only that engine's side imports it. Every other module is shared: both engines call it, or it works on the runs of
 both, or it is found by listing a folder, where no import names it.
 
-Of a shared module every compiled function counts, by its decorator. So does every Python function that was seen to give
-numbers, but for those in the folders of ``MACHINERY``; all other folders of ``models`` count, new ones too.
+Of a shared module every compiled function counts, by its decorator. A function of Python counts where ``sides`` has
+seen at least two engines call it for numbers, unless it is in a folder of ``MACHINERY``; all other folders of
+``models`` count, new ones too.
 """
 
 import ast
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 
 from validation.blind_spots.rewriting import COMPILES, ROOT, Function, text, tree
@@ -105,7 +106,7 @@ def candidates() -> list[str]:
     return list(dict.fromkeys((*compiled_functions(), *law_functions())))
 
 
-def shared_functions(numbers: Iterable[str]) -> list[str]:
-    """``module:name`` of all shared functions, compiled ones first; numbers : those that were seen to give numbers."""
-    compiled, known = set(compiled_functions()), set(numbers)
-    return [name for name in candidates() if name in compiled or name in known]
+def shared_functions(several: Collection[str]) -> list[str]:
+    """``module:name`` of all shared functions, compiled ones first; several : those that several engines call."""
+    compiled = set(compiled_functions())
+    return [name for name in candidates() if name in compiled or name in several]

@@ -12,12 +12,13 @@ functions that it did not spoil.
 
 import csv
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 
 from models.core.whole_files import whole_file
+from validation.blind_spots.shared import compiled_functions
 
 KEPT = Path(__file__).with_name("blind_spots.csv")
 HARMLESS = Path(__file__).with_name("harmless.csv")
@@ -27,6 +28,7 @@ error; or the function gives views of its arguments, new arrays that are written
 INDEPENDENT = ("closed form", "published", "native", "written equations", "plain counterpart")
 CHECKS_OF_CHECKS = "planted."
 JOINED = "; "
+NOT_AUDITED = "not audited"
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,11 @@ class Line:
     run.
 
     ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
-    writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked);
+    writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked), "not
+    audited" (it is shared, and nothing was asked yet);
     calling : in how many cases and tests that were asked it gives numbers, which are those on independent grounds, and
     all others if none of these noticed; left : how many of them were not run, for want of time; commit : that the line
-    belongs to.
+    belongs to; kind : "compiled", or "Python" and the engines that call the function.
     """
 
     function: str
@@ -49,6 +52,7 @@ class Line:
     tests: str
     independent: str
     commit: str
+    kind: str = "compiled"
 
     @property
     def is_covered(self) -> bool:
@@ -102,26 +106,36 @@ def harmless() -> dict[str, tuple[str, str]]:
         return {each["function"]: (each["why"], each["proof"]) for each in csv.DictReader(file)}
 
 
+def kind_of(function: str, engines: Mapping[str, tuple[str, ...]]) -> str:
+    """Whether a function is compiled, or of Python and shared by which engines, as ``Line.kind`` tells it."""
+    return "compiled" if function in compiled_functions() else " ".join(["Python", *engines.get(function, ())])
+
+
 def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
-    """The measured lines, and the kept ones of all other functions that are still there."""
-    lines = {line.function: line for line in (*kept, *measured)}
+    """The measured lines, and the kept ones of all other functions that are still there.
+
+    A function that was not audited now keeps its line.
+    """
+    measured = sorted(measured, key=lambda line: line.ended != NOT_AUDITED)
+    count = sum(line.ended == NOT_AUDITED for line in measured)
+    lines = {line.function: line for line in (*measured[:count], *kept, *measured[count:])}
     return [lines[name] for name in functions if name in lines]
 
 
 def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
     """Functions that nothing independent notices, by what there is instead.
 
-    functions : all that are shared now; those that have no line are "not audited".
+    functions : all that are shared now; those that have no line are "not audited" as well.
     """
     known = {line.function: line for line in lines}
     gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": []}
-    gaps |= {"run by nothing": [], "not audited": [], **{why: [] for why in WHY_HARMLESS}}
+    gaps |= {"run by nothing": [], "not spoiled": [], NOT_AUDITED: [], **{why: [] for why in WHY_HARMLESS}}
     for name in functions:
         line = known.get(name)
         if name in harmless():
             gaps[harmless()[name][0]].append(name)
-        elif line is None or line.ended == "not spoiled":
-            gaps["not audited"].append(name)
+        elif line is None or line.ended in (NOT_AUDITED, "not spoiled"):
+            gaps[NOT_AUDITED if line is None else line.ended].append(name)
         elif line.ended == "not run":
             gaps["run by nothing"].append(name)
         elif not line.is_covered and line.ended != "no numbers":

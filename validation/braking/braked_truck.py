@@ -7,13 +7,13 @@ import numpy as np
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.plane_records import Report, motion_of
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
-from models.brake.surfaces import EVEN, OnRoad, Road
+from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 
 
-def on_road(plane: Plane, tables: Tables, road: Road = EVEN, slope: float = 10.0) -> OnRoad:
+def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: float = 10.0) -> OnRoad:
     """A vehicle whose tyres are all alike, of a slope (1/rad)."""
     return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 

@@ -10,16 +10,16 @@ from models.brake.controller import AllApplied, Command, Sample
 from models.brake.plane_chain import inertia
 from models.brake.plane_step import share_out
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
-from models.brake.port.ask import checked
+from models.brake.port.ask import checked_answer
 from models.brake.surfaces import Stretch, road
 from models.brake.trailer import CHOSEN, train
 from models.systems.braking.march import Start
 from models.systems.braking.procedures import ready
-from models.systems.braking.run import carried, run
+from models.systems.braking.run import marched_by, run
 from models.systems.braking.scene import BrakingScene, build
-from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, Moved, bent
+from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, Moved, bent_friction
 
-TRUCK, HIGH = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}))
+TRUCK, HIGH_TRUCKS = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}))
 """The paper's truck, and one as high as it is long and twice as high as it is wide."""
 
 
@@ -43,7 +43,7 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
     return error
 
 
-def even(implementation: str, folder: Path) -> float:
+def on_even_friction(implementation: str, folder: Path) -> float:
     """The truck on even friction, straight ahead: y, heading and yaw rate (m, rad, rad/s)."""
     moved = Moved(implementation, TRUCK, DRY)
     moved.under(np.full((101, 4), 4e3))
@@ -62,13 +62,13 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 def lifting(implementation: str, folder: Path) -> float:
     """A truck as high as it is long, braked on dry road."""
-    Moved(implementation, HIGH, DRY, speed=20.0).under(np.full((101, 4), 2e4))
+    Moved(implementation, HIGH_TRUCKS, DRY, speed=20.0).under(np.full((101, 4), 2e4))
     return np.inf
 
 
 def turned_over(implementation: str, folder: Path) -> float:
     """A truck twice as high as it is wide, steered on dry road."""
-    Moved(implementation, HIGH, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
+    Moved(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
     return np.inf
 
 
@@ -94,7 +94,7 @@ def jackknifed(implementation: str, folder: Path) -> float:
 
 def no_friction_on_one_side(implementation: str, folder: Path) -> float:
     """The truck locked, none on the left, 0.8 on the right, for 5 ms: speed lost against mu g t / 2, relative."""
-    tyres, plane = (bent((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
+    tyres, plane = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
     moved = Moved(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
     moved.under(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
@@ -111,7 +111,7 @@ def lagging_at_rest(implementation: str, folder: Path) -> float:
     """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
     vehicle, begun = ready(scene, "stop")
-    vehicle = carried(vehicle, implementation)
+    vehicle = marched_by(vehicle, implementation)
     begun.state[1, 1] = 0.2
     path = vehicle.run(AllApplied(4), begun, 10.0)
     rest = Start(path.states[-1].copy(), path.turning[-1].copy())
@@ -157,11 +157,11 @@ def below_push_out(implementation: str, folder: Path) -> float:
     return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
 
 
-def answers(most: float = 8.0, **command: Any) -> Error:
+def nonsense_answers(most: float = 8.0, **command: Any) -> Error:
     """A case of a controller that answers nonsense where the supply has ``most`` bar."""
 
     def error(implementation: str, folder: Path) -> float:
-        checked(Command(**command), Sample(3, 16_500_000, np.ones(4), True, most, 10.0), most=most)
+        checked_answer(Command(**command), Sample(3, 16_500_000, np.ones(4), True, most, 10.0), most=most)
         return np.inf
 
     return error

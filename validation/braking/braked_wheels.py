@@ -8,13 +8,13 @@ import numpy as np
 from models.brake.advance import AT_REST, ENDS, advance, ending
 from models.brake.plane_vehicle import GRAVITY, Plane
 from models.brake.quarter import Quarter
-from models.brake.surfaces import EVEN, Road, Stretch, road
+from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.core.errors import RunFailed
 from models.engines.braking import Carried
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable, stacked
 from validation.braking.braked_truck import Moving, on_road
-from validation.braking.quarter_stops import exact
+from validation.braking.quarter_stops import exact_distance
 
 Error = Callable[[str, Path], float]
 STEP, SPEED = 5.5e-3, 10.0
@@ -23,7 +23,7 @@ LOAD = QUARTER.mass * GRAVITY
 DRY, ICE = surface("dry"), surface("ice")
 
 
-def bent(*points: tuple[float, float]) -> TyreTable:
+def bent_friction(*points: tuple[float, float]) -> TyreTable:
     """Friction of these (slip, mu) at every load and slip angle, and none across."""
     slips, mu = np.array(points).T
     along = np.tile(mu, (2, 1, 1))
@@ -40,7 +40,7 @@ class Moved(Moving):
         *tyres: TyreTable,
         speed: float = SPEED,
         turning: float | None = None,
-        road: Road = EVEN,
+        road: Road = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else Carried(implementation, plane).advance
@@ -69,7 +69,7 @@ def stopping(
     *tyres: TyreTable,
     step: float = STEP,
     turning: float | None = None,
-    road: Road = EVEN,
+    road: Road = UNIFORM_ROAD,
 ) -> float:
     """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
     wheel = Moved(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
@@ -78,7 +78,7 @@ def stopping(
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
 
 
-def settled(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
+def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
     """Torque (N m) under which a slip stays, the way (m) that this takes, and the speed of turning (rad/s)."""
     force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return (
@@ -88,25 +88,27 @@ def settled(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
     )
 
 
-def steady(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
+def steady_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
     """A case of a stop at a slip that stays: way against m v^2 / (2 F), relative."""
-    level, way, turning = settled(tyre, slip)
+    level, way, turning = settled_stop(tyre, slip)
     return lambda name, folder: abs(stopping(name, level, tyre, step=step, turning=turning) / way - 1.0)
 
 
 def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
     """A case of a stop from rolling: way against the exact one, relative."""
-    level, _, _ = settled(tyre, slip)
-    return lambda name, folder: abs(stopping(name, level, tyre, step=step) / exact(QUARTER, tyre, level, SPEED) - 1.0)
+    level, _, _ = settled_stop(tyre, slip)
+    return lambda name, folder: abs(
+        stopping(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
+    )
 
 
-PEAKED = bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
+PEAKED = bent_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 
 def beyond_the_peak(implementation: str, folder: Path) -> float:
     """A thousandth above the torque of the peak: the wheel locks; way against the exact one."""
     peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
-    return abs(stopping(implementation, peak, PEAKED) / exact(QUARTER, PEAKED, peak, SPEED) - 1.0)
+    return abs(stopping(implementation, peak, PEAKED) / exact_distance(QUARTER, PEAKED, peak, SPEED) - 1.0)
 
 
 def at_the_peak(implementation: str, folder: Path) -> float:
@@ -125,7 +127,7 @@ def locked(implementation: str, folder: Path) -> float:
 
 def changing(implementation: str, folder: Path) -> float:
     """Locked from friction 0.2 on to 0.8 after 10 m: way against its closed form."""
-    slick, rough = (bent((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
+    slick, rough = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
     way = stopping(implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)]))
     return abs(way / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
@@ -134,7 +136,7 @@ def frictions(implementation: str, folder: Path) -> float:
     """Locked on friction from 1e-6 to 1.5 for 0.2 s: speed lost against mu g t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
-        wheel = Moved(implementation, QUARTER.plane, bent((0.0, 0.0), (1.0, mu)), turning=0.0)
+        wheel = Moved(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), turning=0.0)
         wheel.under(np.full((41, 1), 1e6), 5e-3)
         errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(errors))
@@ -170,7 +172,7 @@ def on_the_line(implementation: str, folder: Path) -> float:
 def slope_changes(implementation: str, folder: Path) -> float:
     """Error on a change of friction, from dry on to wet within a step of 20 ms, lightly braked: way against that of the
     same force, relative."""
-    level, way, turning = settled(DRY, 0.004)
+    level, way, turning = settled_stop(DRY, 0.004)
     both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
     stop = stopping(implementation, level, DRY, surface("wet"), step=2e-2, turning=turning, road=both)
     return abs(stop / way - 1.0)

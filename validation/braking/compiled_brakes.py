@@ -12,7 +12,7 @@ from models.brake.relaxation import Lag
 from models.brake.relaxation import lag_on as compiled_lag_on
 from models.brake.sprung import Sprung
 from models.brake.sprung_step import HELD
-from models.brake.surfaces import EVEN, OnRoad, Road, surfaces
+from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, surfaces
 from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
 from models.engines.braking_sprung import driven
@@ -58,7 +58,7 @@ def lag_on(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lags of the truck's tyres after a step, as by ``validation.braking.plain_relaxation.lag_on``."""
     after, lagging = lag.copy(), np.zeros(4)
-    truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, EVEN)
+    truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, UNIFORM_ROAD)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
     return after, lagging
 

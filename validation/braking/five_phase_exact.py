@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
 from models.brake.controllers.five_phase_cycle import Frozen
 
 
@@ -109,7 +109,7 @@ def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = Non
     """``cycle`` of a wheel at a frozen speed whose brake is a line; begun : rate of pressure (bar/s) at first."""
     rates = [rate(k, controller) for k in range(6)]
     rates[0] = rates[0] if begun is None else begun
-    phases = [(frozen.brake.rising * speed, *end_of(k, controller)) for k, speed in enumerate(rates)]
+    phases = [(frozen.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
     forces = frozen.load * frozen.tyre.mu_x[0, 0]
     return cycle(Wheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
 

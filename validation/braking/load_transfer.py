@@ -32,7 +32,7 @@ def transfer(drive: Drive) -> np.ndarray:
     return moments
 
 
-def asked(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
+def asked_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
     """(2,) N m: what ``transfer`` must be at accelerations (2,) ahead and to the left in m/s^2."""
     handling, free = drive.handling, drive.handling.vehicle
     masses, heights = np.array([(body.mass, body.position[2]) for body in free.bodies]).T
@@ -49,10 +49,10 @@ def asked(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
 
 def braked_error(drive: Drive, mu: float) -> float:
     """Transfer between the axles of a drive that slides, beside what is asked for, less 1."""
-    return float(transfer(drive)[0] / asked(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
+    return float(transfer(drive)[0] / asked_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
 
 
 def turning_error(drive: Drive) -> float:
     """Transfer between the sides of a drive in a steady turn, beside what is asked for, less 1."""
     ahead, _, rate = drive.velocity()[-1]
-    return float(transfer(drive)[1] / asked(drive, np.array([0.0, ahead * rate]))[1] - 1.0)
+    return float(transfer(drive)[1] / asked_moments(drive, np.array([0.0, ahead * rate]))[1] - 1.0)

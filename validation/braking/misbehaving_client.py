@@ -19,7 +19,7 @@ def frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int =
     return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def wrong(kind: str, number: int, link: socket.socket) -> None:
+def misbehave(kind: str, number: int, link: socket.socket) -> None:
     """Do it, and wait until the other end has had enough."""
     if kind == "died":
         os._exit(9)
@@ -53,7 +53,7 @@ def main(kind: str, port: str) -> None:
                 return
             number = struct.unpack_from("<I", asked, 4)[0]
             if number >= WELL:
-                wrong(kind, number, link)
+                misbehave(kind, number, link)
                 return
             link.sendall(frame(number))
 

@@ -12,7 +12,7 @@ from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
 from models.brake.plain import pressure as plain_pressure
 from models.brake.plain import road as plain_road
 from models.brake.plain import tyre as plain_tyre
-from models.brake.pressure import Air, Chambers, by_pressures, by_valves, still
+from models.brake.pressure import Air, Chambers, by_pressures, by_valves, resting_chambers
 from models.brake.surfaces import Road, Stretch, road
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked
@@ -39,7 +39,7 @@ def tables() -> Tables:
     return stacked([by_load(name) for name in ("dry", "wet", "ice")])
 
 
-def largest(compiled: np.ndarray, plain: np.ndarray) -> float:
+def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     """Largest difference (m, ...) by the largest size of each column; infinite where one side is no number."""
     scale = np.maximum(np.abs(plain).max(axis=0), 1e-300)
     apart = float(np.max(np.abs(compiled - plain) / scale))
@@ -95,7 +95,7 @@ def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray
         chambers = Chambers(
             0.15 * four, np.array([0.1, 0.1, 0.0, 0.2]), 8.0, four * [0.5, 0.4, 0.3, 0.6], 40.0, delay, 0.6 * four
         )
-        airs = still(chambers, 5.5e-3), still(chambers, 5.5e-3)
+        airs = resting_chambers(chambers, 5.5e-3), resting_chambers(chambers, 5.5e-3)
         pressures = plain_pressure.Pressures(chambers, brakes, 5.5e-3, airs[1])
         for n in range(samples):
             valves = random.choice([RELEASE, HOLD, APPLY, APPLY, SLOW], 4)
@@ -116,7 +116,7 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
     return np.concatenate((air.pressure, torques.ravel(), air.supply))
 
 
-def lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def slip_lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Lagging slips and what the step is given of them (count, 8), compiled and plain."""
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
     lags, plain = np.empty((2, count, 8))

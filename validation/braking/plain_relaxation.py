@@ -9,10 +9,10 @@ from models.brake.plane_vehicle import PAPER, truck
 from models.brake.pressure import Chambers
 from models.systems.braking.march import on_tyres
 from models.tyre.magic_formula import surface
-from validation.braking.sprung_box import GRADIENT, steady
-from validation.braking.truck_equations import turned
+from validation.braking.sprung_box import GRADIENT, steady_torques
+from validation.braking.truck_equations import braked_turn
 
-SPEED, UNTIL, STEER = 11.11, 9.0, 0.03
+FIRST_SPEED, LAST_SPEED, STEER = 11.11, 9.0, 0.03
 """Speeds (m/s) from which and to which the truck turns, and its steer angle (rad)."""
 
 
@@ -47,7 +47,7 @@ def turn_apart(length: float, substeps: int = 4) -> float:
     """Distance (m) by which a braked turn of the truck on tyres that relax over a length (m) ends from its written
     equations."""
     tyre, torques = surface("ice"), (300.0, 200.0)
-    end = turned(PAPER, tyre, STEER, torques, SPEED, UNTIL, length)
+    end = braked_turn(PAPER, tyre, STEER, torques, FIRST_SPEED, LAST_SPEED, length)
     path = on_tyres(
         truck(PAPER),
         [tyre],
@@ -56,6 +56,6 @@ def turn_apart(length: float, substeps: int = 4) -> float:
         steer=np.array([STEER, STEER, 0.0, 0.0]),
         substeps=substeps,
         relaxation=np.full(4, length),
-    ).run(steady(*np.repeat(torques, 2)), SPEED, end.time)
+    ).run(steady_torques(*np.repeat(torques, 2)), FIRST_SPEED, end.time)
     places = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])
     return float(np.hypot(*(places(end.time) - (end.x, end.y))))

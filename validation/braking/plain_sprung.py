@@ -11,7 +11,7 @@ from models.brake.controllers.slip import SlipBangBang
 from models.brake.plain.suspension import Suspension, WheelForces
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
-from models.brake.surfaces import EVEN, Stretch, road
+from models.brake.surfaces import UNIFORM_ROAD, Stretch, road
 from models.engines.braking_sprung import OnSprings
 from models.engines.braking_sprung_plain import PlainOnSprings
 from models.systems.braking.march import Braked, BrakingPath, on_tyres
@@ -20,7 +20,7 @@ from models.tyre.magic_formula import surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.compiled_brakes import in_engine, wheel_forces_in
-from validation.braking.sprung_box import SPIN, car, steady
+from validation.braking.sprung_box import SPIN, car, steady_torques
 from validation.spatial.cars import twin
 from validation.spatial.trains import caravan, train
 
@@ -38,7 +38,7 @@ def asymmetric() -> Sprung:
 
 
 @cache
-def bent() -> Sprung:
+def car_with_stops() -> Sprung:
     """The car with stops and dry friction at its wheels, and dampers in its tyres."""
     stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
     damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
@@ -70,9 +70,9 @@ def compiled_springs() -> Sprung:
     return sprung(train(), SPIN, forces="compiled")
 
 
-VEHICLES = {"car": car, "twin": asymmetric, "bent": bent}
+VEHICLES = {"car": car, "twin": asymmetric, "bent": car_with_stops}
 TRAINS = {"caravan": towing, "train": in_row, "compiled train": compiled_springs}
-EVERY = {**VEHICLES, **TRAINS}
+EVERY_VEHICLE = {**VEHICLES, **TRAINS}
 
 
 def wheels_of(vehicle: Sprung) -> int:
@@ -98,7 +98,7 @@ def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray,
 @cache
 def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
     """(count, n) by plain code."""
-    suspension = Suspension(EVERY[vehicle]())
+    suspension = Suspension(EVERY_VEHICLE[vehicle]())
     both, kept = states(suspension.size, count, len(suspension.tyres))
     return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
 
@@ -114,7 +114,7 @@ def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarr
     return computed
 
 
-def apart(compiled: np.ndarray, plain: np.ndarray) -> float:
+def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     """Largest difference by the largest acceleration of each state; infinite where one is no number."""
     off = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
     return off if np.isfinite(off) else np.inf
@@ -145,7 +145,7 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
 
 def controller(valves: bool, wheels: int = 4) -> Controller:
     """Valves that a slip controller sets, or pressures that stay."""
-    return SlipBangBang(wheels=wheels) if valves else steady(*wheels * (4e4,))
+    return SlipBangBang(wheels=wheels) if valves else steady_torques(*wheels * (4e4,))
 
 
 def run(
@@ -160,7 +160,7 @@ def plain_run(
     vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
     """``run`` by plain code."""
-    return run(EVERY[vehicle](), "reference", duration, valves, speed, lags)
+    return run(EVERY_VEHICLE[vehicle](), "reference", duration, valves, speed, lags)
 
 
 def paths_apart(first: BrakingPath, other: BrakingPath) -> float:
@@ -179,7 +179,7 @@ def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np
     rows = []
     for engine in ("mujoco", "reference"):
         on_suspension = vehicle_on(vehicle, engine, False)
-        turn = steady_turn(replace(on_suspension, road=EVEN), speed, radius)
+        turn = steady_turn(replace(on_suspension, road=UNIFORM_ROAD), speed, radius)
         if turn is None:
             rows.append(np.full(2 * wheels_of(vehicle) + 2 * vehicle.size, np.nan))
         else:

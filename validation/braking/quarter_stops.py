@@ -14,18 +14,18 @@ from scipy.integrate import solve_ivp
 
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import Quarter, QuarterStop, braked
-from models.brake.surfaces import EVEN
+from models.brake.surfaces import UNIFORM_ROAD
 from models.machine.compiled import njit
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked
 
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)
-SLOWEST = 1e-6
+SLOWEST_SPEED = 1e-6
 """Speed (m/s) below which slip is taken at this one."""
-SETTLED = 1e-11
+SETTLED_RATE = 1e-11
 """Rate of the slip by that of the start at which it has settled."""
-PATIENCE = 3.0
+LONGEST_TIME_RATIO = 3.0
 
 
 class Numbers(NamedTuple):
@@ -54,7 +54,7 @@ class Change(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def force_at(u, w, quarter, curve):
     """Force (N) and slip of a wheel (rad/s) whose centre has a speed (m/s)."""
-    u, mu = max(u, SLOWEST), curve.mu
+    u, mu = max(u, SLOWEST_SPEED), curve.mu
     slip = (u - quarter.radius * w) / u
     cell, share = cell_and_share(curve.slips, min(abs(slip), 1.0))
     return math.copysign(quarter.mass * GRAVITY * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
@@ -74,7 +74,7 @@ def literal(u, w, torque, quarter, curve, step):
     mass, radius, inertia = quarter
     force, slip = force_at(u, w, quarter, curve)
     secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * curve.mu[1] / curve.slips[1]
-    decay = secant * radius * radius / (inertia * max(u, SLOWEST))
+    decay = secant * radius * radius / (inertia * max(u, SLOWEST_SPEED))
     settled = (u - torque * u / (radius * secant)) / radius if secant > 0.0 else w - torque / inertia * step
     return u - step * force / mass, max(settled + (w - settled) * math.exp(-decay * step), 0.0)
 
@@ -114,7 +114,7 @@ def march(scheme, u, w, torques, quarter, road, step):
     return x, -1, u
 
 
-def marched(
+def marched_quarter(
     scheme: int, quarter: Quarter, torques: np.ndarray, road: Change, speed: float, step: float
 ) -> tuple[float, int, float]:
     """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
@@ -128,16 +128,18 @@ def stopped(
 ) -> tuple[float, float]:
     """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from rolling at a speed (m/s).
 
-    A scheme may chatter or creep for ever. After PATIENCE times the time that the torque alone would take, the way
-    until then is given, with the speed (m/s) that is left, else 0.
+    A scheme may chatter or creep for ever. After LONGEST_TIME_RATIO times the time that the torque alone would take,
+    the way until then is given, with the speed (m/s) that is left, else 0.
     """
-    most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))
+    most = int(LONGEST_TIME_RATIO * speed * quarter.mass * quarter.radius / (torque * step))
     curve = Curve(tyre.slips, tyre.mu_x[0, 0])
-    way, _, left = marched(SCHEMES.index(scheme), quarter, np.full(most + 1, torque), Change(curve, curve), speed, step)
+    way, _, left = marched_quarter(
+        SCHEMES.index(scheme), quarter, np.full(most + 1, torque), Change(curve, curve), speed, step
+    )
     return way, left
 
 
-def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
+def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
     """Stopping distance (m) from rolling under a constant torque (N m), to 1e-9 of it.
 
     In the variable q with dt = u dq the slip has an equation of its own, s' = -(r^2 / J) (F - T / r) - (1 - s) F / m,
@@ -152,7 +154,7 @@ def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> flo
         return [-(r * r / inertia) * (force - torque / r) - (1.0 - y[0]) * force / m, -force / m, math.exp(2.0 * y[1])]
 
     def settled(q: float, y: np.ndarray) -> float:
-        return float(min(rates_in(q, y)[0] / (r * torque / inertia) - SETTLED, 1.0 - y[0]))
+        return float(min(rates_in(q, y)[0] / (r * torque / inertia) - SETTLED_RATE, 1.0 - y[0]))
 
     settled.terminal = True  # type: ignore[attr-defined]
     part = solve_ivp(
@@ -169,13 +171,13 @@ STEP = 5.5e-3
 
 
 @cache
-def met(on: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
+def friction_table(on: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
     """Table of a surface, as it is and for compiled functions."""
     tyre = surface(on, scale)
     return tyre, stacked([tyre])
 
 
-def steady(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
+def steady_torque(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
     """Force (N) at a slip and the torque (N m) under which it stays."""
     force = quarter.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return force, quarter.steady_torque(slip, force)
@@ -193,4 +195,4 @@ def stop(
     """Braked by a constant torque (N m) for more than it takes at the least of both forces, and ``after`` (s)."""
     least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
-    return braked(quarter, tyre[1], EVEN, np.full(steps + 1, torque), step, speed, turning)
+    return braked(quarter, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, turning)

@@ -19,7 +19,7 @@ from models.systems.braking.march import on_tyres
 from models.tyre.magic_formula import SURFACES, surface
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
-SLOWEST = 0.06
+LAST_SPEED = 0.06
 """Speed (m/s) at which the reference ends, above what one sample takes; the rest of its way is that of sliding."""
 Stretches = Sequence[tuple[float, Callable[[float], float]]]
 """Stretches of a road: where each begins (m), and mu by the slip."""
@@ -51,7 +51,7 @@ def tight_distance(
 ) -> float:
     """Stopping distance (m) by the reference on a road of stretches; method : of scipy."""
     y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
-    while y[1] > SLOWEST:
+    while y[1] > LAST_SPEED:
         given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
         valve = int(np.asarray(controller.sample(given).valves)[0])
         law = _law(pressure, torque, valve, brake)

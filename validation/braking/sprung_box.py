@@ -85,7 +85,7 @@ def constant(mu: float) -> TyreTable:
     return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * aside[:, None])
 
 
-def steady(*torques: float) -> Pressures:
+def steady_torques(*torques: float) -> Pressures:
     """Torques (W,) in N m of the brakes of ``braked``, which stay."""
     return Pressures(np.array(torques) / GRADIENT)
 

@@ -17,11 +17,11 @@ from models.multibody.numbers import Handling
 from models.systems.braking.march import BrakingPath
 from models.vehicles.spatial import SpatialVehicle, hitch_of
 from validation.braking.plain_sprung import towing
-from validation.braking.sprung_box import LOCKS, SPIN, braked, constant, steady
+from validation.braking.sprung_box import LOCKS, SPIN, braked, constant, steady_torques
 
 SLIPPERY, GRIP = 0.05, 0.1
 """Friction under wheels that all lock, and under those of a caravan that brakes alone."""
-SETTLED = 0.4
+SETTLED_SHARE = 0.4
 """Share of a stop over whose end a deceleration and loads are taken: springs and hitch are at rest before."""
 
 
@@ -37,7 +37,7 @@ class Pulled:
 
 def locked_stop(speed: float = 1.5) -> tuple[float, float]:
     """Way (m) of a stop from a speed (m/s) with all wheels locked, and that by friction alone, v^2 / (2 mu g)."""
-    path = braked(towing(), constant(SLIPPERY)).run(steady(*6 * (LOCKS,)), speed)
+    path = braked(towing(), constant(SLIPPERY)).run(steady_torques(*6 * (LOCKS,)), speed)
     return float(path.states[-1, 0, 0]), speed**2 / (2.0 * SLIPPERY * GRAVITY)
 
 
@@ -75,8 +75,8 @@ def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4
     vehicle = towing() if change is None else towing.__wrapped__()
     if change is not None:
         change(vehicle.handling)
-    path = braked(vehicle, constant(GRIP)).run(steady(0.0, 0.0, 0.0, 0.0, LOCKS, LOCKS), 8.0, duration)
-    late = slice(-int(SETTLED * len(path.times)), None)
+    path = braked(vehicle, constant(GRIP)).run(steady_torques(0.0, 0.0, 0.0, 0.0, LOCKS, LOCKS), 8.0, duration)
+    late = slice(-int(SETTLED_SHARE * len(path.times)), None)
     times, speeds = path.times[late], path.states[late, 1, 0]
     slowing = float(speeds[0] - speeds[-1]) / float(times[-1] - times[0])
     load = float(path.reports.load[late, 4:].sum(axis=1).mean())
@@ -98,10 +98,10 @@ def hold_on_to_the_car(car: Handling) -> None:
 @cache
 def errors() -> Pulled:
     """A caravan that brakes alone, over its levers, less 1."""
-    return beside(pulled(), pulled_by_levers())
+    return relative_difference(pulled(), pulled_by_levers())
 
 
-def beside(run: Pulled, wanted: Pulled) -> Pulled:
+def relative_difference(run: Pulled, wanted: Pulled) -> Pulled:
     """Each of a run over what is wanted, less 1."""
     return Pulled(
         run.deceleration / wanted.deceleration - 1.0, run.load / wanted.load - 1.0, run.pull / wanted.pull - 1.0

@@ -13,7 +13,7 @@ from models.brake.plane_vehicle import GRAVITY, Truck
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import TyreTable
 
-TIGHT = 1e-9
+SOLVER_TOLERANCE = 1e-9
 
 
 class Turned(NamedTuple):
@@ -25,7 +25,7 @@ class Turned(NamedTuple):
     time: float
 
 
-def turned(
+def braked_turn(
     vehicle: Truck,
     tyre: TyreTable,
     steer: float,
@@ -48,7 +48,9 @@ def turned(
         return float(np.hypot(state[3], state[4]) - until)
 
     slow.terminal = True  # type: ignore[attr-defined]
-    solution = solve_ivp(equations, (0.0, 200.0), start, method="LSODA", rtol=TIGHT, atol=TIGHT, events=slow)
+    solution = solve_ivp(
+        equations, (0.0, 200.0), start, method="LSODA", rtol=SOLVER_TOLERANCE, atol=SOLVER_TOLERANCE, events=slow
+    )
     if not solution.success or not solution.t_events[0].size:
         raise RunFailed("written", "the vehicle does not slow down", float(solution.t[-1]))
     x, y, heading = solution.y_events[0][0][:3]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.core.scene_effects import module_of, names_of, without
-from models.core.systems import DEFAULT
+from models.core.systems import DEFAULT_SYSTEM
 from models.core.time_series import write_time_series
 from models.engines.model import Model
 from models.engines.protocol import build
@@ -32,13 +32,13 @@ FORCES = {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}}
 GUIDED = {"integrator": "GeneralizedAlpha"}
 """The one integrator of Exudyn that solves for a prescribed pitch; its neighbour without one takes it, too."""
 
-EFFECTS = names_of(DEFAULT)
+EFFECTS = names_of(DEFAULT_SYSTEM)
 
 
 def added_to(effect: str) -> dict[str, Any]:
     """Tables of the effects that one needs."""
-    module = module_of(DEFAULT, effect)
-    return {name: module_of(DEFAULT, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
+    module = module_of(DEFAULT_SYSTEM, effect)
+    return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
@@ -75,7 +75,7 @@ def model(bare: Scene, engine: str) -> Model:
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     """A scene without and with an effect."""
-    base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT, effect)
+    base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT_SYSTEM, effect)
     less = scene(base, steps, folder, guided)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
         return without(less, effect), less
@@ -95,7 +95,7 @@ def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
 
 def declared(effect: str, engine: str) -> dict[str, int]:
     """Changes of the counts that the effect's file declares."""
-    table = module_of(DEFAULT, effect).COUNTS
+    table = module_of(DEFAULT_SYSTEM, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 

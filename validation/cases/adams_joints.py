@@ -17,7 +17,7 @@ from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import joint_tree
 from validation.adams_joints.mechanism import Mechanism, read_mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction
-from validation.adams_joints.output_file import OutputFile, read_output, starts_alike
+from validation.adams_joints.output_file import OutputFile, read_output, starts_with_mechanism
 from validation.adams_joints.twin_model import examined
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
@@ -30,12 +30,12 @@ QUICK = ("Revolute", "Distance")
 MODELS = {"TranSpring": "TransSpring"}
 """Families whose model file has another name."""
 ENGINES = ("exudyn", "mujoco")
-STEP, EVERY, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
+STEP, STEPS_PER_ROW, DURATION, QUICK_DURATION = 5e-3, 2, 5.0, 1.0
 """s; steps for each row of the files."""
-FINER = 5
+JOINT_STEPS = 5
 """Steps of the joints in MJCF for each of the others: a free body's path in Exudyn on a spring errs by order 2 of its
 steps (5.7e-6 m by 5 ms over 5 s, 1.4e-6 m by 2.5 ms)."""
-PLACE, FORCE = 1e-5, 1e-4
+PLACE_BOUND, FORCE_BOUND = 1e-5, 1e-4
 """Bounds asked for: m, and share of the largest reaction, which is the weight where nothing larger acts."""
 TWINS = 1e-6
 """Of engines and reference, m and share: steps of 5 ms leave 3e-7 of both."""
@@ -43,9 +43,9 @@ LOSES = 1e-4
 """Share of the largest kinetic energy that a file's own motion may lose without friction."""
 WINDOW = 10
 """Rows of a file, a tenth of a second, after which a march from its own state is compared."""
-SAME = {"Spherical": 0.0, "Universal": 90.0}
+SHARED_FILES = {"Spherical": 0.0, "Universal": 90.0}
 """Families whose file is of the pendulum of Revolute's, and by how many degrees about z it is turned from that."""
-READ_OFF = 1.0
+READ_OFF_SECONDS = 1.0
 """s of a file from which a spring's constants are read off, where the model file describes another case."""
 
 
@@ -65,7 +65,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [*notes_rows(family, notes), *family_rows(family, mechanism, output, quick)]
         if mechanism.kind != "distance":
             rows += own_model_rows(family, mechanism, folder, 1.0 if quick else DURATION)
-        if family in SAME:
+        if family in SHARED_FILES:
             rows += _same_pendulum(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
@@ -83,13 +83,13 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     if not mechanism.springs:
         return mechanism, {}
     shift = output.columns["Pos"][0] - mechanism.centre
-    moved = mechanism if starts_alike(mechanism, output) else mechanism.moved(shift)
+    moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
     (spring,) = moved.springs
     travel, rate, law = _sprung(moved, output)
     told = spring.stiffness * (travel - spring.rest) + spring.damping * rate
-    if moved is mechanism and np.abs(told - law).max() <= FORCE * np.abs(law).max():
+    if moved is mechanism and np.abs(told - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
-    early = output.times <= READ_OFF
+    early = output.times <= READ_OFF_SECONDS
     parts = np.column_stack([travel, rate, np.ones(len(travel))])[early]
     stiffness, damping, held = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
     constants = {"stiffness": stiffness, "damping": damping, "rest": -held / stiffness}
@@ -119,7 +119,7 @@ def _angle(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def notes_rows(family: str, constants: dict[str, float]) -> list[Row]:
     """What was read off a file: its model file has another start or other constants."""
-    why = f"read off the first {READ_OFF:g} s of the output: the model file describes another case; calibrated"
+    why = f"read off the first {READ_OFF_SECONDS:g} s of the output: the model file describes another case; calibrated"
     units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
     return [
         Observed(_id(family, name), SYSTEM, f"{family}: {name} of the spring", value, units[name]).beside("-", why)
@@ -130,10 +130,10 @@ def notes_rows(family: str, constants: dict[str, float]) -> list[Row]:
 def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bool = False) -> list[Row]:
     """Rows of one model and its output: positions, reactions, reactions on the file's own motion, the twins."""
     duration = min(QUICK_DURATION if quick else DURATION, float(output.times[-1]))
-    motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, EVERY)
+    motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}
     tree = joint_tree(mechanism, motion)
-    runs |= {engine: tree.run(engine, duration, STEP, EVERY) for engine in ENGINES}
+    runs |= {engine: tree.run(engine, duration, STEP, STEPS_PER_ROW) for engine in ENGINES}
     rows = [_own_motion(family, mechanism, output)]
     for name, (path, pushed) in runs.items():
         rows += _against_file(family, name, mechanism, output, path, pushed)
@@ -146,7 +146,7 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
 
 def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
     """Rows of the joint in MJCF, as ``twinrig twin`` certifies it, and of its paths beside those of constraints."""
-    step, every = STEP / FINER, FINER * EVERY
+    step, every = STEP / JOINT_STEPS, JOINT_STEPS * STEPS_PER_ROW
     accelerations, paths = examined(mechanism, folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
@@ -182,7 +182,7 @@ def _own_motion(family: str, mechanism: Mechanism, output: OutputFile) -> Row:
     off = _reaction_difference(mechanism, output.reaction_of_motion(mechanism), output.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
     quantity = f"{family}: reaction on the file's own motion, by the largest"
-    return Observed(_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE, why, "published")
+    return Observed(_id(family, "own_motion"), SYSTEM, quantity, off, "").at_most(FORCE_BOUND, why, "published")
 
 
 def _against_file(
@@ -193,8 +193,14 @@ def _against_file(
     digits = output.rounding("Rforce")[:m], output.rounding("Rtorque")[:m]
     theirs = Reaction(output.columns["Rforce"][:m], output.columns["Rtorque"][:m])
     seen = (
-        ("position", "position of the centre", max(0.0, float(place.max())), "m", PLACE),
-        ("reaction", "reaction by the largest", _reaction_difference(mechanism, pushed, theirs, digits), "", FORCE),
+        ("position", "position of the centre", max(0.0, float(place.max())), "m", PLACE_BOUND),
+        (
+            "reaction",
+            "reaction by the largest",
+            _reaction_difference(mechanism, pushed, theirs, digits),
+            "",
+            FORCE_BOUND,
+        ),
     )
     lost = 0.0 if mechanism.springs else output.energy_lost(mechanism)
     rows = []
@@ -215,18 +221,18 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     What energy the file loses meanwhile, dE, changes its speed by dE / (m v), and its place by that for this time.
     """
     body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
-    starts = np.arange(0, round(duration / STEP / EVERY) - WINDOW, WINDOW)
-    ends = [body.marched(body.at_motion(theirs, k), WINDOW * EVERY, STEP)[:3] for k in starts.tolist()]
+    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW, WINDOW)
+    ends = [body.marched(body.at_motion(theirs, k), WINDOW * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
     digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW]
     off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW]) - digits).max(axis=1)
     _, whole = output.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
     fastest = np.maximum(speed[starts], speed[starts + WINDOW])
-    lost = np.abs(whole[starts + WINDOW] - whole[starts]) / (mechanism.mass * fastest) * (WINDOW * EVERY * STEP)
+    lost = np.abs(whole[starts + WINDOW] - whole[starts]) / (mechanism.mass * fastest) * (WINDOW * STEPS_PER_ROW * STEP)
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"
     left = max(0.0, float((off - lost).max()))
-    return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE, why, "published")
+    return Observed(_id(family, "window"), SYSTEM, quantity, left, "m").at_most(PLACE_BOUND, why, "published")
 
 
 def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolute: Path) -> list[Row]:
@@ -235,21 +241,22 @@ def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolu
     A body that starts at rest on a ball or a cross swings in a plane. Mass, arm and moment of inertia are those of the
     Revolute case: the other code's files of one motion must agree with one another, too.
     """
-    hinge, back = read_output(revolute), Rotation.from_euler("z", -SAME[family], degrees=True)
-    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, EVERY)
+    hinge, back = read_output(revolute), Rotation.from_euler("z", -SHARED_FILES[family], degrees=True)
+    motion, reaction = ConstrainedBody(mechanism).run(float(hinge.times[-1]), STEP, STEPS_PER_ROW)
     place, force = hinge.columns["Pos"], hinge.columns["Rforce"]
     off = float((np.abs(back.apply(motion.place) - place) - hinge.rounding("Pos")).max())
     pushed = float((np.abs(back.apply(reaction.force) - force) - hinge.rounding("Rforce")).max())
     files = np.abs(back.apply(output.columns["Pos"]) - place).max(axis=1)
-    since = output.times[np.argmax(files > PLACE)]
+    since = output.times[np.argmax(files > PLACE_BOUND)]
     why = "the same pendulum on a hinge by the other code, in a file that keeps its energy; the bound asked for"
     hinged = f"{family}: %s beside the other code's file of the same pendulum on a hinge, reference"
     both = (
-        f"{family}: largest distance of the other code's files of one pendulum, above {PLACE:g} m from {since:.2f} s on"
+        f"{family}: largest distance of the other code's files of one pendulum, "
+        f"above {PLACE_BOUND:g} m from {since:.2f} s on"
     )
     return [
         Observed(_id(family, "hinge"), SYSTEM, hinged % "position", max(0.0, off), "m").at_most(
-            PLACE, why, "published"
+            PLACE_BOUND, why, "published"
         ),
         Observed(
             _id(family, "hinge_force"),
@@ -257,9 +264,9 @@ def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolu
             hinged % "force by the largest",
             max(0.0, pushed) / float(np.abs(force).max()),
             "",
-        ).at_most(FORCE, why, "published"),
+        ).at_most(FORCE_BOUND, why, "published"),
         Observed(_id(family, "files"), SYSTEM, both, float(files.max()), "m").beside(
-            PLACE, "one motion: what is left is the error of the file that loses energy", "published"
+            PLACE_BOUND, "one motion: what is left is the error of the file that loses energy", "published"
         ),
     ]
 

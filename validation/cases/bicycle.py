@@ -26,7 +26,7 @@ SPEED = 5.0
 """m/s of the eigenvalues on tyres."""
 FEEDBACK = Control(gain=2.0)
 """Of the measured bicycle."""
-FROM = 2.0
+LOWEST_JUDGED_SPEED = 2.0
 """m/s from which on damping is judged with nothing fitted."""
 FAULT = 1.001
 """Factor of a planted fault."""
@@ -197,7 +197,11 @@ def _unfitted_rows(bicycle: Whipple, seen: Observation) -> list[Row]:
         "",
     )
     why = "parameters and feedback as published, no number fitted"
-    judged = damping.at_most(0.1, why, "measured") if seen.speed >= FROM else damping.beside(0.0, why, "measured")
+    judged = (
+        damping.at_most(0.1, why, "measured")
+        if seen.speed >= LOWEST_JUDGED_SPEED
+        else damping.beside(0.0, why, "measured")
+    )
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 

@@ -13,7 +13,7 @@ from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle, sampled
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
-from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
+from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, resting_chambers
 from models.systems.braking.march import BrakingPath as Recorded
 from models.systems.braking.march import on_tyres
 from models.systems.braking.stop_report import Stop
@@ -27,7 +27,7 @@ TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
 SEED = 22
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
-WIDE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
+WIDE_BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
 PHASES = {
     "deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
     "shallow": FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0),
@@ -91,12 +91,12 @@ def loop_area(brake: Brake, low: float, high: float) -> float:
 
 def _loop_rows() -> list[Row]:
     worst, sense = 0.0, True
-    for brake in (WIDE, PAPER_FRONT):
+    for brake in (WIDE_BRAKE, PAPER_FRONT):
         for low in (0.0, 2.5):
             p, t = loop(brake, low, 4.5)
             worst = max(worst, abs(-np.trapezoid(t, p) / loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
-    rise = torques(np.linspace(0.0, 0.75, 100), of_wheels(WIDE))
+    rise = torques(np.linspace(0.0, 0.75, 100), of_wheels(WIDE_BRAKE))
     return [
         Observed(
             "braking_controllers.loop",
@@ -128,7 +128,7 @@ def _supply_row() -> Row:
     """Four strokes from a reservoir whose supply is cut: what the fifth still has."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
-    air, ends = still(chambers, SAMPLE), np.empty((5, 4))
+    air, ends = resting_chambers(chambers, SAMPLE), np.empty((5, 4))
     for stroke in range(5):
         for valve in (APPLY,) if stroke == 4 else (APPLY, RELEASE):
             for _ in range(500):

@@ -24,23 +24,23 @@ from validation.braking.braked_truck import (
     sideways_with_locked_front_wheels,
     transfer_errors,
 )
-from validation.braking.truck_equations import Turned, turned
+from validation.braking.truck_equations import Turned, braked_turn
 from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
-STEP, SPEED, UNTIL, STEER = 1e-3, 11.11, 0.5, 0.03
+STEP, SPEED, LAST_SPEED, STEER = 1e-3, 11.11, 0.5, 0.03
 TORQUES = (870.0, 580.0)
 """Of each front and each rear wheel (N m): the truck goes 60 m, and no wheel locks."""
-STIFF = 100.0
+STIFF_SLOPE = 100.0
 """Slope of the trailer's tyres (1/rad), towards wheels that only roll."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Turn by all means, mirror image, straight way, trailer; the quick share turns down to 10 m/s only."""
-    until = 10.0 if quick else UNTIL
+    until = 10.0 if quick else LAST_SPEED
     compiled = turn(until)
-    beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
+    beside = {"written out": braked_turn(PAPER, ICE, STEER, TORQUES, SPEED, until)}
     beside |= {name: turn(until, go=Carried(name, PLANE).advance) for name in ("exudyn", "mujoco")}
     rows = [
         Observed(
@@ -170,7 +170,9 @@ def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, durati
     """Error of tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L), relative to the angle."""
     n = round(duration / step)
     state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN.drawbar, 0.0]])
-    states, _ = follow(hooked(CHOSEN), rolling(STIFF), state, np.tile([v, 0.0], (n + 1, 1)), step, STIFF, np.zeros(4))
+    states, _ = follow(
+        hooked(CHOSEN), rolling(STIFF_SLOPE), state, np.tile([v, 0.0], (n + 1, 1)), step, STIFF_SLOPE, np.zeros(4)
+    )
     exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN.drawbar))
     return abs(float(states[-1, 0, 2] / exact - 1.0))
 
@@ -183,7 +185,7 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
     rear = np.sqrt(front**2 - CHOSEN.wheelbase**2)
     first = np.pi / 2.0 - np.arcsin(CHOSEN.drawbar / radius)
     state = np.array([[radius, 0.0, first, first - np.arcsin(CHOSEN.wheelbase / front)], [*hook[0], turn, turn]])
-    states, _ = follow(hooked(CHOSEN), rolling(STIFF), state, hook, step, STIFF, np.zeros(4))
+    states, _ = follow(hooked(CHOSEN), rolling(STIFF_SLOPE), state, hook, step, STIFF_SLOPE, np.zeros(4))
     x, y, drawbar, body = states[-1, 0]
     at = np.array([x, y]) - CHOSEN.drawbar * np.array([np.cos(drawbar), np.sin(drawbar)])
     behind = at - CHOSEN.wheelbase * np.array([np.cos(body), np.sin(body)])

@@ -14,7 +14,7 @@ from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
 from models.brake.controllers.slip import SlipPI
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.pressure import Chambers, by_valves, still
+from models.brake.pressure import Chambers, by_valves, resting_chambers
 from models.brake.trailer import CHOSEN
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.run import run
@@ -147,7 +147,7 @@ def _roll_rows() -> list[Row]:
 def _slow_apply_row() -> Row:
     """Pressure of a chamber that fills slowly, against its exponential."""
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
-    air, torques = still(chambers, 0.01), np.empty((5, 1))
+    air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
         by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINE), torques)
     return Observed(

@@ -13,7 +13,7 @@ from validation.common.rows import Observed, Row, System
 TITLE = "Braking beside the independent reference"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
-SHORT, LONG = 0.05, 1.0
+QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """s of a stop, in the quick share and in the full one."""
 LAWS = {
     "friction": (laws.frictions, 1e-12, "difference of the friction by stacked tables from each table on its nodes"),
@@ -32,7 +32,7 @@ LAWS = {
         1e-12,
         "difference of pressures, torques and supply along random commands from plain code",
     ),
-    "relaxation": (laws.lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
+    "relaxation": (laws.slip_lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
 }
 """Both sides at random states, the bound, and what it is."""
 WHY = "another algorithm in plain code; they differ by rounding"
@@ -45,15 +45,19 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [_law_row(name) for name in LAWS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
     rows += [_relaxing_row(), *(_turn_row(vehicle) for vehicle in vehicles)]
-    rows += [_stop_row(vehicle, engine, SHORT if quick else LONG) for vehicle in vehicles for engine in engines]
+    rows += [
+        _stop_row(vehicle, engine, QUICK_DURATION if quick else FULL_DURATION)
+        for vehicle in vehicles
+        for engine in engines
+    ]
     return rows, {}
 
 
 def _law_row(name: str) -> Row:
     both, bound, what = LAWS[name]
-    return Observed(f"braking_reference.{name}", SYSTEM, what, laws.largest(*both()), "by the largest").at_most(
-        bound, WHY, "native"
-    )
+    return Observed(
+        f"braking_reference.{name}", SYSTEM, what, laws.largest_difference(*both()), "by the largest"
+    ).at_most(bound, WHY, "native")
 
 
 def _acceleration_row(vehicle: str, engine: str) -> Row:
@@ -63,7 +67,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         SYSTEM,
         f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
         f"{whole.STATES} states of any heading",
-        whole.apart(accelerations, whole.plain_accelerations(vehicle)),
+        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
     ).at_most(1e-12, WHY, "native")
 

@@ -9,7 +9,7 @@ import numpy as np
 from models.systems.braking.march import BrakingPath as Run
 from models.tyre.magic_formula import surface
 from validation.braking import plain_sprung as whole
-from validation.braking.sprung_box import box, braked, car, steady
+from validation.braking.sprung_box import box, braked, car, steady_torques
 from validation.common.rows import Observed, Row, System
 
 TITLE = "Relaxing tyres on the suspension"
@@ -47,7 +47,7 @@ def rise_apart(engine: str, samples: int = 20) -> float:
     """The car at a speed whose front wheels are turned by a step: tan of the slip angle in the middle of each step."""
     slick = surface("wet").scaled(SLICK)
     vehicle = replace(braked(car(), slick, engine, STEER), relaxation=whole.LENGTHS)
-    path = vehicle.run(steady(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
+    path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
     ways = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
     risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
     return float(np.abs(risen - (1.0 - np.exp(-ways[:, None] / whole.LENGTHS[:2]))).max())
@@ -57,7 +57,7 @@ def turn(engine: str | None, length: float, stiffer: float | None = None, durati
     """A braked turn of the car, or of the box so many times as stiff, on tyres of a relaxation length (m), 0 for none;
     without an engine in the plane."""
     vehicle = car() if stiffer is None else box(stiffer, 0.01)
-    torques, substeps = steady(*TURNING), 2 if stiffer is None else 4
+    torques, substeps = steady_torques(*TURNING), 2 if stiffer is None else 4
     vehicle_on_tyres = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
     return replace(vehicle_on_tyres, relaxation=np.full(4, length) if length else None).run(torques, 10.0, duration)
 

@@ -9,9 +9,19 @@ import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import Quarter, QuarterStop, braked
-from models.brake.surfaces import EVEN
+from models.brake.surfaces import UNIFORM_ROAD
 from models.tyre.magic_formula import SURFACES
-from validation.braking.quarter_stops import FRONT, PATIENCE, SCHEMES, STEP, exact, met, steady, stop, stopped
+from validation.braking.quarter_stops import (
+    FRONT,
+    LONGEST_TIME_RATIO,
+    SCHEMES,
+    STEP,
+    exact_distance,
+    friction_table,
+    steady_torque,
+    stop,
+    stopped,
+)
 from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking to a stop"
@@ -39,28 +49,32 @@ FURTHER = {
 BOUND = 5e-4
 STEPS = {True: (STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, STEP, 1e-2, 2e-2)}
 """Steps (s) of the sweep, by ``quick``."""
-FINE = 5e-4
+FINE_STEP = 5e-4
 """Least of them (s) in the figure."""
-ASKED = ("dry", "wet", "snow", "ice")
+FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces of the sweep that take every level of the brake in every step."""
-LEVELS, SOME = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
+TORQUE_LEVELS, SOME_LEVELS = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
 """Torque of the brake by that of locking, and those of the other surfaces in steps below the paper's, which are many
 (and all that the quick share takes)."""
-SLOW = 0.5
+SLOW_SPEED = 0.5
 """Speed (m/s) of the sweep in steps below 1 ms, which are many."""
-AFTER = 2.0
+WATCHED_SECONDS = 2.0
 """Time (s) for which a vehicle that stands is watched."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the four headline cases, two steps, two surfaces."""
-    steps = tuple(step for step in STEPS[quick] if step >= FINE)
+    steps = tuple(step for step in STEPS[quick] if step >= FINE_STEP)
     curves = {name: _curve(*each, steps) for name, each in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
         rows += [_further_row(name, *each) for name, each in FURTHER.items()]
     rows += [
-        _sweep_row(("ice", "dry") if quick else tuple(SURFACES), LEVELS[SOME] if quick else LEVELS, STEPS[quick]),
+        _sweep_row(
+            ("ice", "dry") if quick else tuple(SURFACES),
+            TORQUE_LEVELS[SOME_LEVELS] if quick else TORQUE_LEVELS,
+            STEPS[quick],
+        ),
         _locked_row(),
         _release_row(),
         _friction_row(9 if quick else 25),
@@ -71,9 +85,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
     """Curves over the step, of our scheme and the others: error of the stopping distance and speed at which it still
     rolls."""
-    tyre, _ = both = met(name)
-    force, torque = steady(FRONT, tyre, slip)
-    true = exact(FRONT, tyre, torque, speed)
+    tyre, _ = both = friction_table(name)
+    force, torque = steady_torque(FRONT, tyre, slip)
+    true = exact_distance(FRONT, tyre, torque, speed)
     ways = {"ours": [(stop(FRONT, both, torque, speed, step).distance, 0.0) for step in steps]}
     ways |= {key: [stopped(key, FRONT, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
     steadily = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
@@ -107,7 +121,9 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
     for scheme, (error, left) in errors.items():
-        said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
+        said = (
+            f", and still rolls at {left:.2g} m/s in {LONGEST_TIME_RATIO:g} times the time of stopping" if left else ""
+        )
         rows.append(
             Observed(
                 f"{key}.{scheme.split()[-1].lower()}",
@@ -122,9 +138,9 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
 
 def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spin: float) -> Row:
     quarter = Quarter(mass=mass * FRONT.mass, radius=FRONT.radius, spin_inertia=spin * FRONT.spin_inertia)
-    tyre, _ = both = met(on)
-    torque = steady(quarter, tyre, slip)[1]
-    error = stop(quarter, both, torque, speed).distance / exact(quarter, tyre, torque, speed) - 1.0
+    tyre, _ = both = friction_table(on)
+    torque = steady_torque(quarter, tyre, slip)[1]
+    error = stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
     return Observed(
         f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
@@ -153,19 +169,20 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
 def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float, ...]) -> Row:
     wrong, runs = list[str](), 0
     for on, step in product(surfaces, steps):
-        tyre = met(on)
+        tyre = friction_table(on)
         lock = float(tyre[0].mu_x.max()) * FRONT.mass * GRAVITY * FRONT.radius
-        speed = 11.11 if step >= 1e-3 else SLOW
-        for level in levels if on in ASKED or step >= STEP else levels[SOME]:
-            faults = faults_of(stop(FRONT, tyre, level * lock, speed, step, AFTER), FRONT.radius, bool(level))
+        speed = 11.11 if step >= 1e-3 else SLOW_SPEED
+        for level in levels if on in FULL_SWEEP_SURFACES or step >= STEP else levels[SOME_LEVELS]:
+            faults = faults_of(stop(FRONT, tyre, level * lock, speed, step, WATCHED_SECONDS), FRONT.radius, bool(level))
             wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(faults)}"] if faults else []
             runs += 1
-    some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
-    some = "" if set(surfaces) <= set(ASKED) else some
+    some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(FULL_SWEEP_SURFACES)} all)"
+    some = "" if set(surfaces) <= set(FULL_SWEEP_SURFACES) else some
     what = (
-        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
+        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_SPEED:g}: {len(surfaces)} surfaces, "
         f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
-        f"watched for {AFTER:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no stop, "
+        f"watched for {WATCHED_SECONDS:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no "
+        "stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs").within(
@@ -176,7 +193,7 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
 def _locked_row() -> Row:
     errors = []
     for on in SURFACES:
-        tyre = met(on)
+        tyre = friction_table(on)
         torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
         way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
         errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
@@ -193,10 +210,12 @@ def _locked_row() -> Row:
 def _release_row() -> Row:
     errors = []
     for on, step in product(SURFACES, (1e-3, STEP, 2e-2)):
-        tyre, tables = met(on)
+        tyre, tables = friction_table(on)
         sliding = FRONT.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT.radius
         times = step * np.arange(math.ceil(0.8 / step) + 1)
-        braked_stop = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
+        braked_stop = braked(
+            FRONT, tables, UNIFORM_ROAD, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0
+        )
         errors.append(abs(braked_stop.released - 0.5 * 0.8037))
     return Observed(
         "braking_stop.release",
@@ -210,7 +229,10 @@ def _release_row() -> Row:
 
 def _friction_row(levels: int) -> Row:
     torque = 3.0 * FRONT.mass * GRAVITY * FRONT.radius
-    ways = [stop(FRONT, met("ice", float(scale)), torque, 11.11).distance for scale in np.geomspace(0.3, 8.0, levels)]
+    ways = [
+        stop(FRONT, friction_table("ice", float(scale)), torque, 11.11).distance
+        for scale in np.geomspace(0.3, 8.0, levels)
+    ]
     return Observed(
         "braking_stop.friction",
         SYSTEM,
@@ -227,16 +249,19 @@ def tables(data: dict[str, Any]) -> list[Table]:
         for case, curve in data["curves"].items()
         for scheme, errors in curve["errors"].items()
     ]
-    note = f"In per cent of the exact distance. *: it does not stop in {PATIENCE:g} times its time; the way until then."
+    note = (
+        f"In per cent of the exact distance. *: it does not stop in {LONGEST_TIME_RATIO:g} times its time; "
+        "the way until then."
+    )
     heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
-    from models.drawing.figures import GREY, WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, GREY, heading, legend_below, subplots
 
-    figure, axes = subplots(2, 2, figsize=(WIDE, 5.8), sharex=True, sharey=True)
+    figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 5.8), sharex=True, sharey=True)
     milliseconds = 1e3 * np.array(data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
     for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):

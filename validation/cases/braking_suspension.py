@@ -15,12 +15,12 @@ from models.systems.braking.march import BrakingPath as Run
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable
-from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady
+from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady_torques
 from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking on the suspension"
 SYSTEM: System = "anti-lock"
-GENTLE, HARD = 0.05, 0.5
+GENTLE_FRICTION, HARD_FRICTION = 0.05, 0.5
 """Friction of locked wheels."""
 TURNING, HARDER = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
 """Torques (N m) of J-turns: no wheel locks."""
@@ -29,11 +29,11 @@ TURNING, HARDER = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Locked wheels, a J-turn and its mirror image; both engines, the stiff limit and ice in the full share."""
     wet = surface("wet")
-    turns = [braked(car(), wet, steer=steer).run(steady(*HARDER), 6.0) for steer in (0.1, -0.1)]
-    rows = [*_locked_rows(GENTLE), *_mirror_rows(*turns)]
+    turns = [braked(car(), wet, steer=steer).run(steady_torques(*HARDER), 6.0) for steer in (0.1, -0.1)]
+    rows = [*_locked_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
-        rows += [*_locked_rows(HARD), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet), _speed_row(wet)]
+        rows += [*_locked_rows(HARD_FRICTION), *_engine_rows(wet), *_ice_rows(), *_order_rows(wet), _speed_row(wet)]
         data["limit"] = limit(wet)
         rows += _limit_rows(data["limit"])
     return rows, data
@@ -44,7 +44,7 @@ def _locked_rows(mu: float) -> list[Row]:
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
         vehicle, place = braked(vehicle_kind, constant(mu)), f"{name}.{mu:g}"
-        path = vehicle.run(steady(*4 * (LOCKS,)), speed)
+        path = vehicle.run(steady_torques(*4 * (LOCKS,)), speed)
         way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
         gained = float(path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum())
@@ -68,7 +68,9 @@ def _locked_rows(mu: float) -> list[Row]:
                 f"relative difference of the {name}'s load transfer from m a h / L and the shift of its leaning weight",
                 abs(gained * plane.wheelbase / moment - 1.0),
                 "relative",
-            ).at_most(2e-2 if mu == HARD else 2e-3, "pitch takes the weight forwards, and wheels less", "closed form"),
+            ).at_most(
+                2e-2 if mu == HARD_FRICTION else 2e-3, "pitch takes the weight forwards, and wheels less", "closed form"
+            ),
             Observed(
                 f"braking_suspension.weight.{place}",
                 SYSTEM,
@@ -90,7 +92,7 @@ def _locked_rows(mu: float) -> list[Row]:
 
 
 def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
-    exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD else 2e-3
+    exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD_FRICTION else 2e-3
     return [
         Observed(
             f"braking_suspension.{what}.box.{mu:g}",
@@ -119,7 +121,7 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
 def _engine_rows(wet: TyreTable) -> list[Row]:
     """Rows of stops in both engines, in steps of 1 ms."""
     ends = [
-        braked(car(), wet, engine, 0.05, 1e-3).run(steady(*HARDER), 15.0).states[-1, 0, :2]
+        braked(car(), wet, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
     ]
     return [
@@ -134,7 +136,10 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
 
 
 def _order_rows(wet: TyreTable) -> list[Row]:
-    ways = [braked(car(), wet, steer=0.05, substeps=n).run(steady(*HARDER), 10.0).states[-1, 0, 0] for n in (1, 4, 16)]
+    ways = [
+        braked(car(), wet, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
+        for n in (1, 4, 16)
+    ]
     return [
         Observed(
             "braking_suspension.step",
@@ -217,7 +222,7 @@ def limit(tyre: TyreTable) -> list[list[float]]:
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)
         ends = [
-            braked(stiff_box, tyre, engine, 0.015, substeps=4).run(steady(*TURNING), 10.0).states[-1, 0, :2]
+            braked(stiff_box, tyre, engine, 0.015, substeps=4).run(steady_torques(*TURNING), 10.0).states[-1, 0, :2]
             for engine in ("mujoco", None)
         ]
         distances.append([stiffer, float(np.hypot(*(ends[1] - ends[0])))])

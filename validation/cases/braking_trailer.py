@@ -10,14 +10,14 @@ from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as train
-from validation.braking.sprung_box import braked, constant, steady
+from validation.braking.sprung_box import braked, constant, steady_torques
 from validation.common.rows import Observed, Row, System, behaves
 from validation.spatial.towing import keep_to_the_car, levers
 
 TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
-SHORT, LONG = 0.05, 1.0
+QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """s of a stop, in the quick share and in the full one."""
 STATICS = 1e-3
 """Of the closed form of a caravan that brakes alone, which knows no lean: pitched by 2.7 mrad its centre of mass, half
@@ -31,7 +31,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     vehicles, engines = (("caravan",), ENGINES[:1]) if quick else (tuple(whole.TRAINS), ENGINES)
     rows = [_levers_row()]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
-    rows += [_stop_row(vehicle, engine, SHORT if quick else LONG) for vehicle in vehicles[:2] for engine in engines]
+    rows += [
+        _stop_row(vehicle, engine, QUICK_DURATION if quick else FULL_DURATION)
+        for vehicle in vehicles[:2]
+        for engine in engines
+    ]
     if not quick:
         rows += [_locked_row(), *_alone_rows(), *_control_rows(), *_fault_rows()]
     return rows, {}
@@ -39,7 +43,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _levers_row() -> Row:
     car = whole.towing()
-    path = braked(car, constant(0.1)).run(steady(*6 * (0.0,)), 2.0, 0.05)
+    path = braked(car, constant(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
     front, rear, axle, _ = levers(car.handling)
     loads = path.reports.load[-1].reshape(3, 2).sum(axis=1)
     return Observed(
@@ -58,7 +62,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         SYSTEM,
         f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at {whole.STATES} states of "
         "any heading",
-        whole.apart(accelerations, whole.plain_accelerations(vehicle)),
+        whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
     ).at_most(1e-12, WHY, "native")
 
@@ -109,7 +113,9 @@ def _control_rows() -> list[Row]:
     """The slip controller of all six wheels on ice, beside wheels that lock."""
     ice, speed = surface("ice"), 11.11
     vehicle = braked(whole.towing(), ice, substeps=4, gradient=150.0)
-    controlled, locked = (Stop(vehicle.run(way, speed)) for way in (SlipBangBang(wheels=6), steady(*6 * (1e5,))))
+    controlled, locked = (
+        Stop(vehicle.run(way, speed)) for way in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
+    )
     ways = [stop.of_vehicle()["stopping distance [m]"] for stop in (controlled, locked)]
     return [
         Observed(
@@ -131,10 +137,10 @@ def _control_rows() -> list[Row]:
 
 def _fault_rows() -> list[Row]:
     """Faults that both engines share, planted in the table of their forces."""
-    held = train.beside(train.pulled(train.hold_on_to_the_car), train.pulled_by_levers())
+    held = train.relative_difference(train.pulled(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing.__wrapped__()
     keep_to_the_car(turned.handling)
-    apart = whole.apart(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
+    apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
     seen = {
         "brakes": ("brakes of the caravan hold on to the car, by the load of its axle", abs(held.load) > STATICS),
         "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),

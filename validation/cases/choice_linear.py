@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from models.advice.ride_choice.activity import activity
-from models.advice.ride_choice.choose import WORTH, Chooser, RideChoice
+from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, without
-from validation.choice.judged import asked, changes_by_frequency, measured_step, worst_nearby
+from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.drawn_rides import Drawn, drawn
@@ -26,10 +26,10 @@ DRAWS = 8
 """Random speeds and parameters at which a choice is looked at."""
 TOLERANCE = 0.02
 """Of every other scene; the others have their own, from 0.5 to 10 %."""
-FIRST = (2, 5)
+QUICK_SEEDS = (2, 5)
 """Seeds of the quick share, in both of which effects are left out."""
-PARTS = ("predicted", "confirmed")
-TOLD = (1e-4, 0.05)
+PREDICTED_CONFIRMED = ("predicted", "confirmed")
+JUDGED_CHANGES = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: larger than rounding could be blamed for, below 5 %."""
 
 
@@ -62,7 +62,7 @@ class Judged:
 
 def judged(scene: Drawn, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
-    chooser = asked(scene)
+    chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
     rest = whole.reduced(without(scene.scene, choice.left_out))
     two, deviation = Screen(whole.full, chooser.rows).identity(rest)
@@ -81,7 +81,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Forty scenes of random vehicles and ranges of speed, and the published pair; quick: two of the first and the
     pair.
     """
-    seeds = FIRST if quick else range(SCENES_DRAWN)
+    seeds = QUICK_SEEDS if quick else range(SCENES_DRAWN)
     choices = [
         judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE)
         for seed in seeds
@@ -131,8 +131,10 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
 
 def _prediction_row(choices: list[Judged]) -> Row:
     """Predicted by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
-    predicted, confirmed_ = (np.concatenate([getattr(each.choice, part) for each in choices]) for part in PARTS)
-    told = (abs(confirmed_) > TOLD[0]) & (abs(confirmed_) < TOLD[1])
+    predicted, confirmed_ = (
+        np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
+    )
+    told = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
     ratios = predicted[told] / confirmed_[told]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
     return Observed(
@@ -200,7 +202,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(each.saving < 1.0 + WORTH for each in saving)),
+            str(sum(each.saving < 1.0 + EQUAL_COST_LOG for each in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -340,10 +342,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import BLUE, VERMILION, WIDE, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
-    predicted, confirmed_ = (100 * abs(np.array([v for each in data["scenes"] for v in each[key]])) for key in PARTS)
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
+    predicted, confirmed_ = (
+        100 * abs(np.array([v for each in data["scenes"] for v in each[key]])) for key in PREDICTED_CONFIRMED
+    )
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color=BLUE, label="a quantity")
@@ -359,10 +363,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
-    return [(SAID, figure)]
+    return [(FIGURE_TEXT, figure)]
 
 
-SAID = (
+FIGURE_TEXT = (
     "Random scenes of vehicles, most with stiff bushings and light parts on stiff mounts: what saves calls is left out "
     "as far as the tolerance allows, predicted from one covariance and one adjoint solve of the whole scene, and "
     "confirmed by the exact solve of what is left, between the speeds and with parameters off."

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.advice.choice.choose import Chooser
 from models.advice.choice.variants import Variants
-from models.advice.ride_choice.in_time import FEWEST
+from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
@@ -25,15 +25,15 @@ ENGINES = {
     "ride": ("reference",),
 }
 """Implementations that take turns."""
-FRESH, AGAIN = 4, 77
+FRESH_COPIES_RATIO, FRESH_SEED = 4, 77
 """Rides are judged by so many times as many copies as they were chosen with, on roads of this seed."""
-NOISY, FINE = 4, 0.005
+NOISY_RIDE, FINE_TOLERANCE = 4, 0.005
 """A ride, and a tolerance for which its copies are too few if they are the fewest."""
 RESAMPLED, UNSURE = 4000, 0.0015
 """Of copies, to tell what they are sure of: this quantile is left below."""
 QUICK = (0, 2, 3)
 """Scenes of the pitch plane alone in the quick share, by both implementations."""
-TOLD = (1e-4, 0.05)
+JUDGED_CHANGES = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
 
 
@@ -48,7 +48,7 @@ def judged_ride(asked: Bent) -> JudgedByRuns:
     """Choose, and run the vehicle and what is left on roads that the choice has not seen."""
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
-    fresh = Variants(asked.opened(FRESH * COPIES, AGAIN), engine)
+    fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
     whole, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if whole is None or rest is None:
         return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
@@ -58,7 +58,7 @@ def judged_ride(asked: Bent) -> JudgedByRuns:
 
 def _least_certain_change(full: np.ndarray, reduced: np.ndarray) -> float:
     """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
-    picked = np.random.default_rng(AGAIN).integers(len(full), size=(RESAMPLED, len(full)))
+    picked = np.random.default_rng(FRESH_SEED).integers(len(full), size=(RESAMPLED, len(full)))
     changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full[picked].mean(axis=1)) - 1.0)
     return float(np.quantile(changes, UNSURE))
 
@@ -95,15 +95,16 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
 
 def _refused() -> Row:
     """A ride with few copies and a fine tolerance, which chance alone could break."""
-    asked, said = drawn_bent(NOISY), "a choice"
+    asked, said = drawn_bent(NOISY_RIDE), "a choice"
     try:
-        Chooser(asked.opened(FEWEST), ENGINES["ride"][0], list(asked.quantities), FINE).choose()
+        Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
     except InputError as error:
         said = "refused" if "samples would tell" in error.allowed else error.allowed
     return behaves(
         "choice_nonlinear.refused",
         SYSTEM,
-        f"choice for a ride of {FEWEST} copies at a tolerance of {100 * FINE:g} %, where chance may add more than that",
+        f"choice for a ride of {FEWEST_COPIES} copies at a tolerance of {100 * FINE_TOLERANCE:g} %, where chance may "
+        "add more than that",
         said,
         "refused",
         "and how many samples would tell",
@@ -113,7 +114,7 @@ def _refused() -> Row:
 def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is told from zero and below 5 %."""
     pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
-    return np.array([pair for pair in pairs if TOLD[0] < pair[1] < TOLD[1]]).reshape(-1, 2)
+    return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
 
 def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
@@ -204,9 +205,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import DARK, WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     for i, system in enumerate(data["systems"]):
@@ -236,10 +237,10 @@ def draw(data: Saved) -> Drawn:
     left.legend(loc="upper left")
     right.legend(loc="best")
     heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
-    return [(SAID, figure)]
+    return [(FIGURE_TEXT, figure)]
 
 
-SAID = (
+FIGURE_TEXT = (
     "Random scenes of half cars on roads, wheelsets, braked trucks and rides on bent springs: effects that the "
     "quantities can do without are left out and steps lengthened as far as the tolerance allows, predicted from runs "
     "without one and two effects in steps as long as hardly matters, and confirmed by the whole run."

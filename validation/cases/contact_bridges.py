@@ -41,9 +41,9 @@ EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS, SHOWN = 48, 6
+ROUNDS, FIGURE_ROUNDS = 48, 6
 """Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
-LEAST = 0.001
+SHORTEST_TURN = 0.001
 WHY = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
 
@@ -94,7 +94,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     setups = every()
     told = [each for each in setups if each.told]
     rows += _price_rows(Prices([*told, *(each.without for each in told)], ROUNDS))
-    shown = Prices(setups, SHOWN)
+    shown = Prices(setups, FIGURE_ROUNDS)
     return rows, {**data, "points": [shown.point(each) for each in setups]}
 
 
@@ -118,7 +118,7 @@ class Prices:
         kernels = sorted({(each.law, each.count) for each in setups if each.law is not None})
         runs, loops = [_job(each) for each in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST, clock=time.process_time)
+        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, SHORTEST_TURN, clock=time.process_time)
         whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {
             each: (a, b, steps - 1) for each, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)
@@ -297,7 +297,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
         "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
         "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
-        f"tell by itself, in {ROUNDS} rounds; here are {SHOWN} of all."
+        f"tell by itself, in {ROUNDS} rounds; here are {FIGURE_ROUNDS} of all."
     )
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple(

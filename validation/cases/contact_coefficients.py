@@ -215,9 +215,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Coefficients over the ratio of axes, and how far the library is from the exact theory."""
-    from models.drawing.figures import WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.9))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
     solved = np.array([row for part in data.values() for row in part])

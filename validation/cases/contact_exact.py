@@ -347,9 +347,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     x, traction = data["strip"]
     fine = np.linspace(-1, 1, 801)
     left.plot(fine, carter(fine, 1.0, 0.5), color="0.4", label="Carter")

@@ -17,7 +17,7 @@ SYSTEM: System = "contact"
 DIGITS = 60
 BOUND = 1e-10
 LOAD = 1e5
-PRESSURE, SHORT = Decimal(10) ** 9, Decimal(1) / 1000
+PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
 PAIR = Pair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
@@ -55,18 +55,18 @@ def ellipse(ratio: float) -> dict[str, Decimal]:
         g, modulus = Decimal(ratio), Decimal(PAIR.modulus)
         k, e = _complete(g)
         if ratio == 1.0:
-            flat = steep = _pi() * PRESSURE / (4 * SHORT * modulus)
+            flat = steep = _pi() * PRESSURE / (4 * SHORT_SEMI_AXIS * modulus)
         else:
-            scale = PRESSURE * g * g / (modulus * (1 - g * g) * SHORT)
+            scale = PRESSURE * g * g / (modulus * (1 - g * g) * SHORT_SEMI_AXIS)
             flat, steep = scale * (k - e), scale * (e / (g * g) - k)
         return {
-            "short": SHORT,
-            "long": SHORT / g,
+            "short": SHORT_SEMI_AXIS,
+            "long": SHORT_SEMI_AXIS / g,
             "p0": PRESSURE,
-            "approach": PRESSURE * SHORT * k / modulus,
+            "approach": PRESSURE * SHORT_SEMI_AXIS * k / modulus,
             "flat": flat,
             "steep": steep,
-            "load": 2 * _pi() * PRESSURE * SHORT**2 / (3 * g),
+            "load": 2 * _pi() * PRESSURE * SHORT_SEMI_AXIS**2 / (3 * g),
         }
 
 
@@ -212,9 +212,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Axes over the ratio of curvatures, and the error over the ratio of axes."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
     touching = by_load(curvature, 1.0, LOAD, Pair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.accuracy import BEST, remaining_errors, rolled
+from models.contact.accuracy import BEST_CHOICES, remaining_errors, rolled
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
-from models.systems.contact.cases_table import answer
+from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
-from validation.contact.contact_bands import FASTSIM, ROUNDING, SHARE, held, kept
-from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read, read_drawn, read_wide
+from validation.contact.contact_bands import FASTSIM, HELD_SHARE, ROUNDING, kept_shares, theory_errors
+from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read_contacts, read_drawn, read_wide
 from validation.contact.programs import compare, table
 
 TITLE = "Stated errors of rolling contact"
@@ -36,11 +36,11 @@ REPEATED = (
 """Cases of the set that are computed anew; a quick run takes the first two on coarser grids."""
 NETS = (7, 11, 21, 41)
 """Cells per strip whose stated errors are judged; a quick run takes 21 alone."""
-ALIKE: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
+JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
 """Choices of FASTSIM whose cells are judged, beside the best ones; a quick run takes the first alone."""
 REFERENCE = {True: 0.01, False: 0.005}
 """By mu N: the exact theory's own error on the grids of a quick and of a full run."""
-BEYOND = 0.06
+MISSED_SHARE = 0.06
 """Share of contacts of the set that a stated error may miss: the band's 5 % and a row or two."""
 MOMENTS = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
 """Mean error of the moment by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
@@ -56,7 +56,7 @@ ROWS, SEED = 100_000, 41
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Whether stated errors hold; in the full run also Kalker's two programs and a long table."""
-    cases = read()
+    cases = read_contacts()
     wide = read_wide(JUDGED)
     rows = _reference_rows(cases, quick) + _band_rows(cases, quick) + _total_rows(wide)
     rows += _moment_rows(cases, read_drawn(JUDGED), wide) + _cell_rows([*cases, *wide], quick)
@@ -89,13 +89,15 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     unseen, rows = read_drawn(JUDGED), []
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM, "simplified"]:
-        drawn = held(name, unseen)
+        drawn = theory_errors(name, unseen)
         for some, place, which, most in (
-            (held(name, cases), "", "of the set", BEYOND),
-            (drawn, "drawn.", "drawn", 1 - SHARE),
-            (drawn.of(against), "against.", "drawn with lateral creepage against spin", BEYOND),
+            (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
+            (drawn, "drawn.", "drawn", 1 - HELD_SHARE),
+            (drawn.of(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
         ):
-            for what, kind, within in zip(("force", "moment"), ("band", "moment"), kept(name, some), strict=True):
+            for what, kind, within in zip(
+                ("force", "moment"), ("band", "moment"), kept_shares(name, some), strict=True
+            ):
                 rows.append(
                     Observed(
                         f"contact_price.{place}{kind}.{name.replace(' ', '-')}",
@@ -105,7 +107,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
                         f"with the {what}",
                         1 - within,
                         "",
-                    ).at_most(most, f"the band is meant to hold {SHARE:.0%}", "native")
+                    ).at_most(most, f"the band is meant to hold {HELD_SHARE:.0%}", "native")
                 )
     return rows
 
@@ -114,7 +116,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     """Rows: stated errors of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
-        contact = case.contact(Fastsim, **BEST)
+        contact = case.contact(Fastsim, **BEST_CHOICES)
         answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
@@ -128,7 +130,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
             f"contacts of a/b 0.1 to 10 and Poisson's ratio {nu:g} whose {what} is off by more than is stated",
             float(beyond[ratios == nu, k].mean()),
             "",
-        ).at_most(1 - SHARE, "what users read: 95 % are covered", "native")
+        ).at_most(1 - HELD_SHARE, "what users read: 95 % are covered", "native")
         for k, what in enumerate(("force", "moment"))
         for nu in POISSON
     ]
@@ -146,7 +148,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list
     }
     for (bound, (mean, most)), (place, (some, words)) in product(MOMENTS.items(), sets.items()):
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
-        error = held(f"blended {bound}", some).moment_error * lever
+        error = theory_errors(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
             observed = Observed(
                 f"contact_price.mz.{bound}.{place}.{what.split()[0]}",
@@ -166,7 +168,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list
 def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     """The errors that the cells are said to leave, against those found on many cells."""
     rows, some = [], cases[::9] if quick else cases
-    for choices, cells in product(ALIKE[: 1 if quick else None], (21,) if quick else NETS):
+    for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else NETS):
         share = _shares_beyond_stated(some, cells, choices)
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
@@ -179,7 +181,7 @@ def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
                     f"whose error of the cells in the {what} is beyond the stated one",
                     value,
                     "",
-                ).at_most(1 - SHARE, "what users read: 95 % are covered", "native")
+                ).at_most(1 - HELD_SHARE, "what users read: 95 % are covered", "native")
             )
     return rows
 
@@ -188,7 +190,7 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
     answers = []
     for case in cases:
-        contact = case.contact(Fastsim, **{**BEST, **choices})
+        contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(
@@ -223,7 +225,7 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = answer(path, out, partial(Built, PAIR), Method())
+    answers = answer_table(path, out, partial(Built, PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

@@ -21,7 +21,7 @@ from validation.contact.contact_shapes import Shape, exact_normal
 TITLE = "Rolling contact of profiles: S1002 on UIC 60"
 SYSTEM: System = "contact"
 WHEEL_FILE, RAIL_FILE = "MBench_S1002_v3.prw", "MBench_UIC60_v3.prr"
-NEAR = 2e-5
+PROFILE_DISTANCE = 2e-5
 """Largest distance (m) of a built-in profile from the benchmark's."""
 SHIFTS = np.arange(0.0, 10.1, 0.5)
 QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
@@ -105,7 +105,7 @@ def _file_rows() -> list[Row]:
             f"largest distance of the built-in {name} from the benchmark's file",
             1e3 * value,
             "mm",
-        ).at_most(1e3 * NEAR, "the figure set for the built-in profiles", "published")
+        ).at_most(1e3 * PROFILE_DISTANCE, "the figure set for the built-in profiles", "published")
         for name, value in off.items()
     ]
 

@@ -35,7 +35,7 @@ from validation.contact.contact_shapes import (
 
 TITLE = "Rolling contact of any shape: the theory of 1983"
 SYSTEM: System = "contact"
-FULL = 36
+EXACT_CELLS = 36
 """Cells of the exact grid along each axis."""
 WAYS = {
     "elliptic": PLAIN,
@@ -108,7 +108,7 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
 def _against_exact(shape: Shape) -> dict[str, Any]:
     """Errors of every way, in shares of the exact figure and forces in % of mu N, and the exact figures."""
     contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
-    normal = exact_normal(shape, FULL, shape.box or _box_around(contacts["elliptic"]))
+    normal = exact_normal(shape, EXACT_CELLS, shape.box or _box_around(contacts["elliptic"]))
     motions = creepages(normal.area, shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
@@ -126,7 +126,7 @@ def _against_exact(shape: Shape) -> dict[str, Any]:
 
 def _approach_of(shape: Shape) -> dict[str, float]:
     """Errors of the approach with a net for each patch and with one for all, as shares."""
-    exact = exact_normal(shape, FULL, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
+    exact = exact_normal(shape, EXACT_CELLS, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
         name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
         for name, way in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
@@ -141,7 +141,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
         along = np.cos(min(part.patch.lean for part in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
-        error = pressed.approach * along / exact_placed(position, pressed, FULL).approach - 1.0
+        error = pressed.approach * along / exact_placed(position, pressed, EXACT_CELLS).approach - 1.0
         errors[name] = {"each": float(error), "one": np.nan}
     return errors
 
@@ -299,7 +299,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
         for way, errors in case["ways"].items()
     )
     note = (
-        f"Errors against the exact contact on {FULL} x {FULL} cells. Forces: mean and largest over five kinds of "
+        f"Errors against the exact contact on {EXACT_CELLS} x {EXACT_CELLS} cells. Forces: mean and largest over "
+        "five kinds of "
         "creepage at 0.5 and 2 times the linear scale. Paper: pressure proportional to the depth, to the letter; "
         "elliptic: to its root, the default; gradient: least squares of the slopes; one net: one W for all patches."
     )
@@ -368,10 +369,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Errors of the two pressure profiles by shape."""
     if "shapes" not in data:
         return []
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     shapes = data["shapes"]
-    figure, axes = subplots(1, 4, figsize=(WIDE, 4.2), sharey=True)
+    figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
     place = np.arange(len(shapes))
     for axis, (key, label) in zip(
         axes,

@@ -16,11 +16,11 @@ from validation.common.scenes import on_paper_road
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "six_runs.toml"
-ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
+FORCE_NOISE_ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Without the random models and all noise samples but one."""
 RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full report; the quick one has the study's own alone."""
-QUICK = (*ALONE, "run.duration=15")
+QUICK = (*FORCE_NOISE_ALONE, "run.duration=15")
 """Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
 
 FIGURES = (
@@ -144,7 +144,7 @@ def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Saved]:
 
 def _at_rate(rate: float) -> dict[str, float]:
     """Undisturbed drift-off (s) and largest enforced moment (N m) at one sampling rate, steps of 0.5 ms."""
-    scene = load(SCENE, (*ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))
+    scene = load(SCENE, (*FORCE_NOISE_ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))
     rows = _run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 

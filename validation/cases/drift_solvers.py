@@ -51,10 +51,10 @@ SOLVERS = (
 """Steps (s) of fixed-step methods, relative tolerances of adaptive ones. LSODA is Adams' and the BDF methods.
 
 DOPRI5 steps over the kinks of the samples, and rounding decides which of its steps it rejects: changes of the tolerance
-by 1e-9 of itself move its drift-off by 0.5 % at 1e-7, which is TIGHT, and by 0.02 % at 1e-8."""
-TIGHT, LOOSE = 0.005, 0.1
-"""Allowed difference of drift-off by that of the first solver; LOOSE is for tolerances of 1e-5 and above, whose own
-error is as large as that of the samples."""
+by 1e-9 of itself move its drift-off by 0.5 % at 1e-7, which is TIGHT_SHARE, and by 0.02 % at 1e-8."""
+TIGHT_SHARE, LOOSE_SHARE = 0.005, 0.1
+"""Allowed difference of drift-off by that of the first solver; LOOSE_SHARE is for tolerances of 1e-5 and above, whose
+own error is as large as that of the samples."""
 ADAPTIVE = ("DOP853", "LSODA", "Radau", "DOPRI5")
 NOISE, NOISY_RATE, NOISY = 30.7, 1000.0, 8.0
 """Noise (N) on the samples at this rate (Hz), and the length (s) of the runs that are smoothed or not."""
@@ -204,7 +204,7 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
                     "",
                 ).within(
                     1.0,
-                    LOOSE if each["value"] >= 1e-5 and each["method"] in ADAPTIVE else TIGHT,
+                    LOOSE_SHARE if each["value"] >= 1e-5 and each["method"] in ADAPTIVE else TIGHT_SHARE,
                     "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
                     "native",
                 )

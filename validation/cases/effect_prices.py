@@ -40,7 +40,7 @@ WRITTEN = {
 }
 DEAREST = 1.03
 """Ratio of the time of a bare scene to that of a hand-built model."""
-SHORT = 500
+TIMED_STEPS = 500
 """Steps of the runs whose seconds tell what an effect adds."""
 
 
@@ -264,13 +264,13 @@ def _choice() -> Row:
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
     """One line of the price list."""
-    seconds = interleave([_job(bare, engine) for bare in pair(effect, SHORT, folder)], rounds, 5e-3)
-    added = (seconds[1] - seconds[0]) / SHORT * 1e6
+    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], rounds, 5e-3)
+    added = (seconds[1] - seconds[0]) / TIMED_STEPS * 1e6
     return {
         "effect": effect,
         "engine": engine,
         "adds": changes(change(effect, engine, folder)) or "nothing",
-        "step": float(np.median(seconds[0])) / SHORT * 1e6,
+        "step": float(np.median(seconds[0])) / TIMED_STEPS * 1e6,
         "us": describe(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }

@@ -21,14 +21,14 @@ from validation.common.scenes import VEHICLES, drive, force_scene, on_paper_road
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
-DURATION, QUICK_DURATION, START, ROUGH = 4.0, 1.5, 1.0, 2.0
+DURATION, QUICK_DURATION, ABRUPT_START, ROUGH_FACTOR = 4.0, 1.5, 1.0, 2.0
 """Of a manoeuvre, in full and in quick, of an abrupt start whose ringing must not be most of the run, and of the study
 road (s)."""
 PERIOD = 1e-3
 STEP = 1e-3
 BOUND = 1e-4
 GUIDE = {"prescribed_pitch": {"file": "pitch.csv"}}
-BEST = {
+BEST_SETTINGS = {
     "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
     "mujoco": Settings("RK4", STEP, DURATION),
 }
@@ -91,7 +91,7 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
         true = truth(scene)
         if parameters == vehicles[0]:
             rows.append(_uncertainty(scene, true))
-        for engine, settings in BEST.items():
+        for engine, settings in BEST_SETTINGS.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
                 Observed(
@@ -125,12 +125,12 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
 def _ringing(folder: Path) -> CaseAnswer:
     """An abrupt start: error of the multiplier over the first 0.1 s with and without consistent accelerations."""
     manoeuvre(folder, "itwm_drift", abrupt=True)
-    scene = force_scene(folder, step=STEP, duration=START, interpolation="smooth", effects=GUIDE)
+    scene = force_scene(folder, step=STEP, duration=ABRUPT_START, interpolation="smooth", effects=GUIDE)
     true = truth(scene)
     first = slice(1, 101)
     paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
-        settings = Settings("GeneralizedAlpha", STEP, START, spectral_radius=radius)
+        settings = Settings("GeneralizedAlpha", STEP, ABRUPT_START, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
         consistent = moment(scene, "exudyn", settings) - true
         paths[f"consistent start, spectral radius {radius}"] = consistent[first].tolist()
@@ -172,14 +172,16 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
-    drive(folder, ROUGH + 0.1, PERIOD, PERIOD)
+    drive(folder, ROUGH_FACTOR + 0.1, PERIOD, PERIOD)
     paper = perturbed(PARAMETERS)
-    scene = force_scene(folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=paper, effects=GUIDE)
+    scene = force_scene(
+        folder, step=PERIOD, duration=ROUGH_FACTOR, interpolation="smooth", override=paper, effects=GUIDE
+    )
     true = truth(scene)
     table: list[list[Any]] = []
-    for engine, best in BEST.items():
+    for engine, best in BEST_SETTINGS.items():
         for step in steps:
-            settings = Settings(best.integrator, step, ROUGH, spectral_radius=best.spectral_radius)
+            settings = Settings(best.integrator, step, ROUGH_FACTOR, spectral_radius=best.spectral_radius)
             table.append([engine, best.integrator, step, relative(moment(scene, engine, settings)[20:], true[20:])])
     rows = [
         Observed(
@@ -194,7 +196,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
             "table shows the step that it takes",
             "native",
         )
-        for engine in BEST
+        for engine in BEST_SETTINGS
     ]
     return rows, table
 
@@ -214,9 +216,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Start-up ringing of the multiplier."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, axis = subplots(figsize=(WIDE, 3.2))
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))
     paths = data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)

@@ -17,6 +17,7 @@ from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
+from validation.common.peak_memory import peak_memory
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import drive, force_scene
 
@@ -26,9 +27,9 @@ SEED = 17
 DEVIATION = 35.0
 """Noise (N) on each sample: 0.2 % of the largest force on the study road."""
 STEP = 1e-3
-MANY, LONG = 10_000, 60.0
+LARGE_ENSEMBLE_PATHS, LARGE_ENSEMBLE_SECONDS = 10_000, 60.0
 """Paths and seconds of the large ensemble."""
-SOME = 200
+RECOMPUTED_PATHS = 200
 """Paths that are computed again by one worker, and by a run that is killed."""
 SECONDS, MEMORY = 120.0, 2e9
 """Targets of the large ensemble on two cores."""
@@ -36,28 +37,31 @@ STATE, MARKS = 8 * 8, 2 * 8
 """Bytes of a state that is kept, and of the times of drift-off and of failure of a path."""
 TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 """Times (s) of the table of spreads."""
-SAME = "the same bits"
+SAME_BITS = "the same bits"
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
-        forces, duration = Path(name), 1.0 if quick else LONG
+        forces, duration = Path(name), 1.0 if quick else LARGE_ENSEMBLE_SECONDS
         measured = drive(forces, duration, STEP, STEP)
         truth = measured["pitch"]
         scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
         if quick:
             return _quick(forces, scene, job, times), {}
-        large = _in_own_process(_large_ensemble, job, MANY, forces / "large")
+        large = _in_own_process(_large_ensemble, job, LARGE_ENSEMBLE_PATHS, forces / "large")
         paths = large.pop("found")
         rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
         with processes(2) as pool:
-            again, half = pool.submit(run_paths, job, SOME), pool.submit(_half_step_row, forces)
+            again, half = pool.submit(run_paths, job, RECOMPUTED_PATHS), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, paths, forces / "killed")
             rows += [
                 _same_row(
-                    "workers", f"{SOME} paths have the same bits with 1 worker and with 2", paths, again.result()
+                    "workers",
+                    f"{RECOMPUTED_PATHS} paths have the same bits with 1 worker and with 2",
+                    paths,
+                    again.result(),
                 ),
                 killed,
             ]
@@ -108,8 +112,8 @@ def _same_row(id: str, title: str, first: Arrays, other: Arrays) -> Row:
         f"ensemble.{id}",
         SYSTEM,
         title,
-        SAME if equal else "different bits",
-        SAME,
+        SAME_BITS if equal else "different bits",
+        SAME_BITS,
         "a sample belongs to seed, path and place alone",
         "shared kernel",
     )
@@ -139,12 +143,16 @@ def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     child.kill()
     child.join()
     kept = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
-    again = run_paths(job, SOME, blocks, blocks=Blocks(20))
-    if not kept or len(kept) == SOME // 20 or any(path.stat().st_mtime_ns != when for path, when in kept.items()):
+    again = run_paths(job, RECOMPUTED_PATHS, blocks, blocks=Blocks(20))
+    if (
+        not kept
+        or len(kept) == RECOMPUTED_PATHS // 20
+        or any(path.stat().st_mtime_ns != when for path, when in kept.items())
+    ):
         raise AssertionError(f"not killed half-way, or computed again: {len(kept)} blocks were kept")
     return _same_row(
         "resumed",
-        f"{SOME} paths, killed half-way and resumed: the kept blocks are not touched, the "
+        f"{RECOMPUTED_PATHS} paths, killed half-way and resumed: the kept blocks are not touched, the "
         "whole is compared with a run in one piece",
         paths,
         again,
@@ -152,7 +160,7 @@ def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
 
 
 def _run_slow_job(job: NoisePaths, blocks: Path) -> None:
-    run_paths(job, SOME, blocks, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
+    run_paths(job, RECOMPUTED_PATHS, blocks, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
 
 
 def _in_own_process(function: Callable[..., Any], *args: Any) -> Any:
@@ -172,7 +180,7 @@ def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
     kept = sum(values.nbytes for values in paths.values()) / len(paths["drift_off"])
-    most = 1024 * (parent.ru_maxrss + 2 * child.ru_maxrss)
+    most = peak_memory() + 2048 * child.ru_maxrss
     return {
         "found": paths,
         "seconds": seconds,
@@ -185,17 +193,24 @@ def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
 
 
 def _scale_rows(large: Saved) -> list[Row]:
-    what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
+    what = f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s at 1 kHz in the reference, 2 processes"
     share = f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores"
     counted = (
-        ("path-steps", "steps of all paths", float(large["path-steps"]), "", MANY * LONG / STEP, "a count"),
+        (
+            "path-steps",
+            "steps of all paths",
+            float(large["path-steps"]),
+            "",
+            LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP,
+            "a count",
+        ),
         ("failed", "paths that left all bounds", float(large["failed"]), "", 0.0, "a tumbling vehicle stays finite"),
         (
             "kept",
             "bytes of results, by paths",
             large["kept"],
             "byte",
-            STATE * (LONG + 1.0) + MARKS,
+            STATE * (LARGE_ENSEMBLE_SECONDS + 1.0) + MARKS,
             "a count: a state of eight numbers every second, and when it drifts off or fails",
         ),
     )
@@ -319,7 +334,10 @@ def tables(data: Saved) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
     if not data:
         return []
-    paths = f"{MANY:,} paths of {LONG:g} s, noise {DEVIATION:g} N at 1 kHz on the study road"
+    paths = (
+        f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s, noise {DEVIATION:g} N at 1 kHz "
+        "on the study road"
+    )
     spreads = tuple(
         (f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
         for when, pitch, e, heave, o in data["spreads"]
@@ -329,7 +347,8 @@ def tables(data: Saved) -> list[Table]:
         for level, value, low, high in data["quantiles"]
     )
     prices = tuple(
-        (way, f"{1e9 * price:,.0f}", f"{price * MANY * LONG / STEP / 60:,.1f}") for way, price in data["prices"].items()
+        (way, f"{1e9 * price:,.0f}", f"{price * LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP / 60:,.1f}")
+        for way, price in data["prices"].items()
     )
     return [
         Table(
@@ -346,7 +365,8 @@ def tables(data: Saved) -> list[Table]:
         ),
         Table(
             "Price of a path",
-            f"Wall time on two cores, once; the last column is {MANY:,} paths of {LONG:g} s.",
+            f"Wall time on two cores, once; the last column is {LARGE_ENSEMBLE_PATHS:,} paths of "
+            f"{LARGE_ENSEMBLE_SECONDS:g} s.",
             ("way", "per path and step [ns]", "all of them [min]"),
             prices,
         ),
@@ -358,14 +378,20 @@ def draw(data: Saved) -> Drawn:
     if not data:
         return []
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, WIDE, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, heading, subplots
 
-    figure, (fan, histogram) = subplots(1, 2, figsize=(WIDE, 3.6), width_ratios=(3, 2))
+    figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
     fan.legend(loc="lower right")
     histogram.stairs(data["counts"], data["edges"], fill=True, color=BLUE, alpha=0.6)
     histogram.set_title("Drift-offs: paths per half second [-]")
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")
-    heading(figure, f"One measured run, {MANY:,} samples of its noise: how far its pitch is off")
-    return [(f"{MANY:,} noise paths in the reference: how the pitch error spreads, and when paths drift off.", figure)]
+    heading(figure, f"One measured run, {LARGE_ENSEMBLE_PATHS:,} samples of its noise: how far its pitch is off")
+    return [
+        (
+            f"{LARGE_ENSEMBLE_PATHS:,} noise paths in the reference: how the pitch error spreads, and when paths "
+            "drift off.",
+            figure,
+        )
+    ]

@@ -15,10 +15,10 @@ from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
 from validation.common.rows import Observed, Row, System, Table
-from validation.contact.contact_bands import held
-from validation.contact.contact_set import JUDGED, read, read_drawn
+from validation.contact.contact_bands import theory_errors
+from validation.contact.contact_set import JUDGED, read_contacts, read_drawn
 from validation.contact.fastsim_speed import speed
-from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
+from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst_violation
 
 TITLE = "FASTSIM"
 SYSTEM: System = "contact"
@@ -47,14 +47,14 @@ UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
 Contacts = dict[str, Any]
 """Arrays by the names of the parameters of ``fastsim``."""
 CELLS = (11, 21, 41, 81)
-CONVERGED, FINE = 161, 321
+CONVERGED_CELLS, FINE_CELLS = 161, 321
 """Of the model beside the exact theory, and of what cells are measured by."""
-EXACT = (0.0, "exact in floating point")
+EXACT_TO_ROUNDING = (0.0, "exact in floating point")
 ALLOWED = {
-    "finite": EXACT,
-    "reversal": EXACT,
-    "zero": EXACT,
-    "similarity": EXACT,
+    "finite": EXACT_TO_ROUNDING,
+    "reversal": EXACT_TO_ROUNDING,
+    "zero": EXACT_TO_ROUNDING,
+    "similarity": EXACT_TO_ROUNDING,
     "power coarse": (1e-5, "a slender strip that sticks to its end, in the last half cell"),
 }
 WHY = "the same model with 321 cells per strip; a fifth of the model's own error"
@@ -106,7 +106,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     rows: list[Row] = []
     data: dict[str, Any] = {}
     for bound in POWERS:
-        truth = _vector(columns, cells=FINE, bound=bound)
+        truth = _vector(columns, cells=FINE_CELLS, bound=bound)
         for march in ("second-order", "plain"):
             errors = [np.hypot(*(_vector(columns, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
             data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
@@ -146,7 +146,7 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = OPTIONS[i % len(OPTIONS)]
-        for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
+        for name, value in worst_violation(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
     what = {
@@ -279,7 +279,7 @@ def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
 
 def _errors_on_random_contacts() -> list[Row]:
     """Error of the model on contacts drawn at random, on which nothing was calibrated."""
-    error = held("blended intermediate", read_drawn(JUDGED)).error
+    error = theory_errors("blended intermediate", read_drawn(JUDGED)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
     return [
         Observed(
@@ -295,10 +295,10 @@ def _errors_on_random_contacts() -> list[Row]:
 
 def _model() -> tuple[list[Row], list[list[Any]]]:
     """Error of the model at a converged grid against the exact theory, by every bound and kind of flexibility."""
-    table, known = list[list[Any]](), read()
+    table, known = list[list[Any]](), read_contacts()
     for bound in POWERS:
         for kind in KINDS_OF_FLEXIBILITY:
-            contacts = held(f"{kind} {bound}", known, CONVERGED)
+            contacts = theory_errors(f"{kind} {bound}", known, CONVERGED_CELLS)
             errors = contacts.error, contacts.moment_error
             table.append([bound, kind, *(float(value) for e in errors for value in (e.mean(), e.max()))])
     why = "exact theory with its cells' first order taken out, kept; the case of the price solves some of them anew"
@@ -319,7 +319,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         Table(
             "FASTSIM: error of the cells",
             "Mean / largest error of the force in % of mu N against "
-            f"{FINE} cells per strip, over all ellipses, kinds and levels of creepage.",
+            f"{FINE_CELLS} cells per strip, over all ellipses, kinds and levels of creepage.",
             ("bound, march", *(f"{n} cells" for n in CELLS)),
             rows,
         )
@@ -349,9 +349,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Largest error over the cells."""
-    from models.drawing.figures import WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
-    figure, axis = subplots(figsize=(WIDE, 4.4))
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))
     for i, (name, values) in enumerate(data["cells"].items()):
         axis.loglog(
             CELLS,

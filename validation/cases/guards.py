@@ -21,7 +21,7 @@ STEPS = (2e-3, 4e-3, 5e-3, 8e-3, 1e-2)
 DURATIONS = (0.04, 0.2, 2.0)
 QUICK_STEPS, QUICK_DURATIONS = STEPS[::2], DURATIONS[:2]
 """Steps and durations (s) of the runs at unstable steps, in full and in quick."""
-WRONG = 1.0
+WRONG_SHARE = 1.0
 """A complete run is silent if its error exceeds the motion itself: 100 % wrong and no word about it."""
 Runner = Callable[..., Any]
 
@@ -54,7 +54,7 @@ def road() -> Assembly:
 @cache
 def _tight_solution(duration: float) -> np.ndarray:
     """Tight solution at every millisecond."""
-    return setups.tight(road(), 1e-3, duration).states
+    return setups.tight_solution(road(), 1e-3, duration).states
 
 
 def unstable(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
@@ -76,7 +76,7 @@ def _word(engine: str, name: str, step: float, duration: float, runner: Runner) 
         return "raised"
     truth = _tight_solution(duration)[:: round(step / 1e-3)]
     share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
-    return "right" if share <= WRONG else "SILENT"
+    return "right" if share <= WRONG_SHARE else "SILENT"
 
 
 def not_a_number(engine: str) -> dict[str, str]:
@@ -86,7 +86,7 @@ def not_a_number(engine: str) -> dict[str, str]:
         for held in (True, False):
             forces = setups.static_forces(base, 102, 1e-3, held)
             forces.values[57, 0] = np.nan
-            attempt = partial(setups.run, engine, setups.driven(base, forces), 1e-3, 0.1, name)
+            attempt = partial(setups.run, engine, setups.driven_by_forces(base, forces), 1e-3, 0.1, name)
             endings[f"{name}, {'held' if held else 'linear'}"] = ending(attempt)
     return endings
 
@@ -138,7 +138,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _outside_rows() -> list[Row]:
     """Wrong integrators from outside the tree are told in every run; a right one passes."""
     silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
-    names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG)
+    names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG_ENGINES)
     return [
         Observed(
             "guards.outside.silent",

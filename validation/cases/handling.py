@@ -18,9 +18,9 @@ from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import energy, unaccounted
-from models.systems.handling.run import Drive, driven, driven_by
+from models.systems.handling.run import Drive, drive_run, driven_by
 from models.systems.handling.single_track import steady_turn
-from models.tyre.bristles import FIRST, brush, net, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
@@ -31,9 +31,9 @@ TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
 R19 = load_vehicle("r19_free")
 NO_DRAG = replace(R19, drags=())
-ALL = ("fl", "fr", "rl", "rr")
+WHEELS = ("fl", "fr", "rl", "rr")
 LANE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
-SMALL = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE.steer))
+SMALL_STEER = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE.steer))
 LEVEL, SEED, SPEED = 4e-6, 3, 25.0
 SLOPE, GENTLE = 0.1, 0.05
 ROUNDS = 60
@@ -47,7 +47,7 @@ def lane_change(**changes: Any) -> Handling:
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
     duration = 0.3 if quick else 1.0
-    drives = {engine: driven(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
+    drives = {engine: drive_run(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
     rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration), _threads_row()]
     if not quick:
         rows += [
@@ -119,7 +119,9 @@ def _power_row(drive: Drive) -> Row:
 def mirror_gap(handling: Handling, duration: float) -> float:
     """Largest difference between a step of steering to the left and the mirror image of one to the right."""
     left, right = (
-        driven("mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration)
+        drive_run(
+            "mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration
+        )
         for side in (1.0, -1.0)
     )
     return float(np.abs(left.run.positions - mirrored(handling, right.run.positions)).max())
@@ -143,7 +145,7 @@ def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 
     gain = steady_turn(handling, speed).yaw_gain
     if change is not None:
         change(handling)
-    return float(driven("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
+    return float(drive_run("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
 
 
 def _turn_rows() -> list[Row]:
@@ -164,8 +166,8 @@ def _turn_rows() -> list[Row]:
 
 def _stop_rows() -> list[Row]:
     mu, speed = 0.7, 15.0
-    handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=ALL))
-    drive = driven("mujoco", handling, speed, 2.0)
+    handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=WHEELS))
+    drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
     stopped = (speed**2 - ahead[-1] ** 2) / (2.0 * mu * GRAVITY)  # sliding friction alone
@@ -191,8 +193,8 @@ def _transfer_rows() -> list[Row]:
     """Rows: load transfer of the car and of a box on four springs, against the balance of all their bodies."""
     rows = []
     for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
-        braking = braked_error(driven("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
-        turn = turning_error(driven("mujoco", turning(vehicle, 2e-3), SPEED, 3.0))
+        braking = braked_error(drive_run("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
+        turn = turning_error(drive_run("mujoco", turning(vehicle, 2e-3), SPEED, 3.0))
         rows += [
             Observed(
                 f"handling.transfer.{name}",
@@ -214,8 +216,8 @@ def _transfer_rows() -> list[Row]:
 
 
 def _slope_row() -> Row:
-    handling = Handling(R19, Tyres(fixed=ALL), slope=SLOPE)
-    drive = driven("mujoco", handling, 0.0, 2.0, 1e-4)
+    handling = Handling(R19, Tyres(fixed=WHEELS), slope=SLOPE)
+    drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
     return Observed(
@@ -225,9 +227,11 @@ def _slope_row() -> Row:
 
 def _energy_rows() -> list[Row]:
     gaps = {}
-    for name, friction, controls in (("held", 20.0, SMALL), ("sliding", 0.9, LANE)):
+    for name, friction, controls in (("held", 20.0, SMALL_STEER), ("sliding", 0.9, LANE)):
         for step in (1e-3, 5e-4):
-            drive = driven("mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step)
+            drive = drive_run(
+                "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
+            )
             gaps[name, step] = float(np.abs(unaccounted(drive)).max())
     whole = energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
@@ -277,7 +281,7 @@ def _fault_rows() -> list[Row]:
         "bristles of front and rear swapped, by the steady turn": abs(turn_error(_swap_axles)) > 1e-3,
         "one wheel steered the other way, by the steady turn": abs(turn_error(_turn_wrong)) > 1e-3,
         "friction of one tyre 1e-6 off in one engine, by the engines": _gap(
-            driven("mujoco", rough, SPEED, 1.0), driven("exudyn", lane_change(), SPEED, 1.0)
+            drive_run("mujoco", rough, SPEED, 1.0), drive_run("exudyn", lane_change(), SPEED, 1.0)
         )
         > 1e-10,
     }
@@ -348,7 +352,7 @@ def _repeat_tyres(times: int) -> None:
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
-    contacts[:, FIRST:] = 2e-8
+    contacts[:, FIRST_FLEXIBILITY:] = 2e-8
     _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
 
 

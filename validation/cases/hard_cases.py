@@ -1,6 +1,6 @@
 """The table of hard cases: outcome of each implementation, and what an obvious build does instead.
 
-In full every case is run; the quick share runs the last of each family and every EVERY-th before it.
+In full every case is run; the quick share runs the last of each family and every QUICK_SPACING-th before it.
 """
 
 from collections import Counter
@@ -17,10 +17,10 @@ from validation.hard_cases.catalogue import COVERED, beyond
 
 TITLE = "Hard cases"
 SYSTEM: System = "hard-cases"
-LEAST = 80
+FEWEST_CASES = 80
 """Cases that there must be, without measurement files, which are many of a kind."""
 FILES = ("measured_files",)
-EVERY = 24
+QUICK_SPACING = 24
 
 
 @allowing("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
@@ -57,7 +57,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "hard.count",
             SYSTEM,
             "shortfall of the number of hard cases from 80, all measurement files counted once",
-            max(0, LEAST - counted - 1),
+            max(0, FEWEST_CASES - counted - 1),
             "cases",
         ).at_most(0.0, f"{counted} cases without measurement files", "none"),
     ]
@@ -65,9 +65,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def quick_cases(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
-    """The quick share: the last case of each family, and every EVERY-th before it."""
+    """The quick share: the last case of each family, and every QUICK_SPACING-th before it."""
     families = dict.fromkeys(family for family, _ in known)
-    return [pair for name in families for pair in [case for case in known if case[0] == name][::-EVERY]]
+    return [pair for name in families for pair in [case for case in known if case[0] == name][::-QUICK_SPACING]]
 
 
 def _row(case: Case, implementation: str, outcome: Outcome) -> Row:

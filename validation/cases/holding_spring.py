@@ -30,7 +30,7 @@ from validation.common.scenes import drive, force_scene, on_paper_road
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
-DURATION, STEP, HELD = 60.0, 1e-3, 0.2
+DURATION, STEP, HELD_PITCH = 60.0, 1e-3, 0.2
 """Length and step of the runs (s), pitch error of a run that is held (rad)."""
 NOISE = 30.7
 """N, on each sample at 1 kHz."""
@@ -50,7 +50,7 @@ class Setting:
 
 
 JUDGED = (Setting(0.0, False), Setting(0.3, False), Setting(0.7, False), Setting(0.7, True))
-TOLD = (Setting(1.0, False), Setting(0.0, True))
+TOLD_SETTINGS = (Setting(1.0, False), Setting(0.0, True))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     smallest: list[Any] = []
     if not quick:
         rows += [row for engine in ("exudyn", "mujoco") for row in _rows_of_limits(JUDGED[3], measured, engine)]
-        smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD)]
+        smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD_SETTINGS)]
         rows += [
             _found_row(i, name, stiffness, measured.predicted_stiffness) for i, (name, stiffness) in enumerate(smallest)
         ]
@@ -108,9 +108,9 @@ def _rows_of_limits(setting: Setting, measured: FreeRuns, engine: str) -> list[R
                 key,
                 SYSTEM,
                 f"spring of {factor} of the predicted {measured.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
-                "holds" if off <= HELD else "fails",
+                "holds" if off <= HELD_PITCH else "fails",
                 expected,
-                f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed",
+                f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD_PITCH} allowed",
                 "closed form",
             )
         )
@@ -120,11 +120,11 @@ def _rows_of_limits(setting: Setting, measured: FreeRuns, engine: str) -> list[R
 def _smallest(setting: Setting, measured: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
     low, high = 0.5 * measured.predicted_stiffness, 1.3 * measured.predicted_stiffness
-    if _error(setting, high, measured) > HELD:
+    if _error(setting, high, measured) > HELD_PITCH:
         return math.nan
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _error(setting, middle, measured) <= HELD else (middle, high)
+        low, high = (low, middle) if _error(setting, middle, measured) <= HELD_PITCH else (middle, high)
     return high
 
 
@@ -149,5 +149,5 @@ def tables(data: Saved) -> list[Table]:
         for name, stiffness in data["found"]
     )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
-    note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD} rad."
+    note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD_PITCH} rad."
     return [Table("Smallest holding stiffness", note, heads, rows)] if rows else []

@@ -23,13 +23,13 @@ from validation.hard_cases.prescribed_pitch import AsItComes
 TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
 STEP = 1e-3
-OFF, RATE_OFF = 1e-4, 1e-4
+START_ERROR, START_RATE_ERROR = 1e-4, 1e-4
 """Error of the start, rad and rad/s: what a measured start has, and what a long run's rounding adds up to."""
 ALPHA = 10.0
 """Baumgarte's rate, 1/s: slow beside a step of 1 ms, fast beside a run."""
 SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
 """Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
-SMOOTH = 5.0
+PITCH_BANDWIDTH = 5.0
 """Bandwidth (Hz) of the pitch that such a gyro gives."""
 HAND: dict[str, Saved] = {
     "index 1": {},
@@ -79,7 +79,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     with TemporaryDirectory() as name:
         files = _drive(Path(name), 0.2 if quick else 4.0)
         gaps, laws = _gaps(files), _laws(files)
-        walked = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files)  # from a start on the constraint
+        walked = _paths(files.guided("gyro.csv", bandwidth=PITCH_BANDWIDTH), files)  # from a start on the constraint
         loose = _unguided_pitch_errors(_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
         *_gap_rows(gaps, laws, files.duration),
@@ -117,10 +117,11 @@ def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
 
 
 def _gaps(files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus prescribed pitch (n,) by formulation, from a start that is off by OFF and RATE_OFF."""
+    """Pitch minus prescribed pitch (n,) by formulation, from a start that is off by START_ERROR and
+    START_RATE_ERROR."""
     guided = files.guided()
     start = guided.initial.copy()
-    start[[3, 7]] += OFF, RATE_OFF
+    start[[3, 7]] += START_ERROR, START_RATE_ERROR
     return _paths(replace(guided, initial=start), files)
 
 
@@ -143,23 +144,26 @@ def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
     """Gap (n,) in rad that a formulation must have after the wrong start, and why."""
     times = STEP * np.arange(len(files.pitch))
     return {
-        "index 1": (gap_law(times, OFF, RATE_OFF), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
-        "index 1, Baumgarte": (gap_law(times, OFF, RATE_OFF, ALPHA), "g'' + 2 alpha g' + alpha^2 g = 0"),
+        "index 1": (gap_law(times, START_ERROR, START_RATE_ERROR), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
+        "index 1, Baumgarte": (
+            gap_law(times, START_ERROR, START_RATE_ERROR, ALPHA),
+            "g'' + 2 alpha g' + alpha^2 g = 0",
+        ),
         "index 2": (
-            np.append(OFF, OFF + STEP / 2 * RATE_OFF + _quadrature(files)[1:]),
+            np.append(START_ERROR, START_ERROR + STEP / 2 * START_RATE_ERROR + _quadrature(files)[1:]),
             "g' = 0 keeps the error of the angle, and adds that of the trapezoidal rule over the rate",
         ),
     }
 
 
 def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str]], duration: float) -> list[Row]:
-    start = f"from a start off by {OFF:g} rad and {RATE_OFF:g} rad/s"
+    start = f"from a start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s"
     rows = [
         Observed(
             f"index_reduction.law.{_id(name)}",
             SYSTEM,
             f"{name}: difference of the gap {start} from its law",
-            float(np.abs(gaps[name] - law).max() / OFF),
+            float(np.abs(gaps[name] - law).max() / START_ERROR),
             "of the start's",
         ).at_most(1e-3, why, "closed form")
         for name, (law, why) in laws.items()
@@ -185,9 +189,9 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
             "index_reduction.gain",
             SYSTEM,
             f"index 1: ratio of the gap after {duration:g} s to the gap at the start",
-            float(gaps["index 1"][-1] / OFF),
+            float(gaps["index 1"][-1] / START_ERROR),
             "",
-        ).beside(1 + RATE_OFF / OFF * duration, "it never stops", "none")
+        ).beside(1 + START_RATE_ERROR / START_ERROR * duration, "it never stops", "none")
     )
     return [*rows, _index_two_refused()]
 
@@ -259,9 +263,9 @@ def _id(name: str) -> str:
 
 def draw(data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.6))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     for name, gap in data["gaps"].items():
         if max(map(abs, gap[1:])) > 1e-12:
             left.semilogy(data["times"], [abs(value) for value in gap], label=name)
@@ -269,7 +273,7 @@ def draw(data: Saved) -> Drawn:
         xlabel="time [s]",
         ylabel="|pitch - prescribed pitch| [rad]",
         ylim=(1e-9, None),
-        title=f"Start off by {OFF:g} rad and {RATE_OFF:g} rad/s",
+        title=f"Start off by {START_ERROR:g} rad and {START_RATE_ERROR:g} rad/s",
     )
     left.legend(title="projection, index 3, eliminated: 0", title_fontsize=8)
     for i, (name, error) in enumerate(data["loose"].items()):

@@ -31,7 +31,7 @@ from models.systems.pitch_plane.virtual_measurement import measure as measure_ro
 from validation.common.bands import mean_square
 from validation.common.rows import CaseAnswer, Observed, Row, System, not_run
 from validation.common.scenes import on_paper_road, road_scene
-from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
+from validation.drift.attitudes import SEED, START, cone, errors, largest_angle, standard_errors, turning
 from validation.drift.ten_minutes import DEVIATION, RATE, TEN_MINUTES
 from validation.drift.ten_minutes import draw as draw
 from validation.drift.ten_minutes import tables as tables
@@ -69,8 +69,10 @@ def _attitude_from_exact_rates() -> list[Row]:
     swept = "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error"
     order = "fourth order in the sampling period, without noise"
     return [
-        _closed_form_row("clean.axis", fixed, apart(held[-1], turned), "rad", "each step is the exact exponential"),
-        _closed_form_row("clean.cone", swept, apart(coned, true), "rad", order),
+        _closed_form_row(
+            "clean.axis", fixed, largest_angle(held[-1], turned), "rad", "each step is the exact exponential"
+        ),
+        _closed_form_row("clean.cone", swept, largest_angle(coned, true), "rad", order),
         _closed_form_row(
             "clean.norm", "largest departure of the quaternion's norm from 1", off, "", "normalised in each step"
         ),

@@ -43,7 +43,7 @@ CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for m
 STEPS = (40, 120)
 """Steps of the runs that are differenced."""
 BOUND = 1e-6
-PATIENCE = 900
+PROCESS_TIMEOUT = 900
 """Seconds until a process is given up."""
 ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
 
@@ -101,7 +101,7 @@ def _instructions(folder: Path) -> np.ndarray:
         instructions_run.__file__,
         json.dumps(march),
     ]
-    subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PATIENCE)
+    subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PROCESS_TIMEOUT)
     marches = len(CURVES) * len(STEPS)
     counts = [
         [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]

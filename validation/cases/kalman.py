@@ -16,7 +16,7 @@ from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Tab
 from validation.common.scenes import on_paper_road
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
-    COARSE,
+    COARSE_PERIOD,
     at_period,
     closed_loop,
     gyro_alone,
@@ -177,7 +177,7 @@ def _short_rows(folder: Path) -> list[Row]:
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     """Deviations of the errors of estimate and run against the discrete Lyapunov equation."""
-    force = at_period(35.0, COARSE)
+    force = at_period(35.0, COARSE_PERIOD)
     step, covariance = closed_loop(folder, force)
     errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
     squares = np.mean([np.mean(each**2, axis=0) for each in errors], axis=0)

@@ -33,7 +33,7 @@ from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"
 ENGINES = ("exudyn", "mujoco")
-ALL = ("reference", *ENGINES)
+IMPLEMENTATIONS = ("reference", *ENGINES)
 STATES = "m, rad, m/s, rad/s"
 START = {"z1": -0.3, "z2": -0.2, "z3": -0.4, "pitch": 0.05}
 """m, rad: both wheels in the air, one higher."""
@@ -101,7 +101,7 @@ def _accelerations(parameters: str) -> list[Row]:
 def _paths(parameters: str, duration: float) -> list[Row]:
     """Whole paths on the study road at the same step; the least load of any of them."""
     lifting = scene(parameters, duration=duration, step=5e-4, road=True)
-    runs = {engine: simulate(lifting, engine) for engine in ALL}
+    runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
         Observed(
             f"lift_off.path.{engine}.{parameters}",
@@ -143,7 +143,7 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
         lifting = scene(geometry="linear", duration=duration, override=override)
         assembly = assemble(lifting)
         exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
-        for engine in ALL:
+        for engine in IMPLEMENTATIONS:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
             rows.append(
@@ -187,7 +187,7 @@ def _order(halvings: int) -> Row:
 def _energy(duration: float) -> list[Row]:
     """Rows: energy that a bouncing vehicle gains, and that a vehicle without dampers loses."""
     rows = []
-    for engine in ALL:
+    for engine in IMPLEMENTATIONS:
         undamped = scene(duration=duration, override=UNDAMPED)
         states = simulate(undamped, engine).states
         energies = energy(assemble(undamped), states)
@@ -298,7 +298,7 @@ def _above_a_cut() -> list[Row]:
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
-    runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in ALL}
+    runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in IMPLEMENTATIONS}
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [

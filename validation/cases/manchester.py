@@ -18,17 +18,17 @@ from validation.common.scenes import data_folder
 from validation.contact.manchester_references import (
     CONTACT,
     SCENE,
-    apart,
     contact_of,
+    first_touch,
     on_one_plane,
+    patch_forces,
     placed_at,
-    searched,
     sums,
 )
 
 TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
-PLACE, FORCE = 0.3, 2.0
+PLACE_BOUND, FORCE_BOUND = 0.3, 2.0
 """Bounds asked for: mm and %."""
 QUICK = (1.0, 6.5)
 """Shifts (mm) of case A-2 in the quick share."""
@@ -88,10 +88,10 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"largest difference of the {wheel} wheel's mean place of contact",
             place,
             "mm",
-        ).at_most(PLACE, PUBLISHED, "published"),
+        ).at_most(PLACE_BOUND, PUBLISHED, "published"),
         Observed(
             f"manchester.forces.{wheel}", SYSTEM, f"largest difference of the {wheel} wheel's normal force", force, "%"
-        ).at_most(FORCE, PUBLISHED, "published"),
+        ).at_most(FORCE_BOUND, PUBLISHED, "published"),
         Observed(
             f"manchester.peaks.{wheel}",
             SYSTEM,
@@ -117,7 +117,7 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
     for position in placed:
         for sign, places in ((1.0, position.right), (-1.0, position.left)):
             for place in places:
-                y, u, angle = searched(contact.side, position, sign, place.wheel_y)
+                y, u, angle = first_touch(contact.side, position, sign, place.wheel_y)
                 gaps.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
     first, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
     mirror = max(
@@ -129,8 +129,8 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
     why = "search over points of the wheel's surface, straight between points of both profiles"
     asked, corner = f"{why}; the bound asked for", f"{why}, as far as an angle changes in 0.3 mm of the gauge corner"
     told = (
-        ("rail", "first touch on the rail, case A-1", "mm", PLACE, asked),
-        ("wheel", "first touch on the wheel, case A-1", "mm", PLACE, asked),
+        ("rail", "first touch on the rail, case A-1", "mm", PLACE_BOUND, asked),
+        ("wheel", "first touch on the wheel, case A-1", "mm", PLACE_BOUND, asked),
         ("angle", "angle there", "rad", 0.02, corner),
     )
     return [
@@ -174,7 +174,7 @@ def _split_rows(placed: Placed) -> list[Row]:
     forces = [place.normal for place in placed.right]
     total = sum(forces)
     contact = contact_of("A-2")
-    alone, (mean, _, plane) = apart(contact, placed), on_one_plane(contact, placed)
+    alone, (mean, _, plane) = patch_forces(contact, placed), on_one_plane(contact, placed)
     far = {
         name: 100.0 * max(abs(a - b) for a, b in zip(forces, other, strict=True)) / total
         for name, other in (("apart", alone), ("one plane", plane))
@@ -186,14 +186,14 @@ def _split_rows(placed: Placed) -> list[Row]:
             "error of the shares of two patches at 5 mm in the wheel's force",
             far["apart"],
             "%",
-        ).at_most(FORCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
+        ).at_most(FORCE_BOUND, "each on a half-space of its own that the other's resultant sinks", "closed form"),
         Observed(
             "manchester.split.plane",
             SYSTEM,
             "error of the shares of two patches at 5 mm on the same plane",
             far["one plane"],
             "%",
-        ).at_most(FORCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
+        ).at_most(FORCE_BOUND, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
         Observed("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm").beside(
             float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
         ),
@@ -217,7 +217,7 @@ def _load_row(static: list[Placed]) -> Row:
 
 def _file_rows(placed: list[Placed]) -> list[Row]:
     """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
-    names = {"places": ("mm", PLACE, 0), "forces": ("%", FORCE, 1)}
+    names = {"places": ("mm", PLACE_BOUND, 0), "forces": ("%", FORCE_BOUND, 1)}
     words = "difference between built-in profiles and the benchmark's files, case A-2"
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
@@ -297,10 +297,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Mean place and force of the right wheel beside CONTACT's."""
-    from models.drawing.figures import BLUE, GREY, WIDE, heading, legend_below, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, heading, legend_below, subplots
 
     published = np.array(data["published"])
-    figure, axes = subplots(1, 2, figsize=(WIDE, 3.5))
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.5))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
         axis.plot(
             published[:, 0],

@@ -43,24 +43,24 @@ SHARE = 0.2
 """Part of a planted size by which what is found may be off."""
 VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES = 180 / np.pi
-LATE = 3e-3
+DELAY = 3e-3
 QUICK = (
-    Planted("3 ms late, one force", "shift", "fl_fz", LATE, "s", faults={"delay": {"fl_fz": LATE}}),
+    Planted("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
     Planted("left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged(("fl", "fr"))),
     Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
 )
 AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
-    ("3 ms late, one hub", "shift", "all channels of rr", LATE, "s", "delay", {"rr": LATE}),
-    ("3 ms early, one force", "shift", "rl_fz", -LATE, "s", "delay", {**dict.fromkeys(NOISE, LATE), "rl_fz": 0.0}),
-    ("3 ms late, one accelerometer", "shift", "all channels of shelf", LATE, "s", "delay", {"shelf": LATE}),
+    ("3 ms late, one hub", "shift", "all channels of rr", DELAY, "s", "delay", {"rr": DELAY}),
+    ("3 ms early, one force", "shift", "rl_fz", -DELAY, "s", "delay", {**dict.fromkeys(NOISE, DELAY), "rl_fz": 0.0}),
+    ("3 ms late, one accelerometer", "shift", "all channels of shelf", DELAY, "s", "delay", {"shelf": DELAY}),
     (
         "3 ms late, all inertial channels",
         "shift",
         "all inertial",
-        LATE,
+        DELAY,
         "s",
         "delay",
-        dict.fromkeys(("acceleration", "angular rate", "angle"), LATE),
+        dict.fromkeys(("acceleration", "angular rate", "angle"), DELAY),
     ),
     ("40 ms late, one force", "shift", "fr_fz", 4e-2, "s", "delay", {"fr_fz": 4e-2}),
     ("2 % too much, front wheel", "gain", "fl_fz", 2.0, "%", "gain", {"fl_fz": 0.02}),
@@ -217,7 +217,7 @@ def _wrong_vehicles(folder: Path) -> list[Row]:
 def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: three faults at once are all named."""
     spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
-    findings = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})
+    findings = planted(virtual, folder, *spoil, delay={"rl_fz": DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -226,7 +226,7 @@ def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
         behaves(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
-        _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", LATE),
+        _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", DELAY),
     ]
 
 

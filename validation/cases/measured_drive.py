@@ -16,7 +16,7 @@ from validation.common.rows import Observed, Row, System
 TITLE = "A car on four rolling tyres along a measured drive"
 SYSTEM: System = "rolling-vehicle"
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
-MADE = SCENES / "single_track.csv"
+WRITTEN_DRIVE = SCENES / "single_track.csv"
 SENSORS = {"yaw rate": (3, 0.004), "side slip": (5, 0.0008)}
 """Column of the file, and standard deviation (rad/s, rad) of the noise that its maker put on it."""
 START = (0.8, 1.2)
@@ -52,7 +52,7 @@ def _scene(stretch: list[float], cornering: tuple[float, float] = (1.0, 1.0)) ->
 
 def _motion_rows(drive: Any) -> list[Row]:
     every = round(0.02 / float(drive.times[1] - drive.times[0]))
-    made = np.genfromtxt(MADE, delimiter=",", skip_header=1)[: len(drive.times[::every])]
+    made = np.genfromtxt(WRITTEN_DRIVE, delimiter=",", skip_header=1)[: len(drive.times[::every])]
     return [
         Observed(
             f"measured_drive.{name.replace(' ', '_')}",
@@ -67,7 +67,7 @@ def _motion_rows(drive: Any) -> list[Row]:
 
 def _tyre_rows() -> list[Row]:
     keys = ["tyres.cornering.0=0.3:3", "tyres.cornering.1=0.3:3"]
-    known = uncertainty(fit(problem_of(_scene([0.0, 6.0], START), MADE, keys, "mujoco", low_pass=5.0)))
+    known = uncertainty(fit(problem_of(_scene([0.0, 6.0], START), WRITTEN_DRIVE, keys, "mujoco", low_pass=5.0)))
     off = known.fit.values - 1.0
     scaled = off / known.fit.problem.scale
     return [

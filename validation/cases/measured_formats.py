@@ -52,14 +52,14 @@ def written(path: Path, values: np.ndarray) -> Path:
     return write(path, [ChannelGroup(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
 
 
-def apart(values: np.ndarray, truth: np.ndarray) -> float:
+def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
     """Largest difference by the size of the value; inf where gaps differ."""
     if not np.array_equal(np.isnan(values), np.isnan(truth)):
         return float("inf")
     return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
-def kept(source: Source) -> dict[str, bool]:
+def is_kept(source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start come back as they were given."""
     return {
         "names": tuple(channel.name for channel in source.channels) == NAMES,
@@ -104,11 +104,11 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
     there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
     error, off, by_library = (
-        apart(values, truth),
+        largest_difference(values, truth),
         float(np.abs(times - PERIOD * np.arange(COUNT)).max()),
-        apart(there, truth),
+        largest_difference(there, truth),
     )
-    lost = ", ".join(what for what, good in kept(source).items() if not good)
+    lost = ", ".join(what for what, good in is_kept(source).items() if not good)
     key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(

@@ -29,7 +29,7 @@ ASTM = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 COUNTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 REPEATED = 2.5
 """s, of the pattern."""
-LONG = 24.0
+LONG_DURATION = 24.0
 """s, of the run whose memory is watched."""
 
 
@@ -179,8 +179,8 @@ def _run_killed_twice(folder: Path) -> Row:
 
 def _memory(folder: Path) -> list[Row]:
     """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
-    run_of(folder, LONG, REPEATED)
-    words = map(str, (folder, LONG, REPEATED, LONG / 10, 2e-3))
+    run_of(folder, LONG_DURATION, REPEATED)
+    words = map(str, (folder, LONG_DURATION, REPEATED, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
@@ -190,7 +190,7 @@ def _memory(folder: Path) -> list[Row]:
         Observed(
             "measured_long.memory",
             SYSTEM,
-            f"memory for 60 channels at 1 kHz, measured once: the largest over {LONG:g} s in ten "
+            f"memory for 60 channels at 1 kHz, measured once: the largest over {LONG_DURATION:g} s in ten "
             "blocks, and the growth of an hour at the rate of the second half",
             float(last[1] + growth * 3600.0),
             "B",

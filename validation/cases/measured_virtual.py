@@ -17,7 +17,7 @@ from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
 from models.measured.recording import Recording
 from models.systems.hub_forces.measurement import HubForces, model
-from models.systems.measured.run import read as read_files
+from models.systems.measured.run import read_files as read_files
 from models.systems.measured.section_run import Hold, Outcome, SectionRun
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
@@ -36,7 +36,7 @@ SEED, SAMPLES = 61, 10
 FORMATS = ("csv", "mf4", "rsp", "tdms")
 NOISE = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 5e-3}
 """N, N m, rad, rad/s: hub forces to 0.2 % of their largest, an inertial unit to 0.1 degrees."""
-LATE = 0.003
+RECORDER_DELAY = 0.003
 """s, by which the inertial unit's recorder is late, which the scene states."""
 DAMAGE = 0.03
 RATE, DURATION = 500.0, 5.0
@@ -97,7 +97,7 @@ def faults(bits: int) -> Faults:
     """All that is planted."""
     table = {
         "noise": NOISE,
-        "delay": dict.fromkeys(("angle", "angular rate"), LATE),
+        "delay": dict.fromkeys(("angle", "angular rate"), RECORDER_DELAY),
         "quantisation": {"bits": bits},
         "dropouts": {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]},
     }
@@ -109,7 +109,7 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
     folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
-    for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -LATE)):
+    for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -RECORDER_DELAY)):
         signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
         write(folder / f"{name}.{form}", [group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{form}", offset))
@@ -119,7 +119,7 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
     return read_files(load(folder / "scene.toml"), folder)
 
 
-def held(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
+def held_run(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
     """Set up the run of a recording, with the vehicle held as ``hold`` says; the run is not yet marched."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
@@ -140,7 +140,7 @@ def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, d
             values = recording.columns.block(recording.columns.names, 0, recording.count)
             damage = next((damages for other, damages in known if _differ_by_rounding(values, other)), None)
             if damage is None:
-                damage = errors(march(held(recording, true.vehicle, proof.hold), place / "run"), true).damage
+                damage = errors(march(held_run(recording, true.vehicle, proof.hold), place / "run"), true).damage
                 known.append((values, damage))
             ratios[form].append(damage)
     means = {
@@ -200,13 +200,13 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
 
 def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: the recording run free and held by both engines; the verdicts."""
-    free = held(first, true.vehicle, Hold("none"))
-    jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
+    free = held_run(first, true.vehicle, Hold("none"))
+    jobs = {engine: held_run(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
-    held_run = runs[ENGINES[-1]]
-    blind = judge(jobs[ENGINES[-1]], held_run)
+    last_run = runs[ENGINES[-1]]
+    blind = judge(jobs[ENGINES[-1]], last_run)
     rows = [
         Observed(
             f"measured_virtual.engines_{proof.name}",
@@ -223,7 +223,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
             blind.word,
             "accepted",
             f"{blind.reason}; beside the truth, 5 % for each damage of this one "
-            f"sample of noise: {judge_beside_truth(held_run, true, proof.hold).word}",
+            f"sample of noise: {judge_beside_truth(last_run, true, proof.hold).word}",
         ),
     ]
     level = Level(NOISE["force"], NOISE["moment"])
@@ -326,7 +326,7 @@ def _quick(folder: Path) -> list[Row]:
     true = measured(proof, folder, 0.6)
     samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)
     recording = recorded(true, samples, proof.vehicle, "csv", folder / "quick")
-    run = march(held(recording, true.vehicle, proof.hold), folder / "quick" / "run")
+    run = march(held_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     wrong = errors(run, true)
     level = Level(8.0, 1.0)
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))

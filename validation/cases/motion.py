@@ -358,9 +358,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 3.9))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     heights = np.geomspace(0.02, 1.2, 40)
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]

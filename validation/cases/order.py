@@ -55,7 +55,7 @@ def errors(
     return errors_of_steps
 
 
-def fitted(steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
+def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
     """Slope of log error over log step by least squares."""
     return float(np.polyfit(np.log(steps), np.log(errors_of_steps), 1)[0])
 
@@ -76,7 +76,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 f"order.{engine}.{name}",
                 SYSTEM,
                 f"observed order of {name} in {engine}",
-                fitted(steps, errors_of_steps),
+                fitted_order(steps, errors_of_steps),
                 "",
             ).within(order, band, WHY, "closed form")
         )

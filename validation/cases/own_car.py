@@ -6,7 +6,7 @@ import numpy as np
 
 from models.multibody.numbers import Controls, Handling
 from models.own_model.car import car
-from models.systems.handling.run import REFERENCE, build, driven
+from models.systems.handling.run import REFERENCE, build, drive_run
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.car_energy import energies_apart
 from validation.own_model.cars import SALOON
@@ -16,7 +16,7 @@ SYSTEM: System = "rolling-vehicle"
 CONTROLS = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0)))
 SPEED = 22.0
 """m/s."""
-ALIKE = 1e-10
+ALLOWED_DIFFERENCE = 1e-10
 """Of the largest."""
 STATES = {True: 10, False: 100}
 """By whether the case is quick."""
@@ -42,7 +42,7 @@ def _energy(handling: Handling, quick: bool) -> Row:
 
 def _lane_change(handling: Handling, duration: float) -> list[Row]:
     """Both engines beside one another, and beside the plain equations at the state in which the drive ends."""
-    drives = {engine: driven(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
+    drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]
     rows = [
         Observed(
@@ -51,7 +51,7 @@ def _lane_change(handling: Handling, duration: float) -> list[Row]:
             f"largest difference of the states of Exudyn and MuJoCo over {duration:g} s of a lane change",
             float(np.abs(states[0] - states[1]).max() / np.abs(states[1]).max()),
             "of the largest",
-        ).at_most(ALIKE, "rounding: same tableau, same step", "shared kernel")
+        ).at_most(ALLOWED_DIFFERENCE, "rounding: same tableau, same step", "shared kernel")
     ]
     run = drives["mujoco"].run
     last = run.times[-1], run.positions[-1], run.rates[-1]
@@ -65,6 +65,6 @@ def _lane_change(handling: Handling, duration: float) -> list[Row]:
                 f"largest difference of accelerations in {engine} from the plain equations, at the end of it",
                 float(apart),
                 "of the largest",
-            ).at_most(ALIKE, "rounding", "native")
+            ).at_most(ALLOWED_DIFFERENCE, "rounding", "native")
         )
     return rows

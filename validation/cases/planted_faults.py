@@ -41,7 +41,7 @@ CAMPAIGNS = (
     advice.CAMPAIGN,
 )
 FEW = (DESCRIPTION[0], EQUATIONS[0])
-EVERY, LEAST = 16, 40
+QUICK_SPACING, FEWEST_FAULTS = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
 
 
@@ -50,7 +50,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
     data: Saved = {
         "pitch-plane": plane,
-        **{campaign.id: campaign.measure(EVERY if quick else 1) for campaign in CAMPAIGNS},
+        **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in CAMPAIGNS},
     }
     rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
     return [*rows, *([] if quick else [_row_of_fault_count(data)])], data
@@ -61,8 +61,8 @@ def _row_of_fault_count(data: Saved) -> Row:
     return Observed(
         "planted.count",
         SYSTEM,
-        f"shortfall of the number of faults that are caught in all systems from {LEAST}",
-        max(0, LEAST - caught),
+        f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
+        max(0, FEWEST_FAULTS - caught),
         "faults",
     ).at_most(0, f"{caught} of {len(_lines(data))} are", "native")
 

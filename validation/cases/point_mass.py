@@ -184,9 +184,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, axes = subplots(1, 2, figsize=(WIDE, 3.8))
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
         exact = [continuous(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]

@@ -53,7 +53,7 @@ FULL_ONLY: tuple[Make, ...] = (
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
 ROUNDS = {True: 1, False: 15}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
-LEAST = {True: 0.004, False: 0.005}
+SHORTEST_TURN = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 CALLBACKS = {
     "all compiled to no forces": "ratio of every force in a compiled callback to the same model without forces",
@@ -61,9 +61,9 @@ CALLBACKS = {
     "to no forces": "ratio of native springs and a compiled callback for the road to the bodies without any force",
 }
 """Ratios of seconds and what they compare."""
-COUNTED = 0.2
+COUNTED_DURATION = 0.2
 """Length (s) of the runs whose force calls are counted from outside."""
-ALIKE = {
+COINCIDING_CURVES = {
     "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
     "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
 }
@@ -85,11 +85,11 @@ def _beside(quick: bool) -> CaseAnswer:
     """Answers of price cases without a problem for the runner: ride, the parts of a step, force calls, claims about
     speed."""
     road = assemble(road_excited.scene())
-    rows, prices = ride.measure(quick, ROUNDS[quick], LEAST[True])
-    rounds, least, duration = 2 * ROUNDS[quick], 2 * LEAST[quick], road_excited.DURATION
+    rows, prices = ride.measure(quick, ROUNDS[quick], SHORTEST_TURN[True])
+    rounds, least, duration = 2 * ROUNDS[quick], 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
-        "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
+        "split": [] if quick else split.measure(ROUNDS[quick], SHORTEST_TURN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, rounds, least) for name in ("RK4", "Euler")},
         "real time": speed.real_time(road, duration, rounds, least),
     }
@@ -100,7 +100,7 @@ def _beside(quick: bool) -> CaseAnswer:
 def _priced(quick: bool, make: Make) -> CaseAnswer:
     """The rows and the saved data of a problem."""
     problem = make(quick)
-    measured = runner.measure(problem, quick, ROUNDS[quick], LEAST[quick])
+    measured = runner.measure(problem, quick, ROUNDS[quick], SHORTEST_TURN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
@@ -128,7 +128,7 @@ def _road_rows(saved: Saved) -> list[Row]:
             why,
             "native",
         )
-        for name, (group, why) in ALIKE.items()
+        for name, (group, why) in COINCIDING_CURVES.items()
     ]
     return rows + [
         behaves(
@@ -154,7 +154,7 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted(engine, assembly, road_excited.settings_of(each, COUNTED))
+            counted(engine, assembly, road_excited.settings_of(each, COUNTED_DURATION))
             for each in settings
             if each.engine == engine
         ]

@@ -22,13 +22,13 @@ QUICK = 8
 """Number of the one scene that a quick run draws."""
 SCENES = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
 """How many scenes of each system a full run judges."""
-SPARE = 3
+REDRAWS = 3
 """A refused scene is drawn anew, up to so many times in a row; then it counts as one whose tolerance is not held."""
 ENGINE = "mujoco"
 """The one that a quick run asks about; a full one asks about all."""
 STRIDE = 1000
 """Between the number of a scene and of the one that is drawn in its place."""
-MET, FACTOR = 0.95, 3.0
+LEAST_MET_SHARE, SECONDS_FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting holds its tolerance; bound of predicted by true error."""
 
 
@@ -56,9 +56,9 @@ def _shared(folder: Path) -> list[Judged]:
 
 
 def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
-    """Verdicts on a scene of a system, none if it was refused once more than SPARE times; the reasons."""
+    """Verdicts on a scene of a system, none if it was refused once more than REDRAWS times; the reasons."""
     refused: list[str] = []
-    for n in range(number, number + (SPARE + 1) * STRIDE, STRIDE):
+    for n in range(number, number + (REDRAWS + 1) * STRIDE, STRIDE):
         try:
             told = (
                 judge(drawn(n, folder), engines)
@@ -85,14 +85,14 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
             held / len(verdicts),
             "",
-        ).within(1.0, 1.0 - MET, why, "closed form"),
+        ).within(1.0, 1.0 - LEAST_MET_SHARE, why, "closed form"),
         Observed(
             "recommendation.predicted",
             SYSTEM,
             "largest factor between the predicted and the true error",
             max(factors, default=float("inf")),
             "times",
-        ).at_most(FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
+        ).at_most(SECONDS_FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
         Observed(
             "recommendation.refused",
             SYSTEM,
@@ -100,7 +100,9 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             len(refused),
             "scenes",
         ).at_most(
-            (1.0 - MET) * len(verdicts), "; ".join(refused) or "none was: every one got a recommendation", "none"
+            (1.0 - LEAST_MET_SHARE) * len(verdicts),
+            "; ".join(refused) or "none was: every one got a recommendation",
+            "none",
         ),
         Observed(
             "recommendation.factor",
@@ -179,7 +181,13 @@ def draw(data: Saved) -> Drawn:
     span = np.array([1e-6, 10.0])
     ax.plot(span, span, color=DARK, linewidth=0.8)
     ax.fill_between(
-        span, span / FACTOR, span * FACTOR, color="#bbbbbb", alpha=0.4, linewidth=0, label=f"within a factor {FACTOR:g}"
+        span,
+        span / SECONDS_FACTOR,
+        span * SECONDS_FACTOR,
+        color="#bbbbbb",
+        alpha=0.4,
+        linewidth=0,
+        label=f"within a factor {SECONDS_FACTOR:g}",
     )
     ax.axvline(1.0, color=BAD, linewidth=1.0, label="tolerance")
     ax.set(

@@ -36,7 +36,7 @@ SHIPPED = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck")
 TWINS = ("r19_ride", "r19_free", "three_axle_truck")
 FILTERS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
 SPEEDS = np.linspace(5.0, 50.0, 60)
-LEAST = 1e-20
+SYMMETRY_ZERO = 1e-20
 """Variances below this share of the largest of their kind are zero by symmetry."""
 
 
@@ -99,7 +99,7 @@ def _compared(
     """Largest relative difference of the covariance of a vehicle from quadrature of the analytic one, what each says of
     its own error, and how many outputs are not zero by symmetry."""
     covariance, integrals = stationary(excited(vehicle, road, speed)), quadrature(analytic, road, speed)
-    told = covariance.variance > LEAST * covariance.variance.max()
+    told = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
     worst = off(covariance.deviation[told], np.sqrt(integrals.variance[told]))
     return worst, covariance.error[told].max(), integrals.error[told].max(), int(told.sum())
 
@@ -229,7 +229,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
     slow = sweep(linear, roads, speeds[some], FILTERS, fast=False)
-    told = slow.variance > LEAST * slow.variance.max()
+    told = slow.variance > SYMMETRY_ZERO * slow.variance.max()
     rows = [
         Observed(
             "ride_covariance.fast.equal",
@@ -260,11 +260,13 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
         "speeds": speeds.tolist(),
         "cases": list(quick.cases),
         "seat": "left occupant Wk",
-        **{name: [quick.of(case, name).tolist() for case in quick.cases] for name in (*ALONG, "left occupant Wk")},
+        **{
+            name: [quick.of(case, name).tolist() for case in quick.cases] for name in (*BODY_POINTS, "left occupant Wk")
+        },
     }
 
 
-ALONG = ("body front", "body centre", "body rear")
+BODY_POINTS = ("body front", "body centre", "body rear")
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -289,11 +291,11 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
-    from models.drawing.figures import WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     shown = data["figure"]
-    figure, axes = subplots(1, 3, figsize=(WIDE, 4.2), sharey=True)
-    for axis, place in zip(axes, ALONG, strict=True):
+    figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
+    for axis, place in zip(axes, BODY_POINTS, strict=True):
         for i, case in enumerate(shown["cases"]):
             words = "left/right {}, front/rear {}".format(*CASES[int(case)])
             axis.plot(shown["speeds"], shown[place][i], label=f"{case}: {words}")
@@ -302,10 +304,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].set_ylim(bottom=0.0)
     legend_below(figure, axes[0], columns=2)
     heading(figure, "Which roads belong together matters most at the centre of the body")
-    return [(SAID, figure)]
+    return [(FIGURE_TEXT, figure)]
 
 
-SAID = (
+FIGURE_TEXT = (
     "R19-ride on the paper's road in its five cases of correlation. At the centre the order of the cases changes with "
     "the speed: there front and rear add up or cancel with the delay, which axles that are equal or independent both "
     "miss. Front and rear of the body hardly feel it: there only the correlation of left and right matters."

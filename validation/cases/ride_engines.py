@@ -35,7 +35,7 @@ DIGRESSIVE = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-1500.0, -400.0, 0.0, 700.0, 25
 BUMP_STOPS = Curve((-0.2, -0.05, 0.05, 0.2), (-8000.0, 0.0, 0.0, 8000.0))
 FRICTION = 40.0
 BY_DIFFERENCES = "central differences of order six leave 1e-13 of smooth laws, 1e-11 of curves with corners"
-SAME = "the same laws, added up in another order: 1e-16 of the largest force per operation"
+SAME_LAWS = "the same laws, added up in another order: 1e-16 of the largest force per operation"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -134,7 +134,7 @@ def _states(name: str) -> list[Row]:
             f"difference of the accelerations of {name} at {STATES} random states, {what}",
             float(value),
             "relative",
-        ).at_most(1e-12, SAME, "native")
+        ).at_most(1e-12, SAME_LAWS, "native")
         for what, value in zip(names, worst, strict=True)
     ]
 
@@ -167,7 +167,7 @@ def _path() -> tuple[list[Row], list[list[str]]]:
                 f"difference of R19-ride's states over 1 s between Exudyn and MuJoCo, {what} springs, RK4 at 1 ms",
                 float(gap),
                 "m, rad, m/s, rad/s",
-            ).at_most(1e-12, SAME, "native")
+            ).at_most(1e-12, SAME_LAWS, "native")
         )
     return rows, price
 

@@ -25,7 +25,7 @@ LEVELS = (1.0, 4.0, 16.0)
 """Times the level of the paper: class C or so, E, and G, where the stops are met all the time."""
 COPIES, LASTING = (60, 400), (1.5, 10.0)
 """Monte Carlo in the quick and in the full share; its length in s."""
-MILD = 1500.0
+MILD_DAMPING = 1500.0
 """Damping (N s/m) beside a law that is looked at alone."""
 
 
@@ -199,8 +199,11 @@ def _alone() -> list[Row]:
     spring = vehicle.springs[0]
     others: dict[str, tuple[float, dict[str, Any]]] = {
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
-        "friction of 100 N": (0.25, {"travel_force": None, "rate_force": None, "damping": MILD, "friction": 100.0}),
-        "stops": (64.0, {"rate_force": None, "damping": MILD, "friction": 0.0}),
+        "friction of 100 N": (
+            0.25,
+            {"travel_force": None, "rate_force": None, "damping": MILD_DAMPING, "friction": 100.0},
+        ),
+        "stops": (64.0, {"rate_force": None, "damping": MILD_DAMPING, "friction": 0.0}),
     }
     rows = []
     for name, (level, laws) in others.items():

@@ -15,7 +15,7 @@ from models.ride.covariance import stationary
 from models.ride.monte_carlo import at_constant_speed, variances_along_drive
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
-from models.ride.varying_speed import REACH, quasi_stationary, varying_speed
+from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, quasi_stationary, varying_speed
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
@@ -36,12 +36,12 @@ DRIVES = {
 STOPS = SpeedProfile((0.0, 1.0, 11.0, 12.0, 15.75, 18.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
 """Standing, to 30 m/s at 3 m/s^2, to standstill at -8 m/s^2, standing."""
 SHORT_STOPS = SpeedProfile((0.0, 0.2, 2.2, 2.4, 3.4, 4.0), (0.0, 0.0, 30.0, 30.0, 0.0, 0.0))
-SETTLED = 13.0
+SETTLED_RATE_TIMES_TIME = 13.0
 """Slowest rate times the time after a change of speed: e^-26 of it is left in a variance."""
-EVEN = SpeedProfile((0.0, 0.5), (20.0, 20.0))
+CONSTANT_SPEED = SpeedProfile((0.0, 0.5), (20.0, 20.0))
 STOP_AND_GO = SpeedProfile((0.0, 0.5, 1.0, 1.3, 2.0), (12.0, 12.0, 0.0, 0.0, 5.0))
 """The last axle meets what the first one met before the stop."""
-STEADY = 20.0
+STEADY_SPEED = 20.0
 """Speed (m/s) of the Monte Carlo at constant speed."""
 LASTING, STEADY_COPIES = 10.0, 1000
 """Its length, s, and its copies, each of which tells as much as dozens at an instant."""
@@ -75,12 +75,15 @@ def ride(name: str, tyre_damping: float = 0.0, cutoff: float | None = None) -> t
 def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     """Stationary after a change of speed and at constant speed; the road itself, always; half the step."""
     vehicle, road = ride(name)
-    system = at_speed(vehicle, road, STEADY)
-    exact, settling = stationary(system).deviation, -SETTLED / np.linalg.eigvals(system.A).real.max()
-    change = SpeedProfile((0.0, 0.5, 0.5 + settling), (STEADY / 2.0, STEADY, STEADY))
-    settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, EVEN))
+    system = at_speed(vehicle, road, STEADY_SPEED)
+    exact, settling = stationary(system).deviation, -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max()
+    change = SpeedProfile((0.0, 0.5, 0.5 + settling), (STEADY_SPEED / 2.0, STEADY_SPEED, STEADY_SPEED))
+    settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED))
     often = np.linspace(stops.times[0], stops.times[-1], 41)
-    stopped, fine = (varying_speed(vehicle, road, stops, instants=often, reach=reach) for reach in (REACH, REACH / 2))
+    stopped, fine = (
+        varying_speed(vehicle, road, stops, instants=often, reach=reach)
+        for reach in (LARGEST_RATE_TIMES_STEP, LARGEST_RATE_TIMES_STEP / 2)
+    )
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
     return [
         Observed(
@@ -204,9 +207,9 @@ def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
 def _constant() -> list[Row]:
     """Copies at constant speed, and what one digit costs by either way."""
     vehicle, road = ride("r19_ride")
-    exact = stationary(at_speed(vehicle, road, STEADY))
-    fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY)) for _ in range(REPEATS)])[1] / REPEATS
-    copies, slow = _timed(at_constant_speed, vehicle, road, STEADY, LASTING, copies=STEADY_COPIES, seed=SEED)
+    exact = stationary(at_speed(vehicle, road, STEADY_SPEED))
+    fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(REPEATS)])[1] / REPEATS
+    copies, slow = _timed(at_constant_speed, vehicle, road, STEADY_SPEED, LASTING, copies=STEADY_COPIES, seed=SEED)
     columns = [copies.names.index(point) for point in POINTS]
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
@@ -312,9 +315,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviations over time, quasi-stationary beside."""
     if not data:
         return []
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
-    figure, axes = subplots(1, 2, figsize=(WIDE, 3.9), sharey=True)
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9), sharey=True)
     for axis, (name, drive) in zip(axes, data.items(), strict=True):
         for column, point in enumerate(POINTS):
             pick = [row[column] for row in drive["deviation"]]

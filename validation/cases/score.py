@@ -20,9 +20,13 @@ from validation.hard_cases.case import IMPLEMENTATIONS
 TITLE = "The score of a stabilised run"
 SYSTEM: System = "drift"
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "stabilisers.toml"
-SHORT = ("run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]")
+QUICK_OPTIONS = ("run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]")
 """The study's scene in the quick report: two runs on a grade."""
-LONG = ("run.duration=60.0", "options.sampling_rate=1000.0", "options.stiffnesses=[50.0, 100.0, 300.0, 1e4, 1e5]")
+FULL_OPTIONS = (
+    "run.duration=60.0",
+    "options.sampling_rate=1000.0",
+    "options.stiffnesses=[50.0, 100.0, 300.0, 1e4, 1e5]",
+)
 """What the prototype measured."""
 SINKING = 0.5
 """Speed (m/s) at which the whole vehicle sinks in the run with a heave drift."""
@@ -141,7 +145,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
 
 def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """Rows: on a grade of 0.1 rad a holding spring is wrong and a prescribed pitch is right, in each implementation."""
-    scene = load(SCENE, SHORT)
+    scene = load(SCENE, QUICK_OPTIONS)
     options = read(Options, scene.options, "", "options")
     (folder / "short").mkdir()
     bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
@@ -229,7 +233,7 @@ def _blind(studied: list[Saved]) -> list[Row]:
 
 def _long(folder: Path) -> list[Saved]:
     """The prototype's methods over 60 s at 1 kHz on the road, in the reference."""
-    scene = load(SCENE, LONG)
+    scene = load(SCENE, FULL_OPTIONS)
     (folder / "long").mkdir()
     bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
     return [_scored(bench, name) for name in PROTOTYPE]

@@ -7,7 +7,7 @@ import numpy as np
 from models.multibody.numbers import Handling, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import energy, unaccounted
-from models.systems.handling.run import Drive, driven
+from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
@@ -17,7 +17,7 @@ from validation.spatial.written_equations import TURN
 TITLE = "A car with a trailer on its suspension"
 SYSTEM: System = "rolling-vehicle"
 TRAINS = {"caravan": caravan, "train": train}
-STEADY = {"caravan": caravan, "train": loose_train}
+STEADY_TRAINS = {"caravan": caravan, "train": loose_train}
 SPEED, TURNING = 22.0, 15.0
 TURN_BOUND = 1e-3
 
@@ -32,7 +32,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _driven(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
     """A turn on a rough road, steered, braked and driven."""
-    return driven(engine, Handling(vehicle, Tyres(), TURN, plane_waves(4e-6, seed=3)), SPEED, duration)
+    return drive_run(engine, Handling(vehicle, Tyres(), TURN, plane_waves(4e-6, seed=3)), SPEED, duration)
 
 
 def _levers_row() -> Row:
@@ -58,7 +58,7 @@ def _engines_row(name: str, duration: float) -> Row:
 
 
 def _turn_rows(name: str) -> list[Row]:
-    errors = towed_turn(STEADY[name](), TURNING)
+    errors = towed_turn(STEADY_TRAINS[name](), TURNING)
     why = "linear tyres, with trail and turning slip; a body that is towed balances about its hitch"
     return [
         Observed(

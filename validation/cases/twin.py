@@ -15,7 +15,7 @@ TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
 STEPS = (2e-3, 1e-3, 5e-4)
 BOUND = 1e-12
-ROUGH = 4_800
+ROUGH_SAMPLES = 4_800
 """Samples of 0.5 ms before the course's rough part is well under both wheels."""
 OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, "refused"))
 """Further measured roads: file, speed (m/s), how they go on beyond their end."""
@@ -57,7 +57,9 @@ def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
     road = {"source": "opencrg", "file": COURSE, "speed": 50.0, "beyond_end": "refused"}
     scenes = [road_scene(parameters, step, 5.0, road, data) for step in steps]
     measured = simulate(scenes[-1], "reference")
-    rough = Result(measured.data.isel(time=slice(ROUGH, None)).assign_coords(time=measured.data.time[:-ROUGH]))
+    rough = Result(
+        measured.data.isel(time=slice(ROUGH_SAMPLES, None)).assign_coords(time=measured.data.time[:-ROUGH_SAMPLES])
+    )
     rows = _compare(f"measured course, {parameters}", scenes) + _forces(parameters, "measured course", rough, steps)
     for name, speed, rule in OTHER_ROADS:
         road = {"source": "opencrg", "file": name, "speed": speed, "beyond_end": rule, "track": "left"}

@@ -11,7 +11,19 @@ from models.own_model.explain import compare
 from models.own_model.file import ModelFile, read
 from models.own_model.path import ALIKE, paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.own_model.files import ARM_URDF, CART, GEARED, JOINTED, PLANTED, TIED, chain, changed, tree
+from validation.own_model.files import (
+    ARM_URDF,
+    CART,
+    GEARED,
+    HELD,
+    JOINTED,
+    LINKED,
+    PLANTED,
+    TIED,
+    chain,
+    changed,
+    tree,
+)
 from validation.own_model.soft_couplings import softly_coupled
 
 TITLE = "A user's own model: MJCF and URDF in every build"
@@ -26,14 +38,21 @@ OUTSIDE = tuple(kind for kind in KINDS if kind not in ("flex", "turning_law"))
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Quick: five models, five states, six planted differences; in full 22 models, eight of them exported, all 30."""
+    """Quick: seven models, five states, six planted differences; in full 24 models, eight of them exported, all 30."""
     texts = {"jointed": JOINTED, "cart": CART, "arm": ARM_URDF, "tied": TIED, "geared": GEARED}
+    texts |= {"linked": LINKED, "held": HELD}
     if not quick:
         texts |= {f"chain_{count}": chain(count) for count in (8, 30)}
         texts |= {f"tree_{seed}": tree(4 + 2 * seed, seed) for seed in range(1, 8)}
     rows = [_agreement(name, _read(folder, name, text), quick) for name, text in texts.items()]
     rows += [] if quick else [_agreement(name, _exported(folder, name), quick) for name in EXPORTED]
-    return [*rows, _soft(folder), *_path(folder), _planted(folder, quick)], {}
+    return [
+        *rows,
+        _soft(folder, "geared", GEARED),
+        _soft(folder, "linked", LINKED),
+        *_path(folder),
+        _planted(folder, quick),
+    ], {}
 
 
 def _read(folder: Path, name: str, text: str, without: tuple[str, ...] = ()) -> ModelFile:
@@ -62,16 +81,16 @@ def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
     ).at_most(worst.bound, "rounding, by the condition of the mass matrix; 1e-10 or more", "native")
 
 
-def _soft(folder: Path) -> Row:
-    """What MuJoCo's couplings give way, by the law of its documentation on the plain equations."""
-    twin = _read(folder, "geared", GEARED).twin
+def _soft(folder: Path, name: str, text: str) -> Row:
+    """What MuJoCo's constraints give way, by the law of its documentation on the plain equations."""
+    twin = _read(folder, name, text).twin
     states = states_of(twin, QUICK_STATES)
     apart = agreement("", moved_at(softly_coupled(twin), states), moved_at(as_parsed(twin), states), twin)
     return Observed(
-        "twin_files.soft_couplings",
+        f"twin_files.soft_{name}",
         SYSTEM,
-        "largest difference of accelerations with soft couplings in MuJoCo from the law of its documentation about the "
-        "plain equations, at states that satisfy them, geared",
+        "largest difference of accelerations with soft constraints in MuJoCo from the law of its documentation about "
+        f"the plain equations, at states that satisfy them, {name}",
         apart.acceleration,
         "of the largest",
     ).at_most(SOLVED, "what MuJoCo's constraint solver leaves, whose tolerance is 1e-8", "closed form")

@@ -11,13 +11,13 @@ from models.rail import equations as eq
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import Equations
-from models.rail.limit_cycle import Orbit, attained, guess_from_orbit, refined, solved
+from models.rail.limit_cycle import Orbit, attained, guess_from_orbit, refined, solved_orbit
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.contact.drawn_wheelsets import HEAVY, SEED, STIFF, Speeds, criticals, drawn
+from validation.contact.drawn_wheelsets import HEAVY_WHEELSET, SEED, STIFF_WHEELSET, Speeds, criticals, drawn_wheelsets
 from validation.faults import wheelset as faults
 
 TITLE = "A wheelset on straight track"
@@ -34,14 +34,18 @@ ENGINES = tuple(name for name in IMPLEMENTATIONS if name != "reference")
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the chosen wheelset alone, without the faults."""
-    wheelsets = {"chosen": CHOSEN} | ({} if quick else drawn())
+    wheelsets = {"chosen": CHOSEN} | ({} if quick else drawn_wheelsets())
     speeds = {name: criticals(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
     rows = [*_wave_rows(wheelsets), *_critical_rows(speeds), *_acceleration_rows(wheelsets)]
     rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
     cycles = _cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATIONS))
     rows += [*_cycle_rows(cycles), _order_row(), *_energy_rows()]
     if not quick:
-        rows += [_none_row("heavy", HEAVY, "unstable"), _none_row("stiff", STIFF, "stable"), *_fault_rows()]
+        rows += [
+            _none_row("heavy", HEAVY_WHEELSET, "unstable"),
+            _none_row("stiff", STIFF_WHEELSET, "stable"),
+            *_fault_rows(),
+        ]
     kept = ("speed", "amplitude", "frequency", "error", "frequency_error")
     return rows, {
         "critical": speeds,
@@ -233,7 +237,7 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
         if first is not None:
             guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
             cycles[name] = {
-                engine: refined(solved(guess, "amplitude", precise=False), "amplitude")
+                engine: refined(solved_orbit(guess, "amplitude", precise=False), "amplitude")
                 for engine, guess in guesses.items()
             }
     return cycles

@@ -10,10 +10,10 @@ import numpy as np
 
 from models.advice.choice.choose import Choice as ChoiceByRuns
 from models.advice.choice.choose import Chooser as ChooserByRuns
-from models.advice.ride_choice.candidates import Set, largest
+from models.advice.ride_choice.candidates import Set, largest_changes
 from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.march import longest_step
-from models.advice.ride_choice.parameters import OFF, changed, parameters
+from models.advice.ride_choice.parameters import PARAMETER_ERROR, parameters, scaled_vehicle
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import confirmed
 from models.ride.frequency import spectra
@@ -28,7 +28,7 @@ OMEGA = np.geomspace(1e-2, 3e5, 3000)
 """rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
-def asked(drawn: Drawn) -> Chooser:
+def asked_speeds(drawn: Drawn) -> Chooser:
     """Of a range of speeds about that of the scene."""
     return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
 
@@ -40,7 +40,7 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
         _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
         for whole in chooser.full_scenes
     ]
-    return largest(np.sqrt(ratios) - 1)
+    return largest_changes(np.sqrt(ratios) - 1)
 
 
 def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
@@ -56,8 +56,8 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = parameters(chooser.scene.vehicle)
     for _ in range(draws):
-        factors = dict(zip(names, 1.0 + OFF * random.uniform(-1.0, 1.0, len(names)), strict=True))
-        full, left = (replace(scene, vehicle=changed(scene.vehicle, factors)) for scene in (chooser.scene, rest))
+        factors = dict(zip(names, 1.0 + PARAMETER_ERROR * random.uniform(-1.0, 1.0, len(names)), strict=True))
+        full, left = (replace(scene, vehicle=scaled_vehicle(scene.vehicle, factors)) for scene in (chooser.scene, rest))
         whole = FullScene(full, float(random.uniform(low, high)))
         ratio = confirmed(whole.reduced(left), chooser.rows) / confirmed(whole.full, chooser.rows)
         worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))

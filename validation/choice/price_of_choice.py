@@ -6,10 +6,10 @@ from models.advice.ride_choice.choose import Chooser
 from models.advice.ride_choice.estimate import estimate
 from models.machine.timing import interleave, paired_ratio
 from models.systems import run
-from models.systems.ride.of_scene import told_by
+from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.scene import RideScene, build
 
-ASKED = {
+ASKED_SCENE = {
     "title": "a car of 19 degrees of freedom",
     "system": "ride",
     "study": "ride_choice",
@@ -25,7 +25,7 @@ ROUNDS = 5
 
 def whole_car() -> RideScene:
     """The scene."""
-    return build(ASKED, "a car of 19 degrees of freedom")
+    return build(ASKED_SCENE, "a car of 19 degrees of freedom")
 
 
 def price_of_choice() -> tuple[tuple[float, float, float], float]:
@@ -34,7 +34,7 @@ def price_of_choice() -> tuple[tuple[float, float, float], float]:
     scene = whole_car()
 
     def choose() -> None:
-        with told_by(scene):
+        with scene_errors(scene):
             Chooser.of(scene).choose()
 
     jobs = (choose, lambda: run(scene, "reference", error=scene.error))

@@ -18,7 +18,7 @@ KINDS = ("status", "gone", "new", "expected", "value")
 Change = Saved
 
 
-def read(path: Path) -> Saved:
+def read_results(path: Path) -> Saved:
     """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
     file = path / "results.json" if path.is_dir() else path
     try:
@@ -29,8 +29,15 @@ def read(path: Path) -> Saved:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("--against", "", str(file), f"cannot be read: {error}") from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        allowed = f"is not the results of a validation ({type(error).__name__}: {error})"
+        allowed = f"is not the results.json of a validation: {_told(error)}"
         raise InputError("--against", "", str(file), allowed) from None
+
+
+def _told(error: Exception) -> str:
+    """What is wrong with a file that was read, in words."""
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno} is no JSON"
+    return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _rows(content: Saved) -> dict[str, Saved]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.result import Result
 from models.core.tables import write_table
-from models.core.whole_files import FULL
+from models.core.whole_files import DISK_FULL_ERRORS
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
 
@@ -52,7 +52,7 @@ def _damaged(result: Result, folder: Path, share: float, complete_sizes: dict[st
         with files_of_at_most(int(share * max(complete_sizes.values()))):
             _save(result, folder)
     except OSError as error:
-        return error.errno not in FULL or not sizes(folder).items() <= complete_sizes.items()
+        return error.errno not in DISK_FULL_ERRORS or not sizes(folder).items() <= complete_sizes.items()
     return True
 
 

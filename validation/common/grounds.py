@@ -16,7 +16,7 @@ from typing import TypeVar
 from models.core.assumptions import Broken, broken_of, watching
 from models.core.result import Result
 
-ANY = ""
+ANY_ASSUMPTION = ""
 """Stands for the name of every assumption."""
 
 
@@ -45,7 +45,7 @@ class Grounds:
         self.part = _instruction_index()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED.get()
         for broken in broken_of(run):
-            self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY, "")))
+            self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def rest(self, allowed: bool) -> str:
         """Text of the broken assumptions that the current row rests on, with or without leave."""
@@ -100,7 +100,7 @@ def _instruction_index() -> int:
 @contextmanager
 def allowing(why: str, *names: str) -> Iterator[None]:
     """Runs that are made inside may break these assumptions, or any where none is named; decorates functions, too."""
-    before = _ALLOWED.set(_ALLOWED.get() | dict.fromkeys(names or (ANY,), why))
+    before = _ALLOWED.set(_ALLOWED.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), why))
     try:
         yield
     finally:

@@ -75,10 +75,10 @@ class Weak(Right):
         return np.array([1.0] * 4 + [0.99] * 4) * rate
 
 
-WRONG = (Still, Boastful, Swapped, Weak)
+WRONG_ENGINES = (Still, Boastful, Swapped, Weak)
 
 
-def passed(kinds: tuple[type, ...] = WRONG, duration: float = 0.5) -> list[str]:
+def passed(kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
     """Names of the integrators whose run on a road ends without a word against it."""
     tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
     before = [dict(table) for table in tables]

@@ -18,11 +18,11 @@ from models.contact.inputs import Array
 from models.contact.theories import Simplified
 from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import ContactCase
-from validation.contact.contact_set import FITTED, FRICTION, LOAD, read, read_drawn, read_wide
+from validation.contact.contact_set import FITTED, FRICTION, LOAD, read_contacts, read_drawn, read_wide
 
 CELLS = 101
 """In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
-SHARE, NEAR, FEW = 0.95, 0.96, 12
+HELD_SHARE, KNOWN_SHARE, FEWEST_OF_GROUP = 0.95, 0.96, 12
 """Part of unseen contacts that a band is to hold; of the known ones of each group between the neighbours of each knot;
 contacts that tell no quantile."""
 ROUNDING = 1e-9
@@ -94,7 +94,7 @@ def groups(cases: list[ContactCase]) -> Array:
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
 
-def held(name: str, cases: list[ContactCase], cells: int = CELLS) -> TheoryErrors:
+def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS) -> TheoryErrors:
     """A theory's forces, moments and errors."""
     answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays(cases)
@@ -105,7 +105,7 @@ def held(name: str, cases: list[ContactCase], cells: int = CELLS) -> TheoryError
     )
 
 
-def kept(name: str, constant: TheoryErrors) -> tuple[float, float]:
+def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
     """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
     moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
@@ -125,14 +125,14 @@ def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[floa
 def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
     """Largest quantile of a group with more than a few contacts; of all together where none has them."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
-    told = [part for part in parts if part.size >= FEW] or [error[rows]]
-    return max(float(np.quantile(part, NEAR)) for part in told)
+    told = [part for part in parts if part.size >= FEWEST_OF_GROUP] or [error[rows]]
+    return max(float(np.quantile(part, KNOWN_SHARE)) for part in told)
 
 
 def main() -> None:
     """Print the rows of ``error_bands.csv``."""
-    known = read() + read_drawn(FITTED) + read_wide(FITTED)
-    theories = {name: held(name, known) for name in (*FASTSIM, "simplified")}
+    known = read_contacts() + read_drawn(FITTED) + read_wide(FITTED)
+    theories = {name: theory_errors(name, known) for name in (*FASTSIM, "simplified")}
     for quantity, error, used in (("force", "error", "used"), ("moment", "moment_error", "used_with_moment")):
         for name, theory in theories.items():
             bands = measured(getattr(theory, error), getattr(theory, used), theory)

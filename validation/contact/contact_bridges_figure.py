@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.drawing.figures import COLOURS, PALE, SKY, SMALL, VERMILION, WIDE, heading, subplot_mosaic
+from models.drawing.figures import COLOURS, COLUMN_WIDTH, PALE, SKY, SMALL_TEXT, VERMILION, heading, subplot_mosaic
 
 LAWS = (
     "no contact",
@@ -27,7 +27,7 @@ LINES = {1: ":", WHEELS: "-", 8: "--"}
 
 def figure(points: list[dict[str, Any]]) -> Figure:
     """Cost per step over the law; shares of engine, kernel and bridge over the law and over the number of wheels."""
-    drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(WIDE, 8.6))
+    drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(COLUMN_WIDTH, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
@@ -72,7 +72,7 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
     axis.grid(True, axis="y", alpha=0.3)
     low, high = axis.get_ylim()
     axis.set_ylim(low, high * (high / low) ** 0.4)  # room for the legend
-    axis.legend(fontsize=SMALL, loc="upper left", ncols=2)
+    axis.legend(fontsize=SMALL_TEXT, loc="upper left", ncols=2)
 
 
 def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
@@ -84,8 +84,8 @@ def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) ->
         axis.barh(labels, share, left=before, color=colour, label=name)
         for i, (at, value) in enumerate(zip(before, share, strict=True)):
             if value >= 6.0:
-                axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize=SMALL)
+                axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize=SMALL_TEXT)
         before += share
     axis.invert_yaxis()
-    axis.tick_params(axis="y", labelsize=SMALL)
+    axis.tick_params(axis="y", labelsize=SMALL_TEXT)
     axis.set_xlabel("share of the step [%]")

@@ -38,7 +38,7 @@ SEED, DRAWN, RANGE = 43, 300, (0.2, 10.0)
 """Of the drawn contacts: seed, how many in each part, and their sizes."""
 WIDE_RATIOS, WIDE_RANGE, POISSON = (0.1, 10.0), (0.05, 10.0), (0.0, 0.28, 0.5)
 """Of the wide contacts: a/b, sizes of the creepages, and Poisson's ratios in turn."""
-WIDE, ABSENT = ((300, 450), (300,)), 0.25
+WIDE_CONTACTS, ABSENT_SHARE = ((300, 450), (300,)), 0.25
 """Wide contacts in each part, draw by draw; share of them that have no xi_x, no xi_y and no spin."""
 FITTED, JUDGED = 0, 1
 """Parts of the drawn contacts: one goes into the bands, the other one has never been seen by them."""
@@ -53,18 +53,20 @@ def cases() -> list[ContactCase]:
     return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
 
 
-def drawn(part: int) -> list[ContactCase]:
+def drawn_contacts(part: int) -> list[ContactCase]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
     return _draw_contacts(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
 
 
-def wide(part: int) -> list[ContactCase]:
+def wide_contacts(part: int) -> list[ContactCase]:
     """A part of the wide contacts, without their forces."""
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
-    pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE[FITTED]) * part
-    streams = enumerate(WIDE[part], first)
+    pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED]) * part
+    streams = enumerate(WIDE_CONTACTS[part], first)
     return [
-        case for stream in streams for case in _draw_contacts(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)
+        case
+        for stream in streams
+        for case in _draw_contacts(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT_SHARE)
     ]
 
 
@@ -85,19 +87,21 @@ def _axes(ratio: float) -> tuple[float, float]:
     return SIZE * ratio**0.5, SIZE / ratio**0.5
 
 
-def read() -> list[ContactCase]:
+def read_contacts() -> list[ContactCase]:
     """All contacts of the set with their forces."""
     return _read(FILE, cases())
 
 
 def read_drawn(part: int) -> list[ContactCase]:
     """A part of the drawn contacts with their forces."""
-    return _read(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
+    return _read(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
 
 
 def read_wide(part: int) -> list[ContactCase]:
     """A part of the wide contacts with their forces."""
-    return _read(WIDE_FILE, wide(FITTED) + wide(JUDGED))[part * sum(WIDE[FITTED]) :][: sum(WIDE[part])]
+    return _read(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))[part * sum(WIDE_CONTACTS[FITTED]) :][
+        : sum(WIDE_CONTACTS[part])
+    ]
 
 
 def _read(path: Path, asked: list[ContactCase]) -> list[ContactCase]:
@@ -120,5 +124,5 @@ def write(path: Path, asked: list[ContactCase]) -> None:
 
 if __name__ == "__main__":
     write(FILE, cases())
-    write(DRAWN_FILE, drawn(FITTED) + drawn(JUDGED))
-    write(WIDE_FILE, wide(FITTED) + wide(JUDGED))
+    write(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))
+    write(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))

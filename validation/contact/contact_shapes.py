@@ -201,7 +201,7 @@ def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> Normal
     raise refused
 
 
-FAR = 1e-3
+UNKNOWN_HEIGHT = 1e-3
 """Height (m) where a distance is not known."""
 
 
@@ -209,7 +209,7 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
     known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
-    heights = np.full((y.size, x.size), FAR)
+    heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
     inside = np.clip(x, known.x[0], known.x[-1])
     heights[over] = known.at(inside[None, :], across[over][:, None]) / np.cos(patch.lean)
     return heights

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from models.rail.eigenvalues import free, growth
+from models.rail.eigenvalues import free_wheelset, growth
 from models.rail.linear import LOWEST_SPEED, critical_or_why
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
@@ -34,14 +34,14 @@ RANGES = {
     "damping_z": (1e3, 2e4),
     "friction": (0.1, 0.5),
 }
-STIFF = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
-HEAVY = free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
+STIFF_WHEELSET = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
+HEAVY_WHEELSET = free_wheelset(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
 """So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
-AROUND, BELOW = 0.02, 5
+HALF_BRACKET, LOWER_SPEEDS = 0.02, 5
 """Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
 
 
-def drawn() -> dict[str, Wheelset]:
+def drawn_wheelsets() -> dict[str, Wheelset]:
     """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
     draw, wheelsets = np.random.default_rng(SEED), dict[str, Wheelset]()
     while len(wheelsets) < DRAWN:
@@ -63,9 +63,10 @@ def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
 
 
 def _critical_speed_near(growth: Callable[[float], float], speed: float) -> float:
-    """The critical speed (m/s) within AROUND of another; an end of that, or a lower speed, where it is not in it."""
-    low, high = (1.0 - AROUND) * speed, (1.0 + AROUND) * speed
-    for below in np.geomspace(LOWEST_SPEED, low, BELOW):
+    """The critical speed (m/s) within HALF_BRACKET of another; an end of that, or a lower speed, where it is not in
+    it."""
+    low, high = (1.0 - HALF_BRACKET) * speed, (1.0 + HALF_BRACKET) * speed
+    for below in np.geomspace(LOWEST_SPEED, low, LOWER_SPEEDS):
         if growth(float(below)) >= 0.0:
             return float(below)
     return high if growth(high) < 0.0 else float(brentq(growth, low, high, xtol=1e-12 * speed, rtol=1e-12))

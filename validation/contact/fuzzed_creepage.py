@@ -29,7 +29,7 @@ OPTIONS: tuple[dict[str, Any], ...] = (
 )
 """What the contacts are computed with, in turn."""
 KINDS = 8
-ALIKE: dict[str, tuple[dict[str, float], tuple[float, ...]]] = {
+SIMILAR_CONTACTS: dict[str, tuple[dict[str, float], tuple[float, ...]]] = {
     "reversal": ({"xi_x": -1.0, "xi_y": -1.0, "spin": -1.0}, (-1.0, -1.0, -1.0)),
     "mirror": ({"xi_y": -1.0, "spin": -1.0}, (1.0, -1.0, -1.0)),
     "similarity": ({"a": 2.0, "b": 2.0, "load": 8.0, "xi_x": 2.0, "xi_y": 2.0}, (8.0, 8.0, 16.0)),
@@ -62,7 +62,7 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     return {"a": a, "b": b, "load": load, "mu": mu, "xi_x": xi_x, "xi_y": xi_y, "spin": spin}
 
 
-def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
+def worst_violation(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
     """Largest violation of each invariant, by mu N and the creepages where it has a size; not finite counts as inf."""
     creep = fastsim(RollingEllipse(**columns), pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
@@ -76,7 +76,7 @@ def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) ->
         return np.array([value / size / unit for value, size, unit in parts])
 
     def unlike(name: str) -> float:
-        factors, sizes = ALIKE[name]
+        factors, sizes = SIMILAR_CONTACTS[name]
         changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
         return _largest_finite(np.abs(forces - relative(fastsim(RollingEllipse(**changed), pair, **options), sizes)))
 

@@ -34,7 +34,7 @@ PLANE = (5.0e-3, 727.0855e-3, -0.2905)
 """Shift (m) at which CONTACT joins two patches, and its plane there: place across the track (m), angle (rad)."""
 CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
-SETTLED, SUNK = 1e-4, 1e-8
+PATCH_LOAD_TOLERANCE, SUNK = 1e-4, 1e-8
 """Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
 SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
@@ -78,7 +78,7 @@ def on_one_plane(contact: Contact, placed: Placed) -> tuple[float, float, list[f
     return 1e3 * float(rows @ (y + s * math.cos(angle)) / rows.sum()), float(solved.pressure.max()) / 1e6, loads
 
 
-def apart(contact: Contact, placed: Placed) -> list[float]:
+def patch_forces(contact: Contact, placed: Placed) -> list[float]:
     """Normal forces (N) of the right wheel's patches, each on a half-space of its own.
 
     Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
@@ -98,7 +98,7 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
                     for touch, cosine, by in zip(touches, cosines, sunk, strict=True)
                 ]
             )
-            if np.abs(forces - before).max() < SETTLED * vertical:
+            if np.abs(forces - before).max() < PATCH_LOAD_TOLERANCE * vertical:
                 return forces
 
     approach = brentq(lambda approach: float(pressed(approach) @ cosines) - vertical, 0.0, 4e-5, xtol=SUNK)
@@ -116,7 +116,7 @@ def _lowered(side: WheelAndRail, placed: Placed) -> Pose:
     return Pose(placed.shift, placed.yaw, placed.roll, side.clearance(pose))
 
 
-def searched(side: WheelAndRail, placed: Placed, sign: float, near: float) -> tuple[float, float, float]:
+def first_touch(side: WheelAndRail, placed: Placed, sign: float, near: float) -> tuple[float, float, float]:
     """First touch of a wheel near a place on it (m from the taping line), by search over points of its surface.
 
     sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.

@@ -21,9 +21,9 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import LONG_C33, LONG_FADING, LONG_RATIOS, NARROW_FADING, RATIOS, STIFFER_SPIN, TABLE
 from models.contact.linear_theory import POWERS as OF_NU
 
-PLACES = np.log(RATIOS)
+LOG_RATIOS = np.log(RATIOS)
 LOGARITHMS = np.log(TABLE)
-NODES = CubicHermiteSpline(PLACES, LOGARITHMS, np.gradient(LOGARITHMS, PLACES, axis=0, edge_order=2))
+NODES = CubicHermiteSpline(LOG_RATIOS, LOGARITHMS, np.gradient(LOGARITHMS, LOG_RATIOS, axis=0, edge_order=2))
 LONG_NODES = make_interp_spline(np.log(LONG_RATIOS), np.log(LONG_C33), k=1)
 Left = Callable[[float], float]
 """Share of the friction that is left at a slip, by the rolling speed."""
@@ -87,7 +87,7 @@ def coefficients(ratio: float, nu: float) -> Array:
     answer = np.array([_by_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
     if inner == ratio:
         return answer
-    asymptote, fading = (narrow, NARROW_FADING) if ratio < 1.0 else (long, LONG_FADING)
+    asymptote, fading = (narrow_coefficients, NARROW_FADING) if ratio < 1.0 else (long_coefficients, LONG_FADING)
     slenderness = min(ratio / inner, inner / ratio)
     return asymptote(ratio, nu) * (1.0 + (answer / asymptote(inner, nu) - 1.0) * slenderness**fading)
 
@@ -97,14 +97,14 @@ def _by_nu(values: Array, power: float, nu: float) -> float:
     return float(barycentric_interpolate([0.0, 0.25, 0.5], values**power, nu)) ** (1.0 / power)
 
 
-def narrow(g: float, nu: float) -> Array:
+def narrow_coefficients(g: float, nu: float) -> Array:
     """First row of Kalker's table E.3 (1990): a/b = g to 0."""
     across, log_16 = math.pi**2 / (4.0 * (1.0 - nu)), math.log(16.0 / g**2)
     spun = math.pi * math.sqrt(g) / (3.0 * (1.0 - nu)) * (1.0 + nu * (0.5 * log_16 + math.log(4.0) - 5.0))
     return np.array([across, math.pi**2 / 4.0, spun, across / (4.0 * g)])
 
 
-def long(ratio: float, nu: float) -> Array:
+def long_coefficients(ratio: float, nu: float) -> Array:
     """Last row of the same table, b/a = g to 0; C33 linear in logarithms through its nodes, and on beyond."""
     g, log_16 = 1.0 / ratio, math.log(16.0 * ratio**2)
     rest = 3.0 - math.log(4.0)

@@ -18,7 +18,7 @@ from scipy.signal import convolve2d
 from models.contact.half_space import Z, influence, offsets
 from models.contact.inputs import Array
 from models.contact.material import Pair
-from models.contact.simplified_kernels import FINER, LEAST
+from models.contact.simplified_kernels import LEAST_STIFFNESS_SHARE, POINTS_PER_MESH
 from models.contact.simplified_theory import SimplifiedOptions
 
 Box = tuple[float, float, float, float]
@@ -135,15 +135,17 @@ def at_depth(bodies: PlainBodies, depth: float, pair: Pair, options: SimplifiedO
     cover = np.clip(0.5 + (depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
     pressure = overlap(depth, bodies.low, height, options)
     u = spread(pressure, step, pair, np.array([Z, Z]))
-    least = LEAST * (depth - bodies.low) / np.average(u, weights=cover)
-    stiffness = max(-1.0 / fitted(height[None], u[None], cover, step, options, True), least)
+    least = LEAST_STIFFNESS_SHARE * (depth - bodies.low) / np.average(u, weights=cover)
+    stiffness = max(-1.0 / fitted_slopes(height[None], u[None], cover, step, options, True), least)
     approach = float(np.average(stiffness * u + height, weights=pressure))
-    m = FINER * n
+    m = POINTS_PER_MESH * n
     fine = overlap(depth, bodies.low, bodies.at(middles(*box[:2], m), middles(*box[2:], m))[0], options)
-    return PlainPatch(depth, float(fine.sum() * step[0] * step[1] / FINER**2), stiffness, approach, box, cover)
+    return PlainPatch(
+        depth, float(fine.sum() * step[0] * step[1] / POINTS_PER_MESH**2), stiffness, approach, box, cover
+    )
 
 
-def fitted(
+def fitted_slopes(
     u: Array, p: Array, cover: Array, step: tuple[float, float], options: SimplifiedOptions, by_height: bool = False
 ) -> float:
     """Slope of u (k, n, n) against p by weighted least squares of all k, or of their slopes; ``by_height``: that of p
@@ -241,7 +243,7 @@ def refitted(pressed: PlainPatch, net: Strips, tractions: Array, pair: Pair, opt
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     p = gathered(net, tractions, box, n)
     u = np.array([sum(spread(p[m], step, pair, np.array([k, m])) for m in range(2)) for k in range(2)])
-    return fitted(u, p, pressed.cover, step, options)
+    return fitted_slopes(u, p, pressed.cover, step, options)
 
 
 def _common(low: Array, high: Array, edges: Array) -> Array:

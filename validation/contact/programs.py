@@ -23,7 +23,9 @@ def compare(cases: list[ContactCase]) -> dict[str, Any]:
     pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
     def old(case: ContactCase) -> Creep:
-        return fastsim(RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **OLD)
+        return fastsim(
+            RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **PROGRAM_OF_1982
+        )
 
     def new(case: ContactCase) -> Rolling:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)
@@ -39,7 +41,7 @@ def compare(cases: list[ContactCase]) -> dict[str, Any]:
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
 
-OLD: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
+PROGRAM_OF_1982: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one", "bound": "parabolic"}
 """The program of 1982, on as many cells as the fine net of the other one has."""
 
 

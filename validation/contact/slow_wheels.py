@@ -18,7 +18,7 @@ DURATION = 0.2
 """s, two periods and more of the suspension."""
 SPEEDS = (1.0, 0.1, 0.05, 0.0)
 METHODS = ("GeneralizedAlpha", "TrapezoidalIndex2")
-MORE = 20
+STEP_RATIO = 20
 """Times the explicit limit that an implicit step is to be, at 1 m/s."""
 STEPS = {1.0: (1e-3, 2e-3, 4e-3), 0.1: (1e-3, 4e-3), 0.05: (1e-3, 4e-3), 0.0: (1e-3, 4e-3)}
 
@@ -59,14 +59,14 @@ def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tu
     return rolling.run(*start, steps, DURATION / steps, method)[: wheels.size], calls[0]
 
 
-def longest(speed: float) -> float:
+def longest_step(speed: float) -> float:
     """Longest step (s) of RK44."""
     return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
 
 
 def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
     """The explicit run at nearly its longest step, against one of half of it, and implicit ones of some steps (s)."""
-    coarse = int(np.ceil(1.05 * DURATION / longest(speed)))
+    coarse = int(np.ceil(1.05 * DURATION / longest_step(speed)))
     true, _ = march(speed, "RK44", 2 * coarse)
     done = []
     for method, count in [("RK44", coarse)] + [(name, round(DURATION / step)) for name in METHODS for step in steps]:
@@ -78,7 +78,7 @@ def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
 
 def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
     """Implicit steps at 1 m/s beside explicit ones, and what is said where none can be taken."""
-    done = runs(1.0, (MORE * longest(1.0), *(() if quick else STEPS[1.0])))
+    done = runs(1.0, (STEP_RATIO * longest_step(1.0), *(() if quick else STEPS[1.0])))
     if not quick:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
     explicit = done[0]
@@ -93,7 +93,8 @@ def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
             "of what is left",
         ).at_most(
             1e-3,
-            f"{MORE} times the explicit limit and of second order: a twentieth of the suspension's shortest period",
+            f"{STEP_RATIO} times the explicit limit and of second order: a twentieth of the suspension's shortest "
+            "period",
             "closed form",
         )
         for run in implicit

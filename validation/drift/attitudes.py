@@ -30,7 +30,7 @@ def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rates, product(product(about, tilt), conjugate(about))
 
 
-def apart(first: np.ndarray, other: np.ndarray) -> float:
+def largest_angle(first: np.ndarray, other: np.ndarray) -> float:
     """Largest angle (rad) between attitudes (..., 4)."""
     return float(np.abs(logarithm(product(conjugate(first), other))).max())
 

@@ -33,7 +33,7 @@ GYRO = 0.1
 """Deviation (rad/s) of the gyro, white at 1 kHz."""
 FRACTION = 0.002
 """Deviation of the force noise by the largest force, at 1 kHz."""
-COARSE = 5e-3
+COARSE_PERIOD = 5e-3
 """Sampling period (s) of the statistics; deviations per sample then keep the intensity of those at 1 kHz."""
 BAND = 15.0
 """Hz, up to which the artificial moment is judged."""
@@ -57,7 +57,7 @@ def force_deviation(true: Result) -> float:
     return FRACTION * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
 
 
-def driven(
+def driven_vehicle(
     folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
 ) -> Scene:
     """The vehicle under the forces in the folder, steps of 1 ms."""
@@ -84,20 +84,20 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
     """
-    true = measured(folder, duration, COARSE)
-    force, angle = at_period(force_deviation(true), COARSE), at_period(ANGLE, COARSE)
-    clean = assemble(driven(folder, duration, {}))
+    true = measured(folder, duration, COARSE_PERIOD)
+    force, angle = at_period(force_deviation(true), COARSE_PERIOD), at_period(ANGLE, COARSE_PERIOD)
+    clean = assemble(driven_vehicle(folder, duration, {}))
     turn = START * float(normal(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
-    states = free_run(replace(clean, initial=start), duration, COARSE)
+    states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
     seen = states[:, 3] + angle * normal(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
-    noisy = assemble(driven(folder, duration, noise_of(force, seed)))
+    noisy = assemble(driven_vehicle(folder, duration, noise_of(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
-        measurement = Measurement(seen[:, None], COARSE, (PITCH,), (angle * np.sqrt(r),))
+        measurement = Measurement(seen[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
         filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START)
-        first = round(1 / COARSE)
+        first = round(1 / COARSE_PERIOD)
         figures[name] = (nees(filtered, states), filtered.surprises[first:], filtered.innovations[first:])
     return figures
 
@@ -116,14 +116,15 @@ def nees(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
 def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     """Transition (14, 14) and stationary covariance of [estimate's error, run's error, force noise], linearised.
 
-    Errors are those of the six relative states at the samples, estimate after its update, ``COARSE`` apart. Exact:
-    exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between samples.
-    deviation : N, of each force sample at COARSE.
+    Errors are those of the six relative states at the samples, estimate after its update, ``COARSE_PERIOD`` apart.
+    Exact: exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between
+    samples.
+    deviation : N, of each force sample at COARSE_PERIOD.
     """
     import control
 
-    force, angle = deviation, at_period(ANGLE, COARSE)
-    assembly = assemble(driven(folder, 1.0, {}, geometry="linear"))
+    force, angle = deviation, at_period(ANGLE, COARSE_PERIOD)
+    assembly = assemble(driven_vehicle(folder, 1.0, {}, geometry="linear"))
     stiffness, damping = spring_of(assembly.parameters, BANDWIDTH, 0.7)
     free, pushes = relative(assembly)
     lever = np.zeros((6, 6))
@@ -154,13 +155,13 @@ def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """First-order hold over COARSE: transition, and what the input's samples at the start and at the end of the step
-    add."""
+    """First-order hold over COARSE_PERIOD: transition, and what the input's samples at the start and at the end of the
+    step add."""
     n, m = b.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b
-    block[n : n + m, n + m :] = np.eye(m) / COARSE
-    moved = expm(block * COARSE)
+    block[n : n + m, n + m :] = np.eye(m) / COARSE_PERIOD
+    moved = expm(block * COARSE_PERIOD)
     late = moved[:n, n + m :]
     return moved[:n, :n], moved[:n, n : n + m] - late, late
 
@@ -168,22 +169,24 @@ def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
     """Errors (n, 12) of estimate and run as ``closed_loop`` orders them, after 2 s: the effect itself, linearised.
 
-    deviation : N, at COARSE. The true vehicle rests, because the interpolation of a moving estimate between its
+    deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
     samples would add an error that is no noise.
     """
     rest = assemble(build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}}))
-    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE)
-    count = round(duration / COARSE) + 1
-    write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE)
+    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE_PERIOD)
+    count = round(duration / COARSE_PERIOD) + 1
+    write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
     seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
-    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE)
+    write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE_PERIOD)
     effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
     noise = noise_of(deviation, seed)
-    drawn = driven(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
-    run = free_run(assemble(drawn), duration, COARSE)
-    guide = guide_of(assemble(driven(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"])
+    drawn = driven_vehicle(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
+    run = free_run(assemble(drawn), duration, COARSE_PERIOD)
+    guide = guide_of(
+        assemble(driven_vehicle(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"]
+    )
     errors = np.hstack([guide.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
-    return errors[round(2 / COARSE) :]
+    return errors[round(2 / COARSE_PERIOD) :]
 
 
 def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) -> np.ndarray:
@@ -207,7 +210,7 @@ def stabilised(
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
     force = force_deviation(true)
     effect = {"file": "read.csv", "force_deviation": force, "pitch_deviation": ANGLE, "inertia_deviation": INERTIA}
-    scene = driven(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}, wrong=wrong)
+    scene = driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}, wrong=wrong)
     return {engine: _scored(true, simulate(scene, engine)) for engine in engines}
 
 
@@ -238,18 +241,18 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     """
     import control
 
-    true = measured(folder, duration, COARSE)
-    force, gyro = at_period(force_deviation(true), COARSE), at_period(GYRO, COARSE)
-    assembly = assemble(driven(folder, duration, noise_of(force, seed)))
+    true = measured(folder, duration, COARSE_PERIOD)
+    force, gyro = at_period(force_deviation(true), COARSE_PERIOD), at_period(GYRO, COARSE_PERIOD)
+    assembly = assemble(driven_vehicle(folder, duration, noise_of(force, seed)))
     clean = true.states
     seen = clean[:, 7] + gyro * normal(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
-    estimated = estimate(assembly, Measurement(seen[:, None], COARSE, (RATE,), (gyro,)), force)
+    estimated = estimate(assembly, Measurement(seen[:, None], COARSE_PERIOD, (RATE,), (gyro,)), force)
     p, sure = assembly.parameters, np.sqrt(estimated.errors()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
     growth = rms(true["pitch_rate"]) * np.sqrt(p.I / inertia)
-    push = (force**2 * COARSE * (p.a**2 + p.b**2)) / inertia**2
+    push = (force**2 * COARSE_PERIOD * (p.a**2 + p.b**2)) / inertia**2
     model, see = np.array([[0.0, 1.0], [growth**2, 0.0]]), np.array([[0.0, 1.0]])
-    law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE]]))[0]
+    law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE_PERIOD]]))[0]
     wrong = estimated.states[len(clean) // 6 :, PITCH] - clean[len(clean) // 6 :, 3]
     return {
         "stated": float(sure[-1]),
@@ -268,23 +271,23 @@ def with_gaps(
     outage: tuple[float, float] | None,
 ) -> dict[str, float]:
     """A stabilised run on a file with holes: its worst error by the deviation that the filter states, and counts."""
-    true = measured(folder, duration, COARSE)
-    deviations = {PITCH: at_period(ANGLE, COARSE), RATE: at_period(GYRO, COARSE)}
-    clean = free_run(assemble(driven(folder, duration, {})), duration, COARSE)
+    true = measured(folder, duration, COARSE_PERIOD)
+    deviations = {PITCH: at_period(ANGLE, COARSE_PERIOD), RATE: at_period(GYRO, COARSE_PERIOD)}
+    clean = free_run(assemble(driven_vehicle(folder, duration, {})), duration, COARSE_PERIOD)
     noise = normal(seed, 0, len(clean), 3, source=PITCH_SENSOR)
     lost = np.abs(noise[:, 2]) < random_gaps
     if outage is not None:
-        lost[round(outage[0] / COARSE) : round(outage[1] / COARSE)] = True
+        lost[round(outage[0] / COARSE_PERIOD) : round(outage[1] / COARSE_PERIOD)] = True
     names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
-    table, force = {}, at_period(force_deviation(true), COARSE)
+    table, force = {}, at_period(force_deviation(true), COARSE_PERIOD)
     effect: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
     for i, column in enumerate(columns):
         name, unit, state, key = names[column]
         table[name] = (unit, np.where(lost, np.nan, clean[:, state] + deviations[column] * noise[:, i]))
         effect[key] = deviations[column]
-    write_time_series(folder / "read.csv", table, COARSE)
-    run = simulate(driven(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}), "reference")
-    every = round(COARSE / 1e-3)
+    write_time_series(folder / "read.csv", table, COARSE_PERIOD)
+    run = simulate(driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}), "reference")
+    every = round(COARSE_PERIOD / 1e-3)
     wrong = run["pitch_estimate"][::every] - clean[:, 3]
     sure = run["pitch_deviation"][::every]
     return {

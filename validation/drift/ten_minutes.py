@@ -23,11 +23,11 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Draw errors like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import BLUE, WIDE, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, heading, subplots
 
     figures = []
     if data["ten minutes"]:
-        figure, axes = subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
+        figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.0), sharey=True)
         paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
         times = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):

@@ -16,7 +16,7 @@ import numpy as np
 from models.advice.price import Answer, Ladder, recommendation, search, truth
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice
-from models.advice.price.truth import Truth, at
+from models.advice.price.truth import Truth, values_at
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -27,7 +27,7 @@ STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "RK4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
 }
 """Places of stages within a step, each from the one before, and weights."""
-LOOSE, TIGHT = 0.03, 6e-7
+LOOSE_TOLERANCE, TIGHT_TOLERANCE = 0.03, 6e-7
 """Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
 CALL = 1e-6
 """s, of a force call by the clock of these checks."""
@@ -126,12 +126,12 @@ def _choice_for(tolerance: float) -> Recommendation:
     with ExitStack() as patched:
         for module in (recommendation, search, truth):
             patched.enter_context(patch.object(module, "time", CLOCK))
-        patched.enter_context(patch.object(recommendation, "LEAST", 0.0))  # a turn is a run
+        patched.enter_context(patch.object(recommendation, "SHORTEST_TURN", 0.0))  # a turn is a run
         return recommendation.recommend(Swing(), tolerance)
 
 
 def _largest_winner(
-    size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT,)
+    size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT_TOLERANCE,)
 ) -> float:
     """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
     return max(
@@ -162,18 +162,21 @@ def _excess_calls(choice: SettingChoice, tolerance: float) -> float:
 CHECKS = {
     "held": Check("true error by the tolerance", "", 1.0, lambda: _largest_winner(_error_by_tolerance)),
     "told": Check(
-        "logarithm of predicted by true error", "", 0.1, lambda: _largest_winner(_log_error_ratio, "", (LOOSE, TIGHT))
+        "logarithm of predicted by true error",
+        "",
+        0.1,
+        lambda: _largest_winner(_log_error_ratio, "", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
     ),
     "calls": Check(
         "force calls beyond the fewest that hold the tolerance",
         "",
         1e-12,
-        lambda: _largest_winner(_excess_calls, "calls", (LOOSE, TIGHT)),
+        lambda: _largest_winner(_excess_calls, "calls", (LOOSE_TOLERANCE, TIGHT_TOLERANCE)),
     ),
     "seconds": Check(
         "the same of the setting recommended by seconds, where a call costs the same in all",
         "",
-        recommendation.SLOWER - 1.0,
+        recommendation.SLOWER_RATIO - 1.0,
         lambda: _largest_winner(_excess_calls, "seconds"),
     ),
 }
@@ -202,12 +205,12 @@ def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> Setti
 
 
 def _mean(self: Truth, other: Answer) -> float:
-    exact = at(self.answer, other.times, self.kink_period)
+    exact = values_at(self.answer, other.times, self.kink_period)
     return float(np.abs(other.values - exact).mean()) if np.isfinite(other.values).all() else np.inf
 
 
 def _numbers_alone(self: Truth, other: Answer) -> float:
-    exact = at(self.answer, other.times, self.kink_period)
+    exact = values_at(self.answer, other.times, self.kink_period)
     return float(np.nanmax(np.abs(other.values - exact)))
 
 

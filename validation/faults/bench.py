@@ -33,7 +33,7 @@ from validation.common.checks import (
 
 STEP = 1e-3
 SAMPLING_PERIOD = 2e-3
-SHORT = 2.5e-4
+ORDER_STEP = 2.5e-4
 """Step of the order check (s), where the stiff wheels no longer bend the observed order of RK4."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
@@ -107,7 +107,7 @@ class Bench:
     @cached_property
     def truth(self) -> Trajectory:
         """The road run of the reference at a sixteenth of the order check's step."""
-        return checks.engine("reference")(self.road, Settings("RK4", SHORT / 16, self.duration)).run()
+        return checks.engine("reference")(self.road, Settings("RK4", ORDER_STEP / 16, self.duration)).run()
 
     @cache  # noqa: B019 - a bench lives as long as its case
     def path(self, situation: str) -> Trajectory:
@@ -156,7 +156,7 @@ def _audit(bench: Bench, engine: str, make: Make) -> float:
 
 
 def _order(bench: Bench, engine: str, make: Make) -> float:
-    return order_gap(make, bench.road, replace(bench.settings(engine), step=SHORT), bench.truth)
+    return order_gap(make, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
 
 
 def _momentum(bench: Bench, engine: str, make: Make) -> float:

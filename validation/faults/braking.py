@@ -16,12 +16,12 @@ from models.brake.advance import advance
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
 from models.brake.port import sensors
 from models.brake.quarter import QuarterPath, QuarterStop
-from models.brake.surfaces import EVEN, Road, Stretch, road
+from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
 from validation.braking.braked_truck import Moving, on_road
-from validation.braking.quarter_stops import LITERAL, exact, stopped
+from validation.braking.quarter_stops import LITERAL, exact_distance, stopped
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -30,7 +30,7 @@ SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 def _first_step(course: Road, steer: float = 0.0) -> Moving:
     """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
-    tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
+    tables = tyre_table.stacked([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
     truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, go=advance)
     if not steer:
         truck.turning[:] = 0.0
@@ -38,26 +38,26 @@ def _first_step(course: Road, steer: float = 0.0) -> Moving:
     return truck
 
 
-DRY = stops.met("dry")[0]
-LEVEL = stops.steady(stops.FRONT, DRY, 0.004)[1]
+DRY = stops.friction_table("dry")[0]
+LEVEL = stops.steady_torque(stops.FRONT, DRY, 0.004)[1]
 """Torque (N m) of light braking."""
 
 
 def _light() -> float:
     """Quarter vehicle, light braking on dry road: way against the exact one."""
-    return abs(stops.stop(stops.FRONT, stops.met("dry"), LEVEL, 11.11).distance / _exact_distance() - 1.0)
+    return abs(stops.stop(stops.FRONT, stops.friction_table("dry"), LEVEL, 11.11).distance / _exact_distance() - 1.0)
 
 
 @cache
 def _exact_distance() -> float:
     """The exact stopping distance (m)."""
-    return exact(stops.FRONT, DRY, LEVEL, 11.11)
+    return exact_distance(stops.FRONT, DRY, LEVEL, 11.11)
 
 
 def _transfer() -> float:
     """Locked on even friction: load of the front wheels against W (b + mu h) / (2 L), relative."""
-    report = _first_step(EVEN).report
-    slide = float(stops.met("ice")[0].mu_x[0, 0, -1])
+    report = _first_step(UNIFORM_ROAD).report
+    slide = float(stops.friction_table("ice")[0].mu_x[0, 0, -1])
     base = 1.42 + 2.19
     wanted = 5640.0 * GRAVITY * (2.19 + slide * 1.2) / (2.0 * base)
     return float(np.abs(report.load[:2] / wanted - 1.0).max())
@@ -73,7 +73,7 @@ def _split() -> float:
 
 def _turns_left() -> float:
     """Steered to the left: 1 if the truck does not yaw to the left, and 1 if it is not the left that is unloaded."""
-    truck = _first_step(EVEN, 0.05)
+    truck = _first_step(UNIFORM_ROAD, 0.05)
     return float(not truck.state[1, 2] > 0.0) + float(not truck.report.load[0] < truck.report.load[1])
 
 
@@ -106,7 +106,7 @@ def _nodes() -> float:
 
 def _distance_at_steady_slip() -> float:
     """Quarter vehicle at a slip that stays: way against m v^2 / (2 F), as in the hard case of that name."""
-    return float(wheels.steady(wheels.DRY, 0.02)("reference", Path()))
+    return float(wheels.steady_slip_case(wheels.DRY, 0.02)("reference", Path()))
 
 
 def _code() -> float:

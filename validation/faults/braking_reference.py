@@ -28,17 +28,19 @@ BOUND = 1e-10
 
 def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60) -> Callable[[], float]:
     """Compiled beside plain at so many states."""
-    return lambda: laws.largest(*sides(count))
+    return lambda: laws.largest_difference(*sides(count))
 
 
 def _accelerations() -> float:
     """Difference in accelerations of a vehicle that is built anew, with the fault."""
-    accelerations = whole.accelerations(whole.bent.__wrapped__(), ENGINE, COUNT)
-    return whole.apart(accelerations, whole.plain_accelerations("bent", COUNT))
+    accelerations = whole.accelerations(whole.car_with_stops.__wrapped__(), ENGINE, COUNT)
+    return whole.relative_difference(accelerations, whole.plain_accelerations("bent", COUNT))
 
 
 def _stop() -> float:
-    return whole.paths_apart(whole.run(whole.bent.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION))
+    return whole.paths_apart(
+        whole.run(whole.car_with_stops.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION)
+    )
 
 
 def _lagging() -> float:
@@ -56,7 +58,7 @@ CHECKS = {
     "pressure": Check(
         "pressures and torques along commands", "by the largest", 1e-12, _law(laws.torques_by_commands, 20)
     ),
-    "relaxation": Check("slip angles that lag", "by the largest", 1e-12, _law(laws.lags)),
+    "relaxation": Check("slip angles that lag", "by the largest", 1e-12, _law(laws.slip_lags)),
 }
 
 

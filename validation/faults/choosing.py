@@ -18,7 +18,7 @@ from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.choice.drawn_scenes import Asked
 from validation.choice.drawn_scenes import draw_scene as drawn_run
-from validation.choice.judged import JudgedByRuns, asked, changes_by_frequency, judged_of, worst_nearby
+from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import attribute
 from validation.ride.drawn_rides import Drawn, drawn
@@ -56,7 +56,7 @@ def _by_runs() -> JudgedByRuns:
 
 @cache
 def _linear_by(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
-    chooser = asked(_linear())
+    chooser = asked_speeds(_linear())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWS, DRAWS) * chooser.tolerance
     return choice, changes_by_frequency(chooser, choice), nearby

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from models.drawing.figures import SMALL, WIDE, heading, subplots
+from models.drawing.figures import COLUMN_WIDTH, SMALL_TEXT, heading, subplots
 
 DECADES = 12
 """End of the colour scale; a refused run counts as this."""
@@ -25,15 +25,15 @@ def fault_map(
 
     ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
     """
-    figure, axes = subplots(1, len(ratios), figsize=(WIDE, 1.6 + 0.17 * len(faults)), sharey=True)
+    figure, axes = subplots(1, len(ratios), figsize=(COLUMN_WIDTH, 1.6 + 0.17 * len(faults)), sharey=True)
     heading(figure, "Which check sees which fault: decades above its tolerance")
     for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
         image = _cells(axis, np.array(values), checks)
         axis.set_title(titles[vehicle])
     first, last = np.atleast_1d(axes)[[0, -1]]
-    first.set_yticks(range(len(faults)), faults, fontsize=SMALL)
+    first.set_yticks(range(len(faults)), faults, fontsize=SMALL_TEXT)
     for row in np.flatnonzero(hidden):
-        last.text(len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL, color="#b03000")
+        last.text(len(checks) / 2 - 0.5, row, "hidden", ha="center", va="center", fontsize=SMALL_TEXT, color="#b03000")
     bar = figure.colorbar(image, ax=axes, shrink=0.4, aspect=30, pad=0.01)
     bar.set_label("size of what it sees / tolerance [decades]")
     return figure
@@ -42,7 +42,7 @@ def fault_map(
 def _cells(axis: Any, ratios: np.ndarray, checks: Sequence[str]) -> Any:
     decades = np.log10(np.clip(ratios, 1e-3, 10.0**DECADES))
     image = axis.imshow(np.where(ratios > 1, decades, np.nan), cmap=BLUES, vmin=0, vmax=DECADES, aspect="auto")
-    axis.set_xticks(range(len(checks)), checks, rotation=45, ha="right", rotation_mode="anchor", fontsize=SMALL)
+    axis.set_xticks(range(len(checks)), checks, rotation=45, ha="right", rotation_mode="anchor", fontsize=SMALL_TEXT)
     axis.set_xticks(np.arange(0.5, len(checks) - 1), minor=True)
     axis.set_yticks(np.arange(0.5, len(ratios) - 1), minor=True)
     axis.grid(False)

@@ -22,7 +22,7 @@ from validation.faults.patches import Patch, attribute
 LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 """Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
 PRINTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
-PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
+SENSOR_PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
 PERIOD, COUNT = 5e-3, 400
 UNITS = {
     ("kN", "force"): 1e3,
@@ -89,7 +89,7 @@ def _clock() -> float:
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
         times = np.arange(round(1.5 * rate)) / rate
-        values = resampling.onto(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
+        values = resampling.resample_to(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
         worst = max(worst, float(np.abs(values - np.sin(4 * np.pi * grid)).max()))
     return worst
 
@@ -97,7 +97,7 @@ def _clock() -> float:
 def _gap() -> float:
     """Points that are numbers within a gap of ten samples, of nine."""
     times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
-    values = resampling.onto(times, times, 0.01, np.arange(41, 48) / 100.0)
+    values = resampling.resample_to(times, times, 0.01, np.arange(41, 48) / 100.0)
     return float(np.isfinite(values).sum())
 
 
@@ -118,7 +118,7 @@ def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     S = matrix(from_cardan(none, pitch, none))
     felt = np.einsum("nji,nj->ni", S, np.column_stack([none, none, heave - 9.81]))
     w, alpha = (np.column_stack([none, component, none]) for component in (rate, turn))
-    return sensor_array(PLACES), in_space(np.array(list(PLACES.values())), felt, w, alpha), pitch, heave
+    return sensor_array(SENSOR_PLACES), in_space(np.array(list(SENSOR_PLACES.values())), felt, w, alpha), pitch, heave
 
 
 def _motion() -> float:
@@ -182,7 +182,7 @@ def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
 
 def _change_resampling(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
     return attribute(
-        "models.measured.resampling:onto",
+        "models.measured.resampling:resample_to",
         lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
     )
 
@@ -204,7 +204,9 @@ def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     return attribute(
         "models.sensors.rigid_body_motion:spin",
         lambda real: (
-            lambda array, readings: real(array, change(readings) if readings.shape[1] == len(PLACES) else readings)
+            lambda array, readings: real(
+                array, change(readings) if readings.shape[1] == len(SENSOR_PLACES) else readings
+            )
         ),
     )
 

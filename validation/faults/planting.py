@@ -20,7 +20,7 @@ from validation.faults import patches
 from validation.faults.changes import Change
 from validation.faults.patches import Context, Patch, attribute, rewritten
 
-BOTH = ("exudyn", "mujoco")
+BOTH_ENGINES = ("exudyn", "mujoco")
 EXUDYN, MUJOCO, HAND = ("exudyn",), ("mujoco",), ("reference",)
 FORCES = ("force", "pitch")
 
@@ -79,54 +79,62 @@ def _euler(settings: Settings) -> Settings:
     return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
 
 
-CLEAN = (Fault("no fault", (*BOTH, *HAND)), Fault("no fault, equations interpreted", HAND, inside=rewritten()))
+CLEAN = (Fault("no fault", (*BOTH_ENGINES, *HAND)), Fault("no fault, equations interpreted", HAND, inside=rewritten()))
 
 DESCRIPTION = (
-    Fault("a and b swapped", BOTH, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
-    Fault("sign of pitch mirrored", BOTH, change.with_moved_points(lambda x, a, b: -x)),
-    Fault("front and rear suspension swapped", BOTH, change.swapped("suspension3", "suspension4")),
-    Fault("front and rear tyre swapped", BOTH, change.swapped("tyre1", "tyre2")),
-    Fault("front and rear wheel mass swapped", BOTH, change.bodies(change.swapped_wheel)),
-    Fault("mass and pitch inertia of the chassis exchanged", BOTH, change.bodies(change.mixed_inertia)),
-    Fault("pitch inertia about the front axle", BOTH, change.inertia_about_axle),
-    Fault("front suspension 1 % too stiff", BOTH, change.stiffened("suspension3", 1.01)),
-    Fault("front suspension in N/mm", BOTH, change.stiffened("suspension3", 1e-3)),
-    Fault("tyre damping dropped", BOTH, change.struts(change.undamped_tyre)),
-    Fault("linear geometry where exact was asked for", BOTH, change.vehicle(lambda v: replace(v, geometry="linear"))),
-    Fault("gravity upward", BOTH, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
-    Fault("gravity 9.80665 for 9.81", BOTH, change.vehicle(lambda v: replace(v, gravity=9.80665))),
-    Fault("start from zero heave", BOTH, change.unstressed_start),
-    Fault("dead band missing", BOTH, change.springs(lambda spring: replace(spring, dead_band=0.0))),
-    Fault("dead band counted as a width", BOTH, change.springs(lambda s: replace(s, dead_band=s.dead_band / 2))),
+    Fault("a and b swapped", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
+    Fault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
+    Fault("front and rear suspension swapped", BOTH_ENGINES, change.swapped("suspension3", "suspension4")),
+    Fault("front and rear tyre swapped", BOTH_ENGINES, change.swapped("tyre1", "tyre2")),
+    Fault("front and rear wheel mass swapped", BOTH_ENGINES, change.bodies(change.swapped_wheel)),
+    Fault("mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.bodies(change.mixed_inertia)),
+    Fault("pitch inertia about the front axle", BOTH_ENGINES, change.inertia_about_axle),
+    Fault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened("suspension3", 1.01)),
+    Fault("front suspension in N/mm", BOTH_ENGINES, change.stiffened("suspension3", 1e-3)),
+    Fault("tyre damping dropped", BOTH_ENGINES, change.struts(change.undamped_tyre)),
+    Fault(
+        "linear geometry where exact was asked for",
+        BOTH_ENGINES,
+        change.vehicle(lambda v: replace(v, geometry="linear")),
+    ),
+    Fault("gravity upward", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
+    Fault("gravity 9.80665 for 9.81", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=9.80665))),
+    Fault("start from zero heave", BOTH_ENGINES, change.unstressed_start),
+    Fault("dead band missing", BOTH_ENGINES, change.springs(lambda spring: replace(spring, dead_band=0.0))),
+    Fault(
+        "dead band counted as a width", BOTH_ENGINES, change.springs(lambda s: replace(s, dead_band=s.dead_band / 2))
+    ),
 )
 """In the description that an engine is built from."""
 
 INPUT = (
-    Fault("input half a sample late", BOTH, change.with_late_input(0.5)),
-    Fault("input a whole sample late", BOTH, change.with_late_input(1.0)),
-    Fault("road held at the middle stages", BOTH, change.driven(("road",), change.HeldStages)),
-    Fault("rear wheel ahead of the front one", BOTH, change.road(wheelbase=-1.0)),
-    Fault("rear delay missing", BOTH, change.road(wheelbase=0.0)),
-    Fault("speed in km/h", BOTH, change.road(speed=3.6)),
-    Fault("rate of the road missing", BOTH, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
-    Fault("left track instead of the mean", BOTH, change.driven(("road",), change.OtherTrack)),
-    Fault("wheel forces in kN", BOTH, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
-    Fault("wheel forces with the other sign", BOTH, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))),
-    Fault("front wheel force at both wheels", BOTH, change.channels(FORCES, change.front_twice)),
-    Fault("wheel forces along the chassis, not vertical", BOTH, change.body_fixed),
+    Fault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
+    Fault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
+    Fault("road held at the middle stages", BOTH_ENGINES, change.driven(("road",), change.HeldStages)),
+    Fault("rear wheel ahead of the front one", BOTH_ENGINES, change.road(wheelbase=-1.0)),
+    Fault("rear delay missing", BOTH_ENGINES, change.road(wheelbase=0.0)),
+    Fault("speed in km/h", BOTH_ENGINES, change.road(speed=3.6)),
+    Fault("rate of the road missing", BOTH_ENGINES, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
+    Fault("left track instead of the mean", BOTH_ENGINES, change.driven(("road",), change.OtherTrack)),
+    Fault("wheel forces in kN", BOTH_ENGINES, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
+    Fault("wheel forces with the other sign", BOTH_ENGINES, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))),
+    Fault("front wheel force at both wheels", BOTH_ENGINES, change.channels(FORCES, change.front_twice)),
+    Fault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed),
     Fault(
         "prescribed pitch in degrees",
-        BOTH,
+        BOTH_ENGINES,
         change.channels(("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi))),
     ),
     Fault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
     Fault("rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))),
     Fault(
-        "prescribed heave upward", BOTH, change.channels(("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0)))
+        "prescribed heave upward",
+        BOTH_ENGINES,
+        change.channels(("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0))),
     ),
-    Fault("added moment with the other sign", BOTH, change.moment(0.0, change.times({0: -1.0}))),
-    Fault("added moment half a sample late", BOTH, change.moment(0.5)),
-    Fault("Euler where Runge-Kutta was asked for", BOTH, settings=_euler),
+    Fault("added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.times({0: -1.0}))),
+    Fault("added moment half a sample late", BOTH_ENGINES, change.moment(0.5)),
+    Fault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_euler),
 )
 """In the input or the settings that an engine is run with."""
 

@@ -89,7 +89,7 @@ CHECKS = {
 }
 
 
-ALL = (0, 1, 2, 3)
+ALL_WHEELS = (0, 1, 2, 3)
 
 
 def tyre(column: int, factor: float, which: tuple[int, ...] = (0,), more: float = 0.0) -> Patch:
@@ -112,8 +112,8 @@ FAULTS = tuple(
     Fault(name, "tyre", patch)
     for name, patch in (
         ("bristles of one tyre 1 % stiffer", tyre(at.BRISTLES, 1.01)),
-        ("bristles of all tyres 1 % stiffer", tyre(at.BRISTLES, 1.01, ALL)),
-        ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL)),
+        ("bristles of all tyres 1 % stiffer", tyre(at.BRISTLES, 1.01, ALL_WHEELS)),
+        ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL_WHEELS)),
         ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
         ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
         ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, more=9e-3)),

@@ -32,7 +32,7 @@ STATES = np.array(
 """Moved from rest (m, rad, m/s, rad/s): the second one slides all over."""
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 SPEED, SLIDING = 60.0, 1
-TINY = 1e-6
+HALF_DIFFERENCE_TIME = 1e-6
 """s: half the time over which energies are differentiated."""
 
 
@@ -73,9 +73,11 @@ def _balance() -> float:
     """
     written, there = equations(), states()
     rates, powers = rates_and_powers(written, there)
-    ahead, behind = (np.sum(energies(written, there + part * TINY * rates), axis=0) for part in (1.0, -1.0))
+    ahead, behind = (
+        np.sum(energies(written, there + part * HALF_DIFFERENCE_TIME * rates), axis=0) for part in (1.0, -1.0)
+    )
     stored, driven, *lost = powers.T
-    missing = (ahead - behind) / (2.0 * TINY) + stored - driven + sum(lost)
+    missing = (ahead - behind) / (2.0 * HALF_DIFFERENCE_TIME) + stored - driven + sum(lost)
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 

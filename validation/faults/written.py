@@ -22,7 +22,7 @@ from models.vehicles.spatial_linear import Preloads
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.faults.tyres import ALL, tyre
+from validation.faults.tyres import ALL_WHEELS, tyre
 from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_input_sets, rolling_cars, rolling_states
 
 BOUND = 1e-12
@@ -169,8 +169,8 @@ def _turned_products(inertia: np.ndarray) -> np.ndarray:
 
 TABLE, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
 FAULTS = (
-    Fault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL)),
-    Fault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL)),
+    Fault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL_WHEELS)),
+    Fault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
     Fault("preload of a spring 1 % off, on tyres", "preload", _preload(TABLE)),
     Fault("preload of a spring 1 % off, cut", "preload", _preload("models.vehicles.cut_vehicle")),
     Fault("one wave of the road 1 % higher", "road", attribute(f"{TABLE}:table", _waves)),

@@ -13,7 +13,7 @@ from models.sensors.sensor_array import sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, driven, largest, rms, settings, vehicle
+from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, rms, settings, vehicle
 
 PERIOD, NOISE = 1e-3, 0.1
 FLOOR = {
@@ -45,7 +45,7 @@ def _read(
         initial=start if initial is None else initial,
         effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
     )
-    assembly = base if initial is None else driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
+    assembly = base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
     engine_settings = settings(engine, PERIOD, 0.3)
     model = build(engine, assembly, engine_settings)
     run = simulate(assembly.scene, engine, engine_settings, assembly)
@@ -71,7 +71,7 @@ def plane(engine: str, folder: Path) -> float:
     """Sensors on a flat floor; the pitch axis lies in their plane."""
     felt, states, true = _read(engine, FLOOR)
     computed = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
-    return largest(computed - true) / largest(true)
+    return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
 def plane_naive(folder: Path) -> str:
@@ -105,13 +105,13 @@ def bracket(engine: str, folder: Path) -> float:
     keep = [name != loose for name in places]
     rest = sensor_array({name: place for name, place in places.items() if name != loose})
     computed = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
-    return largest(computed - true) / largest(true)
+    return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
 def bracket_naive(folder: Path) -> str:
     """The printed formula on all six."""
     felt, _, true = _read("reference", ROOFED, BRACKET)
-    wrong = largest(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / largest(true)
+    wrong = largest_magnitude(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / largest_magnitude(true)
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
@@ -119,7 +119,7 @@ def gap(engine: str, folder: Path) -> float:
     """One reading is not a number."""
     felt, states, _ = _read(engine, ROOFED)
     felt[100, 2, 0] = np.nan
-    return largest(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
+    return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
 
 
 def gap_naive(folder: Path) -> str:
@@ -143,13 +143,13 @@ def tumbling(engine: str, folder: Path) -> float:
     felt, states, start = _falling(engine, 1.4, 3.0)
     orientation = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
     none = np.zeros(len(states))
-    return largest(matrix(orientation) - matrix(from_cardan(none, states[:, 3], none)))
+    return largest_magnitude(matrix(orientation) - matrix(from_cardan(none, states[:, 3], none)))
 
 
 def locked(engine: str, folder: Path) -> float:
     """The nose points straight up, and someone asks for roll and yaw."""
     felt, _, start = _falling(engine, np.pi / 2, 0.0)
-    return largest(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
+    return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
 
 
 def locked_naive(folder: Path) -> str:

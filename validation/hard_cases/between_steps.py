@@ -26,7 +26,7 @@ from models.systems.hub_forces.run import run as run_on_hubs
 from models.systems.hub_forces.scene import build as build_hubs
 from validation.braking.braked_trucks import braking_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
-from validation.hard_cases.rolling import STEP, built
+from validation.hard_cases.rolling import STEP, built_wheelset
 
 HANDLED: dict[str, Word] = {"reference": "refused"}
 """Handling has two implementations."""
@@ -36,7 +36,7 @@ def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callabl
     """A case of a wheelset that is let go 5 mm beside the middle, for a fifth of a second in the usual steps."""
 
     def error(implementation: str, folder: Path) -> float:
-        wheelset = built(implementation, CHOSEN.changed(**changed), speed)
+        wheelset = built_wheelset(implementation, CHOSEN.changed(**changed), speed)
         start = wheelset.displaced(5e-3)
         start[3] = yaw
         ends = [wheelset.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
@@ -63,7 +63,7 @@ def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
     return error
 
 
-def asked(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
+def refused_case(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
     """A case that is to be refused; an answer is wrong."""
 
     def error(implementation: str, folder: Path) -> float:
@@ -229,7 +229,7 @@ CASES = (
         once=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True)
+        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, once=True)
         for name, hard, answer in (
             (
                 "driver who steers within 0.5 ms",

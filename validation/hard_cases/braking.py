@@ -12,12 +12,12 @@ import numpy as np
 from models.brake.brake import Brake
 from models.brake.plane_vehicle import PAPER, truck
 from models.brake.quarter import braked
-from models.brake.surfaces import EVEN, Stretch, check_way, road
+from models.brake.surfaces import UNIFORM_ROAD, Stretch, check_way, road
 from models.core.errors import InputError
 from models.tyre.tyre_table import stacked
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
-from validation.braking.braked_wheels import DRY, bent
+from validation.braking.braked_wheels import DRY, bent_friction
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 
@@ -49,23 +49,25 @@ def fails(name: str, hard: str, error: wheels.Error) -> Case:
     return Case(name, hard, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised"))
 
 
-LINE = bent((0.0, 0.0), (1.0, 0.9))
+LINE = bent_friction((0.0, 0.0), (1.0, 0.9))
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CASES = (
     stops(
         "light braking to a stop",
         "slip has the speed in its denominator, which ends at 0",
-        wheels.steady(DRY, 0.02),
+        wheels.steady_slip_case(DRY, 0.02),
         1e-7,
     ),
     stops(
-        "light braking to a stop, 20 ms", "50 time constants of the wheel in a step", wheels.steady(DRY, 0.004, 2e-2)
+        "light braking to a stop, 20 ms",
+        "50 time constants of the wheel in a step",
+        wheels.steady_slip_case(DRY, 0.004, 2e-2),
     ),
-    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.steady(LINE, 0.5)),
+    stops("table of a single cell", "slip 0 and 1 are its only nodes", wheels.steady_slip_case(LINE, 0.5)),
     stops(
         "slip that settles on a node",
         "the slope of friction jumps there",
-        wheels.steady(bent((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
+        wheels.steady_slip_case(bent_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
     ),
     Case(
         "from rolling, 20 ms",
@@ -159,7 +161,13 @@ CASES = (
         trucks.energy_grows((8.0, 0.0, 3.0), 2e4),
     ),
     Case(
-        "truck on even friction", "rounding left and right", "does not yaw", "m, rad, rad/s", 0.0, "exact", trucks.even
+        "truck on even friction",
+        "rounding left and right",
+        "does not yaw",
+        "m, rad, rad/s",
+        0.0,
+        "exact",
+        trucks.on_even_friction,
     ),
     Case(
         "truck on split friction in a mirror",
@@ -253,24 +261,26 @@ CASES = (
         once=True,
     ),
     fails("truck that rolls over", "both wheels of a side bear nothing", trucks.turned_over),
-    fails("299 bar of a supply of 6", "more than there is", trucks.answers(6.0, pressures=np.full(4, 299.0))),
+    fails("299 bar of a supply of 6", "more than there is", trucks.nonsense_answers(6.0, pressures=np.full(4, 299.0))),
     fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting),
     fails(
         "controller answers not a number",
         "would spread to every state",
-        trucks.answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
+        trucks.nonsense_answers(pressures=np.array([1.0, np.nan, 1.0, 1.0])),
     ),
-    fails("controller answers for three wheels", "of four", trucks.answers(valves=np.ones(3, dtype=np.int64))),
-    fails("controller answers nothing", "neither valves nor pressures", trucks.answers()),
+    fails("controller answers for three wheels", "of four", trucks.nonsense_answers(valves=np.ones(3, dtype=np.int64))),
+    fails("controller answers nothing", "neither valves nor pressures", trucks.nonsense_answers()),
     *(
         Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refused(run), REFUSED)
         for name, run in (
             (
                 "torque that drives the wheel",
-                lambda: braked(wheels.QUARTER, stacked([DRY]), EVEN, np.full(3, -1.0), wheels.STEP, wheels.SPEED),
+                lambda: braked(
+                    wheels.QUARTER, stacked([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
+                ),
             ),
-            ("table that ends before it locks", lambda: bent((0.0, 0.0), (0.9, 0.8))),
-            ("table with friction at no slip", lambda: bent((0.0, 0.1), (1.0, 0.8))),
+            ("table that ends before it locks", lambda: bent_friction((0.0, 0.0), (0.9, 0.8))),
+            ("table with friction at no slip", lambda: bent_friction((0.0, 0.1), (1.0, 0.8))),
             (
                 "stretches shorter than a step",
                 lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),

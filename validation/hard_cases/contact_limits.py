@@ -16,14 +16,14 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case
 
 PAIR = Pair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
-SMALL = 1e-7
+SMALL_CREEPAGE = 1e-7
 CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
 """m, m, N: two balls of that radius, each pressed by that load, on a grid of such cells."""
 
 
 def _linear_error(cells: int, march: March) -> float:
-    answer = fastsim(RollingEllipse(A, B, LOAD, MU, SMALL, 0.0, 0.0), PAIR, cells=cells, march=march)
-    return abs(float(answer.fx / forces(A, B, SMALL, 0.0, 0.0, PAIR)[0]) - 1.0)
+    answer = fastsim(RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), PAIR, cells=cells, march=march)
+    return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, PAIR)[0]) - 1.0)
 
 
 def few_cells(implementation: str, folder: Path) -> float:
@@ -57,7 +57,7 @@ def mirrored(implementation: str, folder: Path) -> float:
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
-def power(implementation: str, folder: Path) -> float:
+def power_gained(implementation: str, folder: Path) -> float:
     """Most power gained per metre, by mu N times the creepage, 21 cells."""
     along, across, spin = _draw_creepages()
     size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
@@ -139,7 +139,7 @@ CASES = (
         "of mu N creepage",
         1e-5,
         "what 21 cells leave",
-        power,
+        power_gained,
         once=True,
     ),
     Case(

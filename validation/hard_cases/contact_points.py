@@ -10,7 +10,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.effects.contact_points import contact_points
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import IMPLICIT, driven, largest, run, vehicle
+from validation.hard_cases.setups import IMPLICIT, driven_by_forces, largest_magnitude, run, vehicle
 
 STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 LOAD = 1000.0
@@ -29,14 +29,14 @@ def step_answer(engine: str, folder: Path) -> float:
     values[1:] = LOAD
     p, worst = base.parameters, 0.0
     for step in STEPS:
-        assembly = driven(base, Sampled(values, 2e-2, held=True))
+        assembly = driven_by_forces(base, Sampled(values, 2e-2, held=True))
         if engine == "exudyn":  # its implicit integrators refuse held samples
             path = run(engine, assembly, min(step, 2e-3), 0.1)
         else:
             path = run(engine, assembly, step, 0.1, IMPLICIT[engine])
         since = np.maximum(path.times - 2e-2, 0.0)
         truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
-        worst = max(worst, largest(_compressions(assembly, path)[:, 0] - truth) / (LOAD / p.k1))
+        worst = max(worst, largest_magnitude(_compressions(assembly, path)[:, 0] - truth) / (LOAD / p.k1))
     return worst
 
 
@@ -64,9 +64,9 @@ def linear_load(engine: str, folder: Path) -> float:
 def _ramp_error(engine: str, step: float, integrator: str) -> float:
     """Largest difference to the ramp's closed form at each row's own time, of f/k."""
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
-    assembly, p = driven(base, Sampled(rising, 2e-2, held=False)), base.parameters
+    assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
     path = run(engine, assembly, step, 0.1, integrator)
-    return largest(_compressions(assembly, path)[:, 0] - _ramp(path.times, p.k1, p.d1)) / (LOAD / p.k1)
+    return largest_magnitude(_compressions(assembly, path)[:, 0] - _ramp(path.times, p.k1, p.d1)) / (LOAD / p.k1)
 
 
 def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
@@ -88,10 +88,10 @@ def undamped(engine: str, folder: Path) -> float:
     """A tyre without damping: the contact point has no state and follows its force at once."""
     base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
-    assembly = driven(base, Sampled(values, 1e-3, held=True))
+    assembly = driven_by_forces(base, Sampled(values, 1e-3, held=True))
     path = run(engine, assembly, 1e-3, 0.1)
     stiffness = base.parameters.k1
-    return largest(_compressions(assembly, path)[:100] - values / stiffness) / (LOAD / stiffness)
+    return largest_magnitude(_compressions(assembly, path)[:100] - values / stiffness) / (LOAD / stiffness)
 
 
 CASES = (

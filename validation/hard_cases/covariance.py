@@ -20,7 +20,7 @@ def _base(values: np.ndarray) -> Assembly:
     """The linearised vehicle under its weight and these errors of its forces (n, 2) in N."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, PERIOD)
-    return setups.driven(base, replace(forces, values=forces.values + values))
+    return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
 
 
 def held_noise(engine: str, folder: Path) -> float:
@@ -33,7 +33,7 @@ def held_noise(engine: str, folder: Path) -> float:
             values[sample, wheel] = 1.0
             responses.append(setups.run(engine, _base(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
     covariance, expected = np.array(responses).T @ np.array(responses), _recursion()
-    return setups.largest(covariance - expected) / setups.largest(expected)
+    return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
 
 
 def _recursion() -> np.ndarray:

@@ -16,16 +16,16 @@ from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, largest
+from validation.hard_cases.setups import REFUSED, largest_magnitude
 
 DURATION = 8.0
 TILT = 0.1
 """Pitch rate (rad/s) by which a drifted run starts wrong: at a growth of 0.4 1/s it has turned over in 8 s."""
-SOFT = 50.0
+SOFT_STIFFNESS = 50.0
 """N m/rad: 82 hold on this road."""
-OFF = 0.05
+DRIFTED_PITCH = 0.05
 """Pitch error (rad) beyond which no two runs are compared."""
-HEAVY = 300.0
+HEAVY_NOISE = 300.0
 """Noise (N) on the forces with which a run has drifted off after some seconds."""
 
 
@@ -48,7 +48,7 @@ def figures(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Error
     return figures_of_run(run, scene.vehicle_parameters()), errors(run, truth)
 
 
-def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
+def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
     """The words of the verdicts with and without the true run."""
     scores, wrong = figures(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
@@ -57,7 +57,7 @@ def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
 
 def tumbled(engine: str, folder: Path) -> float:
     """A free run that has turned over."""
-    judged = words(engine, follow(folder, measured(), tilt=TILT), measured())
+    judged = verdict_words(engine, follow(folder, measured(), tilt=TILT), measured())
     return float(judged != ("rejected", "rejected"))
 
 
@@ -71,13 +71,13 @@ def tumbled_naive(folder: Path) -> str:
     )
 
 
-SPRING = {"pitch_spring": {"stiffness": SOFT, "damping": 250.0}}
+SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
 FIRM = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
-def soft(engine: str, folder: Path) -> float:
+def soft_spring(engine: str, folder: Path) -> float:
     """A spring that is too soft."""
-    return float(words(engine, follow(folder, measured(), SPRING, TILT), measured())[0] != "rejected")
+    return float(verdict_words(engine, follow(folder, measured(), SPRING, TILT), measured())[0] != "rejected")
 
 
 def soft_naive(folder: Path) -> str:
@@ -92,7 +92,7 @@ def soft_naive(folder: Path) -> str:
 
 def graded(engine: str, folder: Path) -> float:
     """A spring on a grade: wrong, and never called right without the truth."""
-    judged = words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
+    judged = verdict_words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
     return float(judged != ("rejected", "stabilise"))
 
 
@@ -168,16 +168,16 @@ def two_points_naive(folder: Path) -> str:
 
 def before_drift(engine: str, folder: Path) -> float:
     """Difference to another implementation under the same noise, up to the drift-off, of the largest state."""
-    scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY}})
+    scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY_NOISE}})
     other = "mujoco" if engine == "reference" else "reference"
     first, two = (simulate(scene, name) for name in (engine, other))
     held = slice(None, _first_row_off(first, measured()))
-    return largest(first.states[held] - two.states[held]) / largest(two.states[held])
+    return largest_magnitude(first.states[held] - two.states[held]) / largest_magnitude(two.states[held])
 
 
 def _first_row_off(run: Result, truth: Result) -> int | None:
-    """First row at which the run is OFF from the measured pitch; None where it never is."""
-    far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > OFF)
+    """First row at which the run is DRIFTED_PITCH from the measured pitch; None where it never is."""
+    far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > DRIFTED_PITCH)
     return int(far[0]) if len(far) else None
 
 
@@ -185,7 +185,7 @@ def before_drift_naive(folder: Path) -> str:
     """Two step sizes of the reference, compared over 30 s."""
     truth = simulate(road_scene(duration=30.0), "reference")
     write_measurement(truth, folder, 1e-3)
-    scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY}})
+    scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
     before = gap[: _first_row_off(coarse, truth)].max()
@@ -210,7 +210,7 @@ CASES = (
         "wrong verdicts",
         0.0,
         "a word is right or wrong",
-        soft,
+        soft_spring,
         naive=soft_naive,
     ),
     Case(

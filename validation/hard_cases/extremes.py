@@ -8,7 +8,7 @@ import numpy as np
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, exact, largest, run, unchecked, vehicle
+from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked, vehicle
 
 IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
 """Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
@@ -24,7 +24,7 @@ def _raised_vehicle(base: Assembly) -> Assembly:
 def _distance_from_equilibrium(engine: str, base: Assembly, integrator: str = "") -> float:
     """Distance from the equilibrium after 3 s, relative to the start's."""
     end = run(engine, _raised_vehicle(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
-    return largest(end - base.initial) / 0.01
+    return largest_magnitude(end - base.initial) / 0.01
 
 
 def undamped(engine: str, folder: Path) -> float:
@@ -34,13 +34,15 @@ def undamped(engine: str, folder: Path) -> float:
 
 def _ringing(engine: str, integrator: str = "") -> float:
     base, truth = _undamped()
-    return largest(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest(truth - base.initial)
+    return largest_magnitude(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest_magnitude(
+        truth - base.initial
+    )
 
 
 def _undamped() -> tuple[Assembly, np.ndarray]:
     """The vehicle without dampers, off its equilibrium, and its states over 1 s."""
     base = _raised_vehicle(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    return base, exact(base, 1e-3, 1000)
+    return base, exact_states(base, 1e-3, 1000)
 
 
 def undamped_naive(folder: Path) -> str:
@@ -48,8 +50,8 @@ def undamped_naive(folder: Path) -> str:
     base, truth = _undamped()
     states = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
-        f"Exudyn's explicit Euler past the check: {largest(states - base.initial):.2g} where the truth "
-        f"stays below {largest(truth - base.initial):.2g}, finite and unwarned"
+        f"Exudyn's explicit Euler past the check: {largest_magnitude(states - base.initial):.2g} where the truth "
+        f"stays below {largest_magnitude(truth - base.initial):.2g}, finite and unwarned"
     )
 
 
@@ -82,11 +84,11 @@ def stiff_tyre_naive(folder: Path) -> str:
     """Two steps past the check."""
     base = vehicle(k1=1e9, k2=1e9)
     end = unchecked("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
-    return f"MuJoCo past the check: {largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
+    return f"MuJoCo past the check: {largest_magnitude(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
 
 
-AT_REST = "the vehicle is back in its equilibrium after 3 s"
-GONE = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
+AT_REST_REASON = "the vehicle is back in its equilibrium after 3 s"
+DECAYED_REASON = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
 
 CASES = (
     Case(
@@ -113,29 +115,29 @@ CASES = (
     Case(
         "mass ratio 1e6",
         "a light wheel on a stiff damper: poles at -1.4e7 1/s",
-        AT_REST,
+        AT_REST_REASON,
         "of the push",
         1e-6,
-        GONE,
+        DECAYED_REASON,
         light_wheel,
         REFUSED,
     ),
     Case(
         "mass ratio 1e6, implicit",
         "one step spans 14,000 time constants",
-        AT_REST,
+        AT_REST_REASON,
         "of the push",
         1e-6,
-        GONE,
+        DECAYED_REASON,
         light_wheel_implicit,
     ),
     Case(
         "stiffness 1e9",
         "wheels at 8,200 rad/s",
-        AT_REST,
+        AT_REST_REASON,
         "of the push",
         1e-6,
-        GONE,
+        DECAYED_REASON,
         stiff_tyre,
         REFUSED,
         stiff_tyre_naive,
@@ -143,10 +145,10 @@ CASES = (
     Case(
         "stiffness 1e9, implicit",
         "one step spans 1.3 periods of the wheel",
-        AT_REST,
+        AT_REST_REASON,
         "of the push",
         1e-6,
-        GONE,
+        DECAYED_REASON,
         stiff_tyre_implicit,
     ),
 )

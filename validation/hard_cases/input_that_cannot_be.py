@@ -54,19 +54,19 @@ QUERIED: dict[str, dict[str, float]] = {
 
 
 @cache
-def true() -> np.ndarray:
+def true_forces() -> np.ndarray:
     """Wheel forces (n, 2) of the asymmetric vehicle on hills, N."""
     road = {"source": "hills", "speed": 20.0}
     run = simulate(road_scene("asymmetric_twin", PERIOD, DURATION, road), "reference")
     return np.column_stack([run["f1"], run["f2"]])
 
 
-def words(change: Change) -> list[str]:
+def error_texts(change: Change) -> list[str]:
     """Errors and doubts about the forces, changed; InputError where there is an error."""
     front, rear = (
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
-    forces = np.ascontiguousarray(change(true()))
+    forces = np.ascontiguousarray(change(true_forces()))
     findings = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
     errors = [each.text for each in findings if each.weight == "error"]
     if errors:
@@ -75,7 +75,7 @@ def words(change: Change) -> list[str]:
 
 
 def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:
-    return abs(len(words(change)) - doubted)
+    return abs(len(error_texts(change)) - doubted)
 
 
 def _vehicle(change: dict[str, float], _: str, folder: Path) -> float:

@@ -13,30 +13,38 @@ from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import driven, largest, run, settings, static_forces, tight, vehicle
+from validation.hard_cases.setups import (
+    driven_by_forces,
+    largest_magnitude,
+    run,
+    settings,
+    static_forces,
+    tight_solution,
+    vehicle,
+)
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
 G = 9.81
 
 
-def rest(engine: str, folder: Path) -> float:
+def motion_at_rest(engine: str, folder: Path) -> float:
     """Largest motion of both vehicles, exact and linear geometry, in 2 s from their static equilibrium."""
     worst = 0.0
     for parameters in VEHICLES:
         for geometry in ("exact", "linear"):
             base = vehicle(parameters, geometry)
-            worst = max(worst, largest(run(engine, base, 1e-3, 2.0).states - base.initial))
+            worst = max(worst, largest_magnitude(run(engine, base, 1e-3, 2.0).states - base.initial))
     return worst
 
 
 def rest_naive(folder: Path) -> str:
     """Motion from a start at zero, the unstressed vehicle."""
     base = vehicle(initial=np.zeros(8))
-    fall = largest(run("reference", base, 1e-3, 2.0).states[:, 4:7])
+    fall = largest_magnitude(run("reference", base, 1e-3, 2.0).states[:, 4:7])
     return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
 
 
-def down(engine: str, folder: Path) -> float:
+def loads_at_rest(engine: str, folder: Path) -> float:
     """Tyre loads of the vehicle at rest: half of (750 + 30) kg each, and by the lever for the twin."""
     worst = 0.0
     for parameters in VEHICLES:
@@ -46,7 +54,7 @@ def down(engine: str, folder: Path) -> float:
         front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
         rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
         for name, load in (("f1", front), ("f2", rear)):
-            worst = max(worst, largest(path[name] - load))
+            worst = max(worst, largest_magnitude(path[name] - load))
     return worst
 
 
@@ -60,7 +68,7 @@ def nose_up(engine: str, folder: Path) -> float:
     hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
     if not (acceleration[0] < 0 < acceleration[1] and acceleration[3] < 0):
         return np.inf
-    return largest(acceleration - hand) / largest(hand)
+    return largest_magnitude(acceleration - hand) / largest_magnitude(hand)
 
 
 def push(engine: str, folder: Path) -> float:
@@ -70,10 +78,12 @@ def push(engine: str, folder: Path) -> float:
     for wheel, mass in enumerate((p.m1, p.m2)):
         forces = static_forces(base, 3, 1e-3)
         forces.values[:, wheel] += 100.0
-        model = build(engine, driven(base, forces), settings(engine, 1e-3, 2e-3))
+        model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 2e-3))
         wanted = np.zeros(4)
         wanted[wheel] = -100.0 / mass
-        worst = max(worst, largest(model.acceleration(0.0, *np.split(base.initial, 2)) - wanted) * mass / 100.0)
+        worst = max(
+            worst, largest_magnitude(model.acceleration(0.0, *np.split(base.initial, 2)) - wanted) * mass / 100.0
+        )
     return worst
 
 
@@ -82,11 +92,11 @@ def raised_front(engine: str, folder: Path) -> float:
     base = vehicle("asymmetric_twin")
     forces = static_forces(base, 51, 1e-3)
     forces.values[:, 0] += 500.0
-    end = run(engine, driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
-    truth = tight(driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    end = run(engine, driven_by_forces(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    truth = tight_solution(driven_by_forces(base, forces), 1e-3, 0.05).states[-1] - base.initial
     if not (end[3] > 0 and end[0] < 0 and end[2] - base.parameters.b * np.sin(end[3]) < 0):
         return np.inf
-    return largest(end - truth) / largest(truth)
+    return largest_magnitude(end - truth) / largest_magnitude(truth)
 
 
 def momentum(engine: str, folder: Path) -> float:
@@ -94,14 +104,17 @@ def momentum(engine: str, folder: Path) -> float:
     base = vehicle("asymmetric_twin", "linear")
     p = base.parameters
     forces = static_forces(base, 1000, 1e-3, noise=800.0)
-    rates = run(engine, driven(base, forces), 1e-3, 1.0).states[:, 4:]
+    rates = run(engine, driven_by_forces(base, forces), 1e-3, 1.0).states[:, 4:]
     t = 1e-3 * np.arange(1001)[:, None]
     pushed = np.vstack((np.zeros(2), np.cumsum(forces.values * 1e-3, axis=0)))
     angular = rates @ np.array([-p.m1 * p.b, p.m2 * p.a, 0.0, p.I])
     linear = rates @ np.array([p.m1, p.m2, p.m3, 0.0])
     turned = pushed @ np.array([p.b, -p.a]) + (p.a * p.m2 - p.b * p.m1) * p.g * t[:, 0]
     fallen = (p.m1 + p.m2 + p.m3) * p.g * t[:, 0] - pushed.sum(axis=1)
-    return max(largest(angular - turned) / largest(turned - turned[0]), largest(linear - fallen) / largest(pushed))
+    return max(
+        largest_magnitude(angular - turned) / largest_magnitude(turned - turned[0]),
+        largest_magnitude(linear - fallen) / largest_magnitude(pushed),
+    )
 
 
 def free_heave(engine: str, folder: Path) -> float:
@@ -109,12 +122,15 @@ def free_heave(engine: str, folder: Path) -> float:
     base = vehicle("asymmetric_twin")
     p = base.parameters
     forces = static_forces(base, 100, 1e-3, noise=2000.0)
-    model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
+    model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
         acceleration = model.acceleration(2 * i * 1e-3, *np.split(state, 2))[:3]
         wanted = p.g - forces.values[2 * i].sum() / masses.sum()
-        worst, size = max(worst, abs(acceleration @ masses / masses.sum() - wanted)), max(size, largest(acceleration))
+        worst, size = (
+            max(worst, abs(acceleration @ masses / masses.sum() - wanted)),
+            max(size, largest_magnitude(acceleration)),
+        )
     return worst / size
 
 
@@ -123,12 +139,12 @@ def _spun(geometry: str) -> Assembly:
     base = vehicle("asymmetric_twin", geometry)
     start = base.initial.copy()
     start[7] = 6.0
-    return driven(replace(base, initial=start), static_forces(base, 2, 2.0, held=False))
+    return driven_by_forces(replace(base, initial=start), static_forces(base, 2, 2.0, held=False))
 
 
 @cache
 def _tumbled() -> np.ndarray:
-    return tight(_spun("exact"), 2.5e-4, 1.0).states
+    return tight_solution(_spun("exact"), 2.5e-4, 1.0).states
 
 
 def tumbling(engine: str, folder: Path) -> float:
@@ -137,7 +153,7 @@ def tumbling(engine: str, folder: Path) -> float:
     truth = _tumbled()
     if truth[:, 3].max() < np.pi / 2:
         return np.inf
-    return largest(states - truth)
+    return largest_magnitude(states - truth)
 
 
 def tumbling_naive(folder: Path) -> str:
@@ -165,7 +181,7 @@ def growth(engine: str, mode: Mode) -> float:
     start = base.initial.copy()
     start[3] += 1e-6
     ends = [
-        run(engine, driven(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
+        run(engine, driven_by_forces(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
         for y in (base.initial, start)
     ]
     return abs(ends[1] - ends[0]) / 1e-6
@@ -189,7 +205,7 @@ CASES = (
         "m, rad, m/s, rad/s",
         1e-12,
         "rounding of kN on kg: 1e-13 m/s^2 held down by the dampers",
-        rest,
+        motion_at_rest,
         {},
         rest_naive,
     ),
@@ -200,7 +216,7 @@ CASES = (
         "N",
         1e-8,
         "rounding of 4 kN",
-        down,
+        loads_at_rest,
     ),
     Case(
         "nose up",

@@ -18,12 +18,12 @@ from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
 from validation.drift.kalman_runs import relative
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, driven, largest, static_forces, vehicle
+from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, static_forces, vehicle
 
 PERIOD, DURATION = 5e-3, 6.0
 FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
 """Deviations: N per force sample, rad per angle, rad of a start that is not known."""
-SLOW = 0.1
+SLOW_PERIOD = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
 
 
@@ -58,7 +58,7 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
     run = simulate(scene, engine)
     ended = PERIOD * (lost.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
-    return largest(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
+    return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
 
 def outage(engine: str, folder: Path) -> float:
@@ -79,12 +79,12 @@ def wrong_start(engine: str, folder: Path) -> float:
     return _largest_pitch_error(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
 
 
-def sure(engine: str, folder: Path) -> float:
+def certain_start(engine: str, folder: Path) -> float:
     """Angles known to 1e-9 rad after a start known to 1 rad: pitch error by its deviation, covariance not negative."""
     count, exact = 400, 1e-9
     base = vehicle()
     forces = static_forces(base, count + 1, PERIOD, held=False)
-    assembly = driven(base, forces)
+    assembly = driven_by_forces(base, forces)
     assembly = replace(
         assembly,
         scene=assembly.scene.model_copy(
@@ -102,24 +102,24 @@ def sure(engine: str, folder: Path) -> float:
     return float(np.abs(off / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 
-def nothing(engine: str, folder: Path) -> float:
+def empty_column(engine: str, folder: Path) -> float:
     """A column without a single number."""
     return _largest_pitch_error(engine, folder, slice(None))
 
 
 def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW."""
+    """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW_PERIOD."""
     a, b = relative(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
-    return a, b, expm(block * SLOW)[:6, 6:]
+    return a, b, expm(block * SLOW_PERIOD)[:6, 6:]
 
 
-def stiff(engine: str, folder: Path) -> float:
+def stiff_process_noise(engine: str, folder: Path) -> float:
     """Process noise of forces sampled at 10 Hz beside a pole of -697 1/s."""
     base = vehicle(geometry="linear")
-    forces = Sampled(static_forces(base, 2, SLOW).values, SLOW, held=True)
-    step = PitchStep(driven(base, forces), SLOW, 1)
+    forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
+    step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)
     early = step.advance(np.append(RELATIVE @ base.initial, 0.0), 0)[2][:6]
     wanted = _exact_response()[2]
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
@@ -128,7 +128,7 @@ def stiff(engine: str, folder: Path) -> float:
 def stiff_naive(folder: Path) -> str:
     """The stiff case by filterpy's own discretisation."""
     a, b, wanted = _exact_response()
-    noise = van_loan_discretization(a, b * np.sqrt(SLOW), SLOW)[1]
+    noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
     times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
     return (
         f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
@@ -164,7 +164,7 @@ CASES = (
         "deviations",
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
-        sure,
+        certain_start,
         once=True,
     ),
     Case(
@@ -174,7 +174,7 @@ CASES = (
         "",
         0.0,
         "there is nothing to follow",
-        nothing,
+        empty_column,
         REFUSED,
     ),
     Case(
@@ -184,7 +184,7 @@ CASES = (
         "of its norm",
         1e-6,
         "Runge-Kutta in substeps of 1 ms; the fast modes have settled",
-        stiff,
+        stiff_process_noise,
         {},
         stiff_naive,
     ),

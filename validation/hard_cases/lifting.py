@@ -54,7 +54,7 @@ def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) 
         states = setups.run(engine, assembly, step, LASTING).states
         every = max(1, round(step / STEP))
         exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(states) - 1))
-        return setups.largest(states - exact[::every])
+        return setups.largest_magnitude(states - exact[::every])
 
     return error
 
@@ -77,7 +77,7 @@ def at_the_switch(engine: str, folder: Path) -> float:
     """Largest motion without gravity: the wheels rest on the road at no load: nothing may move, and no noise of
     rounding grow."""
     assembly = vehicle(np.zeros(8), "linear", {"g": 0.0})
-    return setups.largest(setups.run(engine, assembly, 1e-3, 1.0).states)
+    return setups.largest_magnitude(setups.run(engine, assembly, 1e-3, 1.0).states)
 
 
 def thrown_up(engine: str, folder: Path) -> float:
@@ -104,9 +104,12 @@ def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -
 
 def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
     """Largest error of a run beside the solution at tight tolerance; infinite if no wheel left the road."""
-    states, exact = setups.run(engine, assembly, step, duration).states, setups.tight(assembly, step, duration).states
+    states, exact = (
+        setups.run(engine, assembly, step, duration).states,
+        setups.tight_solution(assembly, step, duration).states,
+    )
     air = exact[:, 0] < _heights(assembly.input, step, len(exact))
-    return setups.largest(states - exact) if air.any() else np.inf
+    return setups.largest_magnitude(states - exact) if air.any() else np.inf
 
 
 def _heights(road: Signal | None, step: float, count: int) -> np.ndarray:
@@ -181,10 +184,10 @@ THROWN = "a corner of the force within a step costs its square"
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
-HIGH = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
+HIGH_START = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
 EXACT: tuple[tuple[str, str, float, Error], ...] = (
     ("both wheels in the air", "no tyre holds anything", 1e-4, exactly()),
-    ("fall from five metres", "lands at 15 m/s, many times the tyres' depth at rest", 1e-3, exactly(start=HIGH)),
+    ("fall from five metres", "lands at 15 m/s, many times the tyres' depth at rest", 1e-3, exactly(start=HIGH_START)),
     ("tyres without damping", "every landing is thrown back", 1e-4, exactly(d1=0.0, d2=0.0)),
     (
         "tyre dampers of 5 kN s/m",

@@ -34,7 +34,7 @@ from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation.hard_cases.between_steps import REFUSED, asked
+from validation.hard_cases.between_steps import REFUSED, refused_case
 from validation.hard_cases.case import Case
 
 FRICTION, CELLS = 0.3, 15
@@ -92,7 +92,7 @@ def tiny_noise(implementation: str, folder: Path) -> float:
     return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
-def sure(implementation: str, folder: Path) -> float:
+def certain_filter(implementation: str, folder: Path) -> float:
     """A filter of tilts told of angles and rates to 1e-12, forces to 1 and to 8 N: its deviations, by those told."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
@@ -166,7 +166,7 @@ CASES = (
         "of the deviations told",
         1.0 + 1e-9,
         "rounding",
-        sure,
+        certain_filter,
         once=True,
     ),
     Case(
@@ -181,7 +181,7 @@ CASES = (
         once=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", asked(answer), REFUSED, once=True)
+        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, once=True)
         for name, hard, answer in (
             ("profile with a spike", "a spline swings about it", spiked),
             ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded),

@@ -16,14 +16,14 @@ from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import (
     CONSTRAINED,
-    driven,
-    largest,
+    driven_by_forces,
+    largest_magnitude,
     rms,
     run,
     settings,
     smooth_pitch,
     static_forces,
-    tight,
+    tight_solution,
     vehicle,
 )
 
@@ -57,7 +57,7 @@ def _settled_state() -> np.ndarray:
     base = vehicle()
     samples = angle(PERIOD * np.arange(-500, 2))
     before = setups.guided(base, _weight(), smooth_pitch(samples, PERIOD))
-    return tight(before, PERIOD, DURATION).states[-1]
+    return tight_solution(before, PERIOD, DURATION).states[-1]
 
 
 def _settled(base: Assembly) -> Assembly:
@@ -68,7 +68,7 @@ def _settled(base: Assembly) -> Assembly:
 @cache
 def solution(period: float = PERIOD, noise: float = 0.0) -> Trajectory:
     """The pitch eliminated, order 8, tolerance 1e-12, rows every 1 ms."""
-    return tight(scene(period, noise), PERIOD, DURATION)
+    return tight_solution(scene(period, noise), PERIOD, DURATION)
 
 
 def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
@@ -165,7 +165,7 @@ def undamped_multiplier_naive(folder: Path) -> str:
         path = Inconsistent(scene(), engine_settings).run()
         assert path.moment is not None
         late = (path.moment - truth())[-100:]
-        heave = largest((path.states - solution().states)[-100:, :4])
+        heave = largest_magnitude((path.states - solution().states)[-100:, :4])
         parts.append(f"{name} by {rms(late):.0f} N m (states by {heave:.0e})")
     return f"moment of {rms(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
@@ -254,8 +254,8 @@ def explicit_naive(folder: Path) -> str:
     """Exudyn's explicit solver with the constraint in it, past the check."""
     path = as_it_comes(scene(), 1e-3, "RK44")
     assert path.moment is not None
-    off = largest(path.states[:, 3] - angle(path.times))
-    moment = largest(path.moment[1:])
+    off = largest_magnitude(path.states[:, 3] - angle(path.times))
+    moment = largest_magnitude(path.moment[1:])
     return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
 
 
@@ -264,7 +264,7 @@ def fed_back(engine: str, folder: Path) -> float:
     base = vehicle("asymmetric_twin")
     forces: Signal = static_forces(base, 2, DURATION, held=False)
     base.initial[3] += 0.05
-    free = tight(driven(base, forces), 2.5e-4, DURATION).states
+    free = tight_solution(driven_by_forces(base, forces), 2.5e-4, DURATION).states
     guided = setups.guided(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
     guided.initial[:] = free[0]
     path = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED[engine])
@@ -278,7 +278,7 @@ def gap(engine: str, folder: Path) -> float:
     assembly = scene()
     path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
     assert assembly.input is not None
-    return largest(path.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 2])
+    return largest_magnitude(path.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 2])
 
 
 def gap_naive(folder: Path) -> str:
@@ -286,7 +286,7 @@ def gap_naive(folder: Path) -> str:
     assembly = scene()
     path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None
-    off = largest(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
+    off = largest_magnitude(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
     return f"Exudyn enforces the angle alone: its rate is off by {off:.1e} rad/s"
 
 

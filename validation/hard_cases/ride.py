@@ -44,7 +44,7 @@ def damped_tyre_naive(folder: Path) -> str:
     return f"C P C' gives the tyre force a standard deviation of {stationary(silent).deviation[2]:.0f} N"
 
 
-def free(implementation: str, folder: Path) -> float:
+def free_accelerations(implementation: str, folder: Path) -> float:
     """Accelerations of R19-free against the exact covariance after an hour, axles independent, relative."""
     vehicle = linear(load_vehicle("r19_free"), implementation)
     system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
@@ -131,7 +131,7 @@ def crawling(implementation: str, folder: Path) -> float:
     return off(late, apart)
 
 
-def same_place(implementation: str, folder: Path) -> float:
+def axles_at_one_place(implementation: str, folder: Path) -> float:
     """Two axles at one x, delayed by nothing, against one input, relative."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
@@ -246,7 +246,7 @@ CASES = (
         "",
         1e-6,
         "rounding, doubled twenty times",
-        free,
+        free_accelerations,
     ),
     Case(
         "roll steer on a free car",
@@ -325,7 +325,7 @@ CASES = (
         slow_weighting,
     ),
     Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", crawling),
-    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", same_place),
+    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", axles_at_one_place),
     Case(
         "left springs twice the right ones",
         "roll and heave are coupled",

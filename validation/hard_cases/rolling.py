@@ -13,7 +13,7 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.eigenvalues import free
+from models.rail.eigenvalues import free_wheelset
 from models.rail.equations import Equations
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
@@ -22,19 +22,19 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 KINDS = {name: kind_of(name) for name in IMPLEMENTATIONS}
 STEP = 5e-4
-FREE = free(CHOSEN)
-HEAVY = FREE.changed(mass=8000.0, spin_inertia=2500.0, yaw_inertia=8000.0)
+FREE_WHEELSET = free_wheelset(CHOSEN)
+HEAVY_WHEELSET = FREE_WHEELSET.changed(mass=8000.0, spin_inertia=2500.0, yaw_inertia=8000.0)
 """Without suspension; so heavy and hard to turn that it stands still in steps of 0.08 ms."""
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 """What left and right exchanged make of a state; its spin is about the same axle."""
 
 
-def built(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **options: Any) -> Equations:
+def built_wheelset(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **options: Any) -> Equations:
     """A wheelset in an implementation, with coarse cells."""
     return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
 
-def off(equations: Equations, **values: float) -> np.ndarray:
+def displaced_state(equations: Equations, **values: float) -> np.ndarray:
     """Rest, moved by values named as the state's numbers in ``equations``."""
     state = equations.rest.copy()
     for name, value in values.items():
@@ -54,7 +54,7 @@ def beyond_friction(motion: Motion, mu: float) -> float:
 
 def standing(implementation: str, folder: Path) -> float:
     """Speed at which a standing wheelset creeps sideways under a third of what friction could hold."""
-    equations = built(implementation, HEAVY, 0.0, lean=0.1)
+    equations = built_wheelset(implementation, HEAVY_WHEELSET, 0.0, lean=0.1)
     motion = equations.run(equations.rest, 0.04, 8e-5, 250)
     return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
 
@@ -69,7 +69,7 @@ def reversal(implementation: str, folder: Path) -> float:
     """Largest jump of an acceleration by mu N / m, as the speed passes 0 and where regularisation begins and ends."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
-        below, above = (built(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
+        below, above = (built_wheelset(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
         state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
         jumps.append(np.abs(above.rates(state) - below.rates(state)).max())
     return float(max(jumps) * CHOSEN.mass / (CHOSEN.friction * CHOSEN.load))
@@ -79,13 +79,15 @@ def through_zero(implementation: str, folder: Path) -> float:
     """Kinetic energy of lateral motion and yaw beyond that of the start, by it, in runs of falling speed through 0."""
     state, energies = None, []
     for speed in np.linspace(0.06, -0.06, 7):
-        equations = built(implementation, HEAVY, float(speed))
-        state = off(equations, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
-        state[eq.SPIN] = -speed / HEAVY.radius
+        equations = built_wheelset(implementation, HEAVY_WHEELSET, float(speed))
+        state = displaced_state(equations, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
+        state[eq.SPIN] = -speed / HEAVY_WHEELSET.radius
         motion = equations.run(state, 0.002, 8e-5)
-        if beyond_friction(motion, HEAVY.friction) > 1e-12:
+        if beyond_friction(motion, HEAVY_WHEELSET.friction) > 1e-12:
             return np.inf
-        energies.append(motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia])
+        energies.append(
+            motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY_WHEELSET.mass, HEAVY_WHEELSET.yaw_inertia]
+        )
         state = motion.states[-1].copy()
     return float(np.max(energies) / energies[0][0] - 1.0)
 
@@ -100,9 +102,9 @@ def energies(motion: Motion, w: Wheelset) -> np.ndarray:
 
 def falling(implementation: str, folder: Path, **moved: float) -> float:
     """Energy gained by that of 1 mm, of an elastic wheelset without friction that is let go above its rails."""
-    elastic = FREE.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
-    wheelset = built(implementation, elastic)
-    motion = wheelset.run(off(wheelset, **moved), 0.06, 5e-5)
+    elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
+    wheelset = built_wheelset(implementation, elastic)
+    motion = wheelset.run(displaced_state(wheelset, **moved), 0.06, 5e-5)
     loads = motion.contacts["load"]
     if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
         return np.inf  # nothing has lifted off, or nothing has landed
@@ -112,18 +114,18 @@ def falling(implementation: str, folder: Path, **moved: float) -> float:
 
 def bouncing(implementation: str, folder: Path) -> float:
     """Height above that of release, by it, of a wheelset that rolls, with friction and damping."""
-    wheelset = built(implementation, FREE)
-    start = off(wheelset, Z=-1e-3)
+    wheelset = built_wheelset(implementation, FREE_WHEELSET)
+    start = displaced_state(wheelset, Z=-1e-3)
     motion = wheelset.run(start, 0.2, 1e-4)
-    if beyond_friction(motion, FREE.friction) > 1e-12:
+    if beyond_friction(motion, FREE_WHEELSET.friction) > 1e-12:
         return np.inf
     return float(max(0.0, (start[eq.Z] - motion.states[:, eq.Z].min()) / 1e-3))
 
 
-def light(implementation: str, folder: Path, mass: float) -> float:
+def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float:
     """Load of both wheels of a toy against its weight, relative, creep forces bounded."""
-    toy = FREE.changed(mass=mass, load=mass * GRAVITY, spin_inertia=0.1 * mass, yaw_inertia=mass)
-    wheelset = built(implementation, toy)
+    toy = FREE_WHEELSET.changed(mass=mass, load=mass * GRAVITY, spin_inertia=0.1 * mass, yaw_inertia=mass)
+    wheelset = built_wheelset(implementation, toy)
     motion = wheelset.run(wheelset.rest, 2e-3, 2e-4)
     if beyond_friction(motion, toy.friction) > 1e-12:
         return np.inf
@@ -136,15 +138,15 @@ def frictions(implementation: str, folder: Path) -> float:
     """Force beyond mu N for mu from nothing to 1."""
     shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
-        wheelset = built(implementation, CHOSEN.changed(friction=mu), 60.0)
-        shares.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
+        wheelset = built_wheelset(implementation, CHOSEN.changed(friction=mu), 60.0)
+        shares.append(beyond_friction(wheelset.run(displaced_state(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
     return max(shares)
 
 
 def pure_spin(implementation: str, folder: Path) -> float:
     """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, by mu N (r)."""
     spinning = CHOSEN.changed(conicity=0.5)
-    wheelset = built(implementation, spinning, 20.0)
+    wheelset = built_wheelset(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
     bound = spinning.friction * contact["load"]
     if np.abs(contact["fy"] / bound).min() < 0.1:
@@ -155,7 +157,7 @@ def pure_spin(implementation: str, folder: Path) -> float:
 
 def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
     """Difference of a run from the one with half the step (m)."""
-    equations = built(implementation, wheelset, speed)
+    equations = built_wheelset(implementation, wheelset, speed)
     start = equations.displaced(1e-3)
     ends = [equations.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
     return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
@@ -163,22 +165,24 @@ def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, 
 
 def crawling(implementation: str, folder: Path) -> float:
     """Displacement at 1e-6 m/s against that of a wheelset that stands, by it."""
-    rest = built(implementation, HEAVY, 0.0).rest
-    runs = (built(implementation, HEAVY, speed, lean=0.1).run(rest, 0.01, 8e-5) for speed in (0.0, 1e-6))
+    rest = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
+    runs = (
+        built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest, 0.01, 8e-5) for speed in (0.0, 1e-6)
+    )
     still, slow = (motion.states[-1, eq.Y] for motion in runs)
     return float(abs(slow / still - 1.0))
 
 
 def symmetric(implementation: str, folder: Path) -> float:
     """Displacement, roll and yaw of a wheelset in the middle of the track, above its critical speed."""
-    equations = built(implementation, CHOSEN, 80.0)
+    equations = built_wheelset(implementation, CHOSEN, 80.0)
     return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
 def mirrored(implementation: str, folder: Path) -> float:
     """A start and its mirror image, one wheel in the air: difference of the images."""
-    equations = built(implementation)
-    start = off(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
+    equations = built_wheelset(implementation)
+    start = displaced_state(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
     straight, other = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
     return float(np.abs(straight - MIRROR * other).max())
 
@@ -203,8 +207,8 @@ def ran(
     **moved: float,
 ) -> Motion:
     """A run from a state that is off rest."""
-    wheelset = built(implementation, speed=speed)
-    return wheelset.run(off(wheelset, **moved), duration, step, every)
+    wheelset = built_wheelset(implementation, speed=speed)
+    return wheelset.run(displaced_state(wheelset, **moved), duration, step, every)
 
 
 def fails(implementation: str, folder: Path, **moved: Any) -> float:
@@ -222,10 +226,10 @@ LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 def too_large_naive(folder: Path) -> str:
     """The path without the check of loads, against that of an eighth of the step."""
-    equations, ends = built("reference"), []
+    equations, ends = built_wheelset("reference"), []
     for step in (STEP, STEP / 8.0):
         states, contacts = np.empty((1, eq.STATES)), equations.blank(1)
-        state = off(equations, **LANDING)
+        state = displaced_state(equations, **LANDING)
         eq.march(state, equations.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
@@ -295,7 +299,7 @@ CASES = (
         "",
         1e-6,
         "asked for",
-        partial(light, mass=1.0),
+        partial(light_wheelset_load, mass=1.0),
     ),
     Case(
         "wheelset of a milligram",
@@ -304,7 +308,7 @@ CASES = (
         "",
         0.0,
         "exact",
-        partial(light, mass=1e-6),
+        partial(light_wheelset_load, mass=1e-6),
         RAISED,
     ),
     Case(
@@ -393,8 +397,8 @@ CASES = (
             ("every third of twenty steps", "every", partial(ran, every=3)),
             ("wheelset at 300 m/s", "speed", partial(ran, speed=300.0)),
             ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=np.nan)),
-            ("strips of two cells", "cells", lambda name: built(name, cells=2).rest),
-            ("strips of 2000 cells in an engine", "cells", lambda name: built(name, cells=2000).rest),
+            ("strips of two cells", "cells", lambda name: built_wheelset(name, cells=2).rest),
+            ("strips of 2000 cells in an engine", "cells", lambda name: built_wheelset(name, cells=2000).rest),
         )
     ),
 )

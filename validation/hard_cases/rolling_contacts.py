@@ -28,10 +28,10 @@ from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULAR
 from models.rail.wheelset import CHOSEN
 from models.systems.handling.energy import energy
-from models.systems.handling.run import Drive, build, driven, read
+from models.systems.handling.run import Drive, build, drive_run, read_run
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
-from validation.hard_cases.rolling import built, off
+from validation.hard_cases.rolling import built_wheelset, displaced_state
 
 SLIDES = np.array([[0.02, 0.01, 0.0, 0.3], [-0.3, 0.1, 0.0, -2.0], [1e-6, -2e-6, 0.0, 1e-4], [0.0, 0.0, 0.0, 1.0]])
 """Rates of four wheels: x', y', z' (m/s), yaw' (rad/s)."""
@@ -58,7 +58,7 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
     return f.reshape(-1, 4)
 
 
-def beyond(wheels: Wheels, forces: np.ndarray) -> float:
+def beyond_friction_share(wheels: Wheels, forces: np.ndarray) -> float:
     """Largest force by mu N, less 1; infinite where one has power."""
     if (forces * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
@@ -71,7 +71,7 @@ def bounded(implementation: str, folder: Path, **changes: Any) -> float:
     for theory in ("fastsim", "simplified"):
         for speed in (20.0, 0.0, -20.0):
             wheels = Wheels(theory=theory, cells=7, speed=speed, **changes)
-            shares.append(beyond(wheels, on_rig(implementation, wheels, SLIDES)))
+            shares.append(beyond_friction_share(wheels, on_rig(implementation, wheels, SLIDES)))
     return max(shares)
 
 
@@ -107,8 +107,8 @@ def too_long(implementation: str, folder: Path) -> float:
 
 def jumping(implementation: str, folder: Path) -> float:
     """Energy that the ledger of a wheelset leaves open while contacts come and go, by what creep took."""
-    equations = built(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
-    motion = equations.run(off(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
+    equations = built_wheelset(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
+    motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
     if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts["power"].max() > 0.0:
         return np.inf
@@ -119,13 +119,13 @@ def jumping(implementation: str, folder: Path) -> float:
 def drive(implementation: str, handling: Handling, speed: float, duration: float, step: float) -> Drive:
     """A run of the car."""
     if implementation != "reference":
-        return driven(implementation, handling, speed, duration, step)
+        return drive_run(implementation, handling, speed, duration, step)
     model, start = build("mujoco", handling), handling.straight(speed)
     states = march(lambda _, q, v: model.acceleration(0.0, q, v), *start, round(duration / step), step)
-    return read(handling, Trajectory(step * np.arange(len(states)), states))
+    return read_run(handling, Trajectory(step * np.arange(len(states)), states))
 
 
-def wrong(run: Drive) -> bool:
+def is_wrong(run: Drive) -> bool:
     """Whether a contact has power, or more than mu N."""
     force = np.hypot(run["fx"], run["fy"])
     return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
@@ -144,7 +144,7 @@ def leaping(implementation: str, folder: Path) -> float:
     run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
     loads = run["load"]
     up = (loads == 0.0).all(axis=1)
-    if wrong(run) or not up.any() or (loads[-1] == 0.0).any():
+    if is_wrong(run) or not up.any() or (loads[-1] == 0.0).any():
         return np.inf
     return left_open(run)
 
@@ -152,7 +152,7 @@ def leaping(implementation: str, folder: Path) -> float:
 def parked(implementation: str, folder: Path) -> float:
     """Mean speed (m/s) of locked wheels on a slope, after the first swing."""
     run = drive(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
-    return np.inf if wrong(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
+    return np.inf if is_wrong(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
 
 
 def locked(implementation: str, folder: Path) -> float:
@@ -165,7 +165,7 @@ def back(implementation: str, folder: Path) -> float:
     """Energy that is left open by a car that rolls up a slope, stops and rolls back."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
     ahead = run.velocity()[:, 0]
-    if wrong(run) or not ahead[0] > 0.0 > ahead[-1]:
+    if is_wrong(run) or not ahead[0] > 0.0 > ahead[-1]:
         return np.inf
     return left_open(run)
 

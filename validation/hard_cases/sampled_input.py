@@ -24,7 +24,16 @@ from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import RAISED, REFUSED, exact, largest, run, settings, static_forces, vehicle
+from validation.hard_cases.setups import (
+    RAISED,
+    REFUSED,
+    exact_states,
+    largest_magnitude,
+    run,
+    settings,
+    static_forces,
+    vehicle,
+)
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
@@ -32,14 +41,14 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: 
     base = vehicle("asymmetric_twin")
     forces = Sampled(values, period, held=interpolation == "held")
     steps = round((len(values) - 1) * period / step)
-    path = run(engine, setups.driven(base, forces), step, steps * step)
+    path = run(engine, setups.driven_by_forces(base, forces), step, steps * step)
     p, every = base.parameters, round(period / step)
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     held = np.concatenate(([0.0], np.cumsum(total[:-1] * period)))
     impulse = held if forces.held else held + period * (total - total[0]) / 2
     truth = masses.sum() * p.g * period * np.arange(len(values)) - impulse
-    return largest(path.states[::every, 4:7] @ masses - truth) / largest(impulse)
+    return largest_magnitude(path.states[::every, 4:7] @ masses - truth) / largest_magnitude(impulse)
 
 
 def ramp(engine: str, folder: Path) -> float:
@@ -72,7 +81,7 @@ def impulse_naive(folder: Path) -> str:
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
-        run("reference", setups.driven(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
+        run("reference", setups.driven_by_forces(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
         for held in (True, False)
     ]
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
@@ -82,9 +91,9 @@ def halved(engine: str, folder: Path) -> float:
     """Held noise at 2 ms, steps of 1 and 0.5 ms, against the matrix exponential on the samples."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 250, 2e-3, noise=500.0)
-    truth = exact(setups.driven(base, forces), 2e-3, 250, forces.values)
-    coarse, fine = (run(engine, setups.driven(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
-    return largest(fine[::4] - truth) / largest(coarse[::2] - truth)
+    truth = exact_states(setups.driven_by_forces(base, forces), 2e-3, 250, forces.values)
+    coarse, fine = (run(engine, setups.driven_by_forces(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
+    return largest_magnitude(fine[::4] - truth) / largest_magnitude(coarse[::2] - truth)
 
 
 @dataclass(frozen=True)
@@ -101,10 +110,12 @@ def halved_naive(folder: Path) -> str:
     """Pitch under a force that is looked up at each stage's time."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
-    truth = exact(setups.driven(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
+    truth = exact_states(setups.driven_by_forces(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
     forces = ByTime(values, 2e-3, held=False)
     errors = [
-        largest(run("reference", setups.driven(base, forces), h, 0.5).states[:: round(2e-3 / h)] - truth)
+        largest_magnitude(
+            run("reference", setups.driven_by_forces(base, forces), h, 0.5).states[:: round(2e-3 / h)] - truth
+        )
         for h in (1e-3, 5e-4)
     ]
     return f"looked up at each stage's time: error {errors[0]:.1e} at 1 ms, {errors[1]:.1e} at 0.5 ms, order 1"
@@ -124,7 +135,7 @@ def order(engine: str, profile: SplineProfile) -> float:
     road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
     runs = [run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
     first, second = runs[1][::2] - runs[0], runs[2][::4] - runs[1][::2]
-    return float(np.log2(largest(first) / largest(second)))
+    return float(np.log2(largest_magnitude(first) / largest_magnitude(second)))
 
 
 def c2_road(engine: str, folder: Path) -> float:
@@ -144,15 +155,17 @@ def noise_adaptive(engine: str, folder: Path) -> float:
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
-    path = run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
-    return largest(path.states - exact(setups.driven(base, forces), 1e-3, 200, forces.values))
+    path = run(engine, setups.driven_by_forces(base, forces), 1e-3, 0.2, name)
+    return largest_magnitude(
+        path.states - exact_states(setups.driven_by_forces(base, forces), 1e-3, 200, forces.values)
+    )
 
 
 def noise_adaptive_naive(folder: Path) -> str:
     """Error of noisy forces by scipy's RK45 straight across the jumps."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
-    driven = setups.driven(base, forces)
+    driven = setups.driven_by_forces(base, forces)
     linear = linearised(driven.vehicle)
     a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
 
@@ -161,7 +174,7 @@ def noise_adaptive_naive(folder: Path) -> str:
         return a @ y + np.array([0, 0, 0, 0, g - u[0] / masses[0], g - u[1] / masses[1], g, 0])
 
     solution = solve_ivp(rhs, (0, 0.2), base.initial, rtol=1e-4, atol=1e-6)
-    error = largest(solution.y[:, -1] - exact(driven, 1e-3, 200, forces.values)[-1])
+    error = largest_magnitude(solution.y[:, -1] - exact_states(driven, 1e-3, 200, forces.values)[-1])
     return f"RK45 straight across the jumps: {solution.nfev} force calls for 200 samples, error {error:.0e}"
 
 
@@ -180,7 +193,7 @@ def damaged(engine: str, folder: Path) -> float:
         folder,
     )
     try:
-        return largest(simulate(scene, engine).states)
+        return largest_magnitude(simulate(scene, engine).states)
     except InputError as error:
         if "line 59" not in str(error):
             raise AssertionError(f"the line is not named: {error}") from error
@@ -192,14 +205,14 @@ def damaged_past_reader(engine: str, folder: Path) -> float:
     base = vehicle()
     forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
-    return largest(run(engine, setups.driven(base, forces), 1e-3, 0.2).states)
+    return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 1e-3, 0.2).states)
 
 
 def uneven(engine: str, folder: Path) -> float:
     """Samples every 1 ms, steps of 0.7 ms."""
     base = vehicle()
     forces = static_forces(base, 211, 1e-3, noise=500.0)
-    return largest(run(engine, setups.driven(base, forces), 0.7e-3, 0.21).states)
+    return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 0.7e-3, 0.21).states)
 
 
 @cache
@@ -216,7 +229,7 @@ def bump(engine: str, folder: Path) -> float:
     assembly = vehicle().with_input("road", _bump())
     path = run(engine, assembly, 1e-3, 10.5, name)
     truth = run("reference", assembly, 5e-4, 10.5).states[:, 3]
-    return abs(largest(path.states[:, 3]) - largest(truth)) / largest(truth)
+    return abs(largest_magnitude(path.states[:, 3]) - largest_magnitude(truth)) / largest_magnitude(truth)
 
 
 def bump_naive(folder: Path) -> str:

@@ -45,7 +45,7 @@ def vehicle(
     return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
 
 
-def driven(base: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
+def driven_by_forces(base: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
     """The vehicle cut off the road and driven by two wheel forces (N)."""
     return base.without_tyres().with_input(mode, forces)
 
@@ -91,12 +91,12 @@ def unchecked(
     return build_unchecked(engine, assembly, engine_settings).run()
 
 
-def tight(assembly: Assembly, step: float, duration: float) -> Trajectory:
+def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajectory:
     """The independent solution: the paper's equations, order 8, relative tolerance 1e-12, rows every ``step``."""
     return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
 
 
-def exact(assembly: Assembly, step: float, count: int, forces: np.ndarray | None = None) -> np.ndarray:
+def exact_states(assembly: Assembly, step: float, count: int, forces: np.ndarray | None = None) -> np.ndarray:
     """States (count + 1, 8) of the linearised vehicle, exact by the matrix exponential.
 
     forces (count, 2) in N are held over each step; None is the vehicle on the flat road.
@@ -124,7 +124,7 @@ def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     return rest + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
 
 
-def largest(difference: np.ndarray) -> float:
+def largest_magnitude(difference: np.ndarray) -> float:
     """Largest magnitude of any entry."""
     return float(np.abs(difference).max())
 

@@ -22,12 +22,12 @@ from validation.hard_cases.case import Case
 from validation.hard_cases.setups import (
     CONSTRAINED,
     REFUSED,
-    driven,
-    largest,
+    driven_by_forces,
+    largest_magnitude,
     rms,
     run,
     static_forces,
-    tight,
+    tight_solution,
     unchecked,
     vehicle,
 )
@@ -43,7 +43,7 @@ def sprung(band: float) -> Assembly:
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
-    assembly = driven(base, static_forces(base, 2, DURATION, held=False))
+    assembly = driven_by_forces(base, static_forces(base, 2, DURATION, held=False))
     spring = PitchSpring("chassis", STIFFNESS, 0.0, band)
     return replace(assembly, initial=start, vehicle=replace(assembly.vehicle, pitch_springs=(spring,)))
 
@@ -51,12 +51,12 @@ def sprung(band: float) -> Assembly:
 def kink(engine: str, folder: Path) -> float:
     """Pitch over many crossings of the band's edges."""
     path = run(engine, sprung(BAND), STEP, DURATION)
-    return largest((path.states - _kink_truth().states)[:, 3])
+    return largest_magnitude((path.states - _kink_truth().states)[:, 3])
 
 
 @cache
 def _kink_truth() -> Trajectory:
-    return tight(sprung(BAND), STEP, DURATION)
+    return tight_solution(sprung(BAND), STEP, DURATION)
 
 
 def kink_naive(folder: Path) -> str:
@@ -86,13 +86,13 @@ def never_left(engine: str, folder: Path) -> float:
     tied = sprung(1.0)
     free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
     between, other = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
-    return largest(between - other)
+    return largest_magnitude(between - other)
 
 
 def beside_held(moment_held: bool = False) -> Assembly:
     """A moment of 2 kN m at 20 Hz beside held forces with noise, both sampled every 4 ms."""
     base = vehicle("asymmetric_twin")
-    assembly = driven(base, static_forces(base, 126, 4e-3, noise=300.0))
+    assembly = driven_by_forces(base, static_forces(base, 126, 4e-3, noise=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
     return replace(assembly, moment=Sampled(samples, 4e-3, moment_held))
 
@@ -100,18 +100,18 @@ def beside_held(moment_held: bool = False) -> Assembly:
 def moving_moment(engine: str, folder: Path) -> float:
     """Pitch under held forces and a moment that is not held."""
     path = run(engine, beside_held(), STEP, DURATION)
-    return largest((path.states - _moving_truth().states)[:, 3])
+    return largest_magnitude((path.states - _moving_truth().states)[:, 3])
 
 
 @cache
 def _moving_truth() -> Trajectory:
-    return tight(beside_held(), STEP, DURATION)
+    return tight_solution(beside_held(), STEP, DURATION)
 
 
 def moving_moment_naive(folder: Path) -> str:
     """The moment held like the forces that it stands beside."""
     path = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
-    return f"held as well: pitch off by {largest((path.states - _moving_truth().states)[:, 3]):.1e} rad"
+    return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
@@ -126,8 +126,8 @@ def _free_motion() -> np.ndarray:
     """States every 0.25 ms of the vehicle under its weight, released from a tilt."""
     base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
-    assembly = driven(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
-    return tight(assembly, 2.5e-4, DURATION).states
+    assembly = driven_by_forces(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
+    return tight_solution(assembly, 2.5e-4, DURATION).states
 
 
 def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
@@ -159,7 +159,7 @@ def missing_mass(engine: str, folder: Path) -> float:
 def missing_mass_naive(folder: Path) -> str:
     """Difference between the states of guided runs with the true and a wrong mass, as a sentence."""
     whole, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
-    return f"the states of the guided run differ by {largest(whole - other):.1e}: only the force can tell"
+    return f"the states of the guided run differ by {largest_magnitude(whole - other):.1e}: only the force can tell"
 
 
 def rough_rails(engine: str, folder: Path) -> float:

@@ -19,14 +19,14 @@ from validation.hard_cases.setups import (
     IMPLICIT,
     RAISED,
     REFUSED,
-    driven,
-    exact,
+    driven_by_forces,
     exact_decay,
-    largest,
+    exact_states,
+    largest_magnitude,
     run,
     settings,
     static_forces,
-    tight,
+    tight_solution,
     unchecked,
     vehicle,
 )
@@ -45,7 +45,7 @@ def inside_limit(engine: str, folder: Path) -> float:
     """RK4 at 3.9 ms for 300 steps: the fastest mode must have died."""
     assembly = _pushed()
     path = run(engine, assembly, 3.9e-3, 1.17)
-    return largest(path.states[-1] - exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
+    return largest_magnitude(path.states[-1] - exact_states(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
 def beyond_limit(engine: str, folder: Path) -> float:
@@ -57,8 +57,8 @@ def beyond_limit(engine: str, folder: Path) -> float:
 
 def _against_tight(assembly, states, step: float) -> float:
     """Error of the states relative to the motion of the tight solution."""
-    truth = tight(assembly, step, (len(states) - 1) * step).states
-    return largest(states - truth) / largest(truth - truth[0])
+    truth = tight_solution(assembly, step, (len(states) - 1) * step).states
+    return largest_magnitude(states - truth) / largest_magnitude(truth - truth[0])
 
 
 def beyond_limit_naive(folder: Path) -> str:
@@ -102,15 +102,15 @@ def huge_naive(folder: Path) -> str:
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     said = not solve(model.built.mbs, model.settings)
     _, states = model._recorded()
-    return f"Exudyn returns {said} with states of up to {largest(states[np.isfinite(states)]):.0e}"
+    return f"Exudyn returns {said} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
 
 
 def sudden(engine: str, folder: Path) -> float:
     """Front force up by 1 kN from one sample to the next, 1 ms steps."""
     assembly, forces = _step_force()
     path = run(engine, assembly, 1e-3, 0.2)
-    truth = exact(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
-    return largest(path.states - truth) / largest(truth[:, 4])
+    truth = exact_states(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
+    return largest_magnitude(path.states - truth) / largest_magnitude(truth[:, 4])
 
 
 def _step_force():
@@ -118,18 +118,18 @@ def _step_force():
     values = static_forces(base, 20, 10e-3).values.copy()
     values[5:, 0] += 1000.0
     forces = Sampled(values, 10e-3, held=True)
-    return driven(base, forces), forces
+    return driven_by_forces(base, forces), forces
 
 
 def sudden_naive(folder: Path) -> str:
     """Generalised-alpha with a step that does not see the fast pole."""
     assembly, forces = _step_force()
     path = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
-    truth = exact(assembly, 10e-3, 20, forces.values)
+    truth = exact_states(assembly, 10e-3, 20, forces.values)
     off = (path.states - truth)[6:9, 4]
     return (
         "Exudyn's default at 10 ms overshoots: front wheel velocity off by "
-        f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {largest(truth[:, 4]):.3f})"
+        f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {largest_magnitude(truth[:, 4]):.3f})"
     )
 
 
@@ -140,10 +140,10 @@ def repeat(engine: str, folder: Path) -> float:
     worst = 0.0
     for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT[engine]):
         signal = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
-        model = build(engine, driven(base, signal), settings(engine, 1e-3, 0.2, integrator))
+        model = build(engine, driven_by_forces(base, signal), settings(engine, 1e-3, 0.2, integrator))
         first = model.run().states
         model.acceleration(0.05, *np.split(first[50], 2))
-        worst = max(worst, largest(model.run().states - first))
+        worst = max(worst, largest_magnitude(model.run().states - first))
     return worst
 
 
@@ -151,9 +151,9 @@ def restart(engine: str, folder: Path) -> float:
     """Stopped after half the time and continued from the saved state."""
     base = vehicle()
     forces = static_forces(base, 400, 1e-3, noise=500.0)
-    whole = run(engine, driven(base, forces), 1e-3, 0.4).states
-    rest = driven(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
-    return largest(run(engine, rest, 1e-3, 0.2).states - whole[200:])
+    whole = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
+    rest = driven_by_forces(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
+    return largest_magnitude(run(engine, rest, 1e-3, 0.2).states - whole[200:])
 
 
 def stamps(engine: str, folder: Path) -> float:
@@ -162,7 +162,7 @@ def stamps(engine: str, folder: Path) -> float:
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     assembly = _pushed()
     path = run(engine, assembly, 1e-3, 0.2, name)
-    return largest(path.states - exact_decay(assembly, path.times))
+    return largest_magnitude(path.states - exact_decay(assembly, path.times))
 
 
 def stamps_naive(folder: Path) -> str:
@@ -170,10 +170,10 @@ def stamps_naive(folder: Path) -> str:
     assembly = _pushed()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
     off = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
-    truth = exact(assembly, 1e-3, len(path.times) - 1)
+    truth = exact_states(assembly, 1e-3, len(path.times) - 1)
     return (
         f"Exudyn's rows lie up to {off.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
-        f"shows an error of {largest(path.states - truth):.0e}"
+        f"shows an error of {largest_magnitude(path.states - truth):.0e}"
     )
 
 
@@ -184,10 +184,10 @@ def keeps_order(engine: str, folder: Path) -> float:
     """Amount by which the observed order falls short while the step is halved four times, from 2 ms on."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
-    truth, errors = exact(base, 0.1, 2)[-1], []
+    truth, errors = exact_states(base, 0.1, 2)[-1], []
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
         end = run(engine, base, step, 0.2, CONSTRAINED[engine]).states[-1]
-        errors.append(largest(end - truth))
+        errors.append(largest_magnitude(end - truth))
     return float(ORDERS[engine] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
 
 

@@ -1,6 +1,5 @@
 """A recording of any length with 60 channels: a virtual measurement repeated with soft seams, noise never twice."""
 
-import resource
 import subprocess
 import sys
 import time
@@ -18,11 +17,12 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import Hold, SectionRun, run
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
+from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
-PLACES = {
+SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
     "acc fr": (1.2, -0.6, 0.6),
     "acc rear": (-1.3, 0.0, 0.6),
@@ -40,7 +40,7 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
     names = [element.name for element in car.elements]
     table = VirtualTable(
         duration=seconds,
-        accelerometers={name: list(place) for name, place in PLACES.items()},
+        accelerometers={name: list(place) for name, place in SENSOR_PLACES.items()},
         travels=names[:10],
         sections=names[:9],
     )
@@ -77,7 +77,9 @@ def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
 
 def sections() -> Sections:
     """All sections, and where the accelerometers sit."""
-    return Sections(r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in PLACES.items()))
+    return Sections(
+        r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in SENSOR_PLACES.items())
+    )
 
 
 def run_of(
@@ -129,7 +131,7 @@ def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") 
     """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
 
     def told(completed: float, of: float) -> None:
-        print(completed, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
+        print(completed, peak_memory(), time.process_time(), flush=True)
 
     job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
     run(job, Path(folder) / "run", told, float(block))

@@ -85,6 +85,36 @@ GEARED = """<mujoco model="geared"><worldbody>
 """Dry friction of a hinge and a slide, a rack that follows a crank, and a lid that stays shut."""
 
 
+LINKED = """<mujoco model="linked"><worldbody>
+<body name="crank"><joint name="crank" axis="0 1 0" damping=".1" armature=".02"/>
+ <inertial pos="0 0 .1" mass="1" diaginertia=".02 .02 .01"/>
+ <body name="rod" pos="0 0 .2"><joint name="rod" axis="0 1 0"/>
+  <inertial pos=".3 0 0" mass=".6" diaginertia=".01 .03 .03"/></body></body>
+<body name="rocker" pos=".6 0 -.2"><joint name="rocker" axis="0 1 0"/>
+ <inertial pos="0 0 .15" mass="1.2" diaginertia=".03 .03 .01"/></body>
+<body name="box" pos="0 1 0" euler="10 20 30"><freejoint name="root"/>
+ <inertial pos=".1 0 .05" mass="2" diaginertia=".05 .06 .07"/><site name="lug" pos=".1 .2 .1" euler="30 0 10"/>
+ <body name="lid" pos="0 .2 .1"><joint name="hinge" axis="1 0 .2" armature=".05"/>
+  <inertial pos="0 .1 0" mass=".4" diaginertia=".01 .01 .01"/></body></body>
+<body name="arm" pos=".2 1.3 0"><joint name="swing" axis="1 .2 0"/>
+ <inertial pos="0 .1 0" mass=".7" diaginertia=".02 .01 .02"/><site name="tip" pos="0 .3 .1" euler="0 20 0"/></body>
+</worldbody><equality>
+ <connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0" solimp=".95 .99 .001"/>
+ <weld name="grip" site1="lug" site2="tip" solimp=".92 .95 .001" torquescale="2"/></equality></mujoco>"""
+"""Four bars in a loop, whose joint repeats what the plane of their hinges asks, and a box held by an arm."""
+
+LOOP, GRIP = (
+    '<connect name="loop" body1="rod" body2="rocker" anchor=".6 0 0"',
+    '<weld name="grip" site1="lug" site2="tip"',
+)
+HELD = LINKED.replace(
+    GRIP, '<weld name="grip" body1="box" body2="crank" relpose=".1 .4 .1 .9 .1 .2 .1" anchor=".05 0 0"'
+)
+"""The box held by the crank, at a place and with a turn that are not those of the file."""
+HUNG = LINKED.replace(GRIP, '<connect name="grip" body1="box" anchor=".1 .2 .1"').replace('torquescale="2"', "")
+"""The box hung by a point on the ground."""
+
+
 def chain(count: int, seed: int = 1) -> str:
     """A chain of hinges and slides with springs, dampers and armatures, all numbers at random."""
     draw = np.random.default_rng(seed)

@@ -1,29 +1,68 @@
-"""Accelerations with the soft couplings of MuJoCo, by the law of its documentation about the plain equations.
+"""Accelerations with the soft constraints of MuJoCo, by the law of its documentation about the plain equations.
 
-At a state that satisfies a coupling, in place and in speed, its reference acceleration is 0. What is left of the law:
-accelerations a minimise (a - a0) M (a - a0) + (J a) (J a) / R, where a0 are those without it, J its row, d the first
-number of solimp, and R = (1 - d) / d times what the documentation calls the diagonal approximation: the sum of the
-joints' entries in the inverse of the mass matrix in the design position.
+At a state that satisfies a constraint, in place and in speed, its reference acceleration is 0. What is left of the law:
+accelerations a minimise (a - a0) M (a - a0) + c c / R with c = J a + J' q', where a0 are those without it, J its rows,
+d the first number of solimp, and R = (1 - d) / d times what the documentation calls the diagonal approximation: the sum
+of the joints' entries in the inverse of the mass matrix in the design position; between bodies, the sum of both
+bodies' means over three directions, of their centres' shifts or of their turns.
 """
 
 import numpy as np
 
+from models.multibody.plain.constraints import turning_rows
+from models.multibody.plain.motion import FIRST
 from models.own_model.builds import Equations, Moved, plain_tree
+from models.own_model.constraints import plain_constraints
 from models.own_model.reading import TwinModel, tie_rows
+
+QUATERNION = 0.5
+"""Rate of a small rotation's quaternion to its angular velocity: MuJoCo's welds are constraints on the former."""
 
 
 def softly_coupled(twin: TwinModel) -> Equations:
-    """Of a model whose couplings are all that is soft in it."""
-    tree, ties = plain_tree(twin), twin.driven.couplings
-    rows, _ = tie_rows(ties, twin.size)
-    mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
-    lightness = np.linalg.inv(mass).diagonal()
-    share = np.array([(1.0 - tie.solimp[0]) / tie.solimp[0] for tie in ties])
-    give = share * ((rows != 0.0) @ lightness)
+    """Of a model whose constraints are all that is soft in it."""
+    tree, constraints = plain_tree(twin), plain_constraints(twin)
+    give, scale = _compliance(twin), _scale(twin)
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = tree.mass_and_force(0.0, q, v)
-        acceleration = np.linalg.solve(mass + rows.T / give @ rows, force)
+        rows, rest = constraints.asked(q, v)
+        rows, rest = scale[:, None] * rows, scale * rest
+        acceleration = np.linalg.solve(mass + rows.T / give @ rows, force - rows.T / give @ rest)
         return Moved(mass, mass @ acceleration, acceleration)
 
     return move
+
+
+def _scale(twin: TwinModel) -> np.ndarray:
+    """(c,): factors of the rows: points and couplings come first, then how axes turn."""
+    driven = twin.driven
+    welds = [QUATERNION * each.torque_scale for each in driven.connections if each.axes is not None]
+    return np.concatenate((np.ones(len(driven.couplings) + 3 * len(driven.connections)), np.repeat(welds, 3)))
+
+
+def _compliance(twin: TwinModel) -> np.ndarray:
+    """(c,): R of every row."""
+    driven, tree = twin.driven, plain_tree(twin)
+    mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
+    inverse = np.linalg.inv(mass)
+    rows, _ = tie_rows(driven.couplings, twin.size)
+    ties = np.array([_share(tie.solimp) for tie in driven.couplings]) * ((rows != 0.0) @ inverse.diagonal())
+    light = [(_share(each.solimp) * _lightness(twin, inverse, each.ends), each.axes) for each in driven.connections]
+    shifts, turns = [each[0] for each, _ in light], [each[1] for each, axes in light if axes is not None]
+    return np.concatenate((ties, np.repeat(shifts, 3), np.repeat(turns, 3)))
+
+
+def _share(solimp: tuple[float, ...]) -> float:
+    return (1.0 - solimp[0]) / solimp[0]
+
+
+def _lightness(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> np.ndarray:
+    """(2,): mean inverse inertias of both bodies together, of shifts (1/kg) and of turns (1/(kg m^2))."""
+    bodies, total = plain_tree(twin).bodies, np.zeros(2)
+    motion = bodies.move(*np.zeros((2, twin.size)))
+    for name in (name for name, _ in ends if name is not None):
+        (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
+        for i, rows in enumerate((shift[FIRST:].T, turning_rows(motion.axes(bodies.row[name])))):
+            total[i] += np.trace(rows @ inverse @ rows.T) / 3.0
+    return total

@@ -4,7 +4,6 @@
 prints what memory and time that takes; 10,000,000 rows need 2 GB of disk.
 """
 
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -15,9 +14,10 @@ from typing import NamedTuple
 
 from models.contact.material import Pair
 from models.ensemble.workers import processes
-from models.systems.contact.cases_table import answer
+from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
+from validation.common.peak_memory import peak_memory
 
 ROWS = (100_000, 1_000_000)
 PERIOD = 1000
@@ -45,11 +45,12 @@ def answered(folder: Path, rows: int) -> Taken:
     """Answer a table of so many rows into ``forces.csv``, without errors, on few cells."""
     write(folder / "cases.csv", rows)
     begun = time.perf_counter()
-    counts = answer(folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False)
+    counts = answer_table(
+        folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False
+    )
     if counts != {"rows": rows, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {rows} sound rows")
-    memory = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return Taken(memory, time.perf_counter() - begun)
+    return Taken(peak_memory(), time.perf_counter() - begun)
 
 
 def in_fresh_process(function: Callable[[Path, int], Taken], rows: int) -> Taken:

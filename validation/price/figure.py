@@ -15,15 +15,15 @@ from models.drawing.figures import (
     BAD,
     BLUE,
     COLOURS,
+    COLUMN_WIDTH,
     DARK,
     GREEN,
     GREY,
     PINK,
     SKY,
-    SMALL,
-    TITLE,
+    SMALL_TEXT,
+    TITLE_TEXT,
     VERMILION,
-    WIDE,
     heading,
     subplots,
     wrapped,
@@ -36,13 +36,13 @@ SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 MARKERS = "s^v<>PXhp*d"
 """Markers of the others, in turn within each engine."""
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
-MORE = (GREY, BLUE, GREEN, PINK, VERMILION, SKY)
+FAMILY_COLOURS = (GREY, BLUE, GREEN, PINK, VERMILION, SKY)
 """Colours of families that are no implementation."""
-LONGEST = 27
+LONGEST_LABEL = 27
 """Letters of a curve's name of which four stand beside each other."""
 SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
 """Coinciding curves show as rings within each other."""
-ONCE = 0.5
+SINGLE_RUN_MARKER = 0.5
 """Size of a marker whose seconds are those of one run, by that of the others."""
 FRONT: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
 BROKEN: Style = {
@@ -61,7 +61,7 @@ CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.lin
 
 def draw(measured: Measured) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
-    figure, axes = subplots(1, 2, figsize=(WIDE, 7.6), sharey=True)
+    figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
     styles = _styles(measured)
     top = 8 * max(measured.error(p) for p in measured.points if p.status == "ok")
     rounds = max(len(p.seconds) for p in measured.points)
@@ -74,7 +74,7 @@ def draw(measured: Measured) -> Figure:
         timed = kind == "seconds"
         label = "time [s] of a run, model built anew (median)" if timed else f"{kind} in the run [-]"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        ax.set_title(wrapped(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * WIDE, TITLE))
+        ax.set_title(wrapped(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * COLUMN_WIDTH, TITLE_TEXT))
     _failures(axes[0], measured, top)
     axes[0].set_ylabel(f"error of the {measured.quantity} [{measured.unit}]")
     axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 15 * top)
@@ -86,12 +86,12 @@ def draw(measured: Measured) -> Figure:
     figure.legend(
         handles=_legend(measured, styles),
         loc="outside lower center",
-        ncols=4 if longest <= LONGEST else 3,
-        fontsize=SMALL,
+        ncols=4 if longest <= LONGEST_LABEL else 3,
+        fontsize=SMALL_TEXT,
         handlelength=2.6,
         columnspacing=1.2,
-        title=wrapped(f"Same error at the same setting: {alike}.", 1.1 * WIDE, SMALL) if alike else None,
-        title_fontsize=SMALL,
+        title=wrapped(f"Same error at the same setting: {alike}.", 1.1 * COLUMN_WIDTH, SMALL_TEXT) if alike else None,
+        title_fontsize=SMALL_TEXT,
         alignment="left",
     )
     return figure
@@ -110,10 +110,10 @@ def _styles(measured: Measured) -> dict[str, Style]:
 
 
 def _colour(point: Point, measured: Measured) -> str:
-    """Colour of a point's implementation, or the next of MORE."""
+    """Colour of a point's implementation, or the next of FAMILY_COLOURS."""
     engine = point.setting.engine
     others = [name for name in dict.fromkeys(p.setting.engine for p in measured.points) if name not in COLOURS]
-    return COLOURS[engine] if engine in COLOURS else MORE[others.index(engine) % len(MORE)]
+    return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[others.index(engine) % len(FAMILY_COLOURS)]
 
 
 def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: Style) -> None:
@@ -124,7 +124,7 @@ def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: 
     for p, place in zip(points, places, strict=True):
         alike[place[1] < measured.floor(), kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
-        look = {**style, "linestyle": "none", "markersize": style["markersize"] * (ONCE if once else 1.0)}
+        look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
         face = "white" if hollow else style["color"]
         ax.plot(*zip(*some, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
     for p, place in zip(points, places, strict=True):
@@ -138,7 +138,7 @@ def _floor(ax: Axes, measured: Measured) -> None:
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured.floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
     told = f"reference known to {known:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
-    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL, color=GREY)
+    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
 def _front(ax: Axes, measured: Measured, kind: str) -> None:
@@ -165,7 +165,7 @@ def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
             place,
-            fontsize=SMALL,
+            fontsize=SMALL_TEXT,
             xytext=(float(corner[0]), float(corner[1])),
             textcoords="axes fraction",
             ha="left",
@@ -212,8 +212,8 @@ def _failures(ax: Axes, measured: Measured, top: float) -> None:
             ax.plot(calls, top, "x", color=_colour(p, measured), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
-        text = wrapped(text, 0.42 * WIDE, SMALL)
-        ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL)
+        text = wrapped(text, 0.42 * COLUMN_WIDTH, SMALL_TEXT)
+        ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
 def _expected(p: Point, measured: Measured) -> float:
@@ -247,7 +247,7 @@ def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
     for text in dict.fromkeys(text for p in measured.points for text in p.broken):
-        handles.append(Line2D([], [], **BROKEN, label=fill(f"assumption broken: {text}", LONGEST)))
+        handles.append(Line2D([], [], **BROKEN, label=fill(f"assumption broken: {text}", LONGEST_LABEL)))
     if any(p.status != "ok" for p in measured.points):
         failed = "no answer to rely on"
         handles.append(Line2D([], [], color=GREY, marker="x", linestyle="none", label=failed))

@@ -15,7 +15,7 @@ from itertools import count
 
 import numpy as np
 
-from models.ensemble.runner import AHEAD
+from models.ensemble.runner import BLOCKS_AHEAD
 
 PATH_SECONDS, PATH_BYTES = 0.8 / 50, 0.4e6 / 50
 """A path of 60 s in a worker (s), and its states at 121 rows (bytes)."""
@@ -78,7 +78,7 @@ def simulated(ensemble: Ensemble, workers: int, blocks: int) -> Outcome:
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
     kept, first, sent, now = set[int](), 0, 0, 0.0
-    ahead = max(AHEAD, 2 * workers)
+    ahead = max(BLOCKS_AHEAD, 2 * workers)
 
     def serve(station: str, takes: float, then: str, block: int) -> None:
         """Take a block as soon as the station is idle."""

@@ -235,9 +235,9 @@ def table(data: dict[str, Any]) -> Table:
 
 def draw(data: dict[str, Any]) -> tuple[str, Figure]:
     """Error over milliseconds, a panel per kind of output."""
-    from models.drawing.figures import WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
-    figure, axes = subplots(1, len(KINDS), figsize=(WIDE, 4.4), sharey=True)
+    figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
     for ax, kind in zip(axes, KINDS, strict=True):
         for p in data["points"]:

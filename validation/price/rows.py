@@ -10,9 +10,9 @@ SYSTEM: System = "cost"
 BANDS = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
 """Allowed distance of the observed from the declared order: at these steps the next power still shows,
 the more the higher the order (RK4 between 1 and 0.25 ms: 4.17)."""
-SURE = 1e-4
+REFERENCE_SHARE = 1e-4
 """Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``sure`` of its own."""
-SETTLED = 0.9
+SETTLED_RATIO = 0.9
 """Of the last but one error: a curve that falls no further has come down to its theory's own."""
 PROMISE = 1.25
 """Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
@@ -60,7 +60,7 @@ def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
 
 def _reference(problem: Problem, measured: Measured) -> Row:
     """The reference must know more than the finest tolerance asks."""
-    quantity, share = measured.quantity, getattr(problem, "sure", SURE)
+    quantity, share = measured.quantity, getattr(problem, "sure", REFERENCE_SHARE)
     return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,
@@ -135,7 +135,7 @@ def _sweep(measured: Measured) -> Row:
         wide = errors[0] >= 1e4 * errors[-1] or setting.value >= 1e4 * points[-1].setting.value
         ended = tried[curve][0].status != "ok" or setting.cells
         whole = ended and errors[-1] <= min(measured.tolerances)
-        settled = len(points) > 1 and errors[-1] >= SETTLED * errors[-2]
+        settled = len(points) > 1 and errors[-1] >= SETTLED_RATIO * errors[-2]
         low = 0 < (setting.order or setting.nominal) < 4
         if len(points) < 6 or not (wide or whole or settled or low):
             short.append(curve)

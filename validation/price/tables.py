@@ -67,9 +67,9 @@ def rounds_of(points: list[Point]) -> str:
     spread = float(np.median([times["mad"] / times["median"] for times in map(describe, in_rounds)]))
     return (
         f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
-        f"{1e3 * runner.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
+        f"{1e3 * runner.SLOW_RUN_SECONDS:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
         f"{len(answered) - len(in_rounds)} that "
-        f"are far from the cheapest, or longer than {1e3 * runner.LONG:g} ms and not for the middle "
+        f"are far from the cheapest, or longer than {1e3 * runner.LONG_RUN_SECONDS:g} ms and not for the middle "
         "tolerance."
     )
 
@@ -121,7 +121,7 @@ def losses(measured: Measured) -> Table:
         "The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
         f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
         "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
-        f"{runner.FEWEST}."
+        f"{runner.FEWEST_ROUNDS}."
     )
     return Table("Factor that a default setting loses", note, (f"{measured.quantity} error at most", *heads), rows)
 

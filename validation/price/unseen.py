@@ -16,7 +16,14 @@ import numpy as np
 
 from models.advice.price import Answer
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import LEAST, SLOWER, Recommendation, SettingChoice, priced, recommend
+from models.advice.price.recommendation import (
+    SHORTEST_TURN,
+    SLOWER_RATIO,
+    Recommendation,
+    SettingChoice,
+    priced,
+    recommend,
+)
 from models.advice.price.search import Tried
 from models.advice.price.systems.pitch_plane import PricedPitchPlane
 from models.advice.price.truth import Truth
@@ -28,8 +35,8 @@ from models.vehicles.parameters.itwm_drift import PARAMETERS
 
 SEED = 907
 ENGINES = ("reference", "exudyn", "mujoco")
-TIGHT = 1e-11
-LONGEST, SHORTEST = 5e-5, 2e-5
+TRUTH_TOLERANCE = 1e-11
+COARSE_SPACING, FINE_SPACING = 5e-5, 2e-5
 """Spacing (s) of the verdict's truth."""
 ROUNDS = 9, 25
 """Interleaved rounds of a contest, and of the one that must say the same again; turns are as long as in the race."""
@@ -37,9 +44,9 @@ CONTEST = 3.0
 """A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
 SCALES = {"f1,f2": 1e3, "pitch": 1e-2, "z3": 1e-2, "f3,f4": 1e3, "suspension_moment": 1e3, "enforced_moment": 1e3}
 """Usual size of a quantity, of which tolerances are parts."""
-PARTS = (-5.0, -1.5)
+TOLERANCE_POWERS = (-5.0, -1.5)
 """Tolerances by that size, powers of ten."""
-CHANGED = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4", "a")
+CHANGED_PARAMETERS = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4", "a")
 """Parameters of which four are changed, by up to e to the half."""
 
 
@@ -89,7 +96,7 @@ def drawn(number: int, folder: Path) -> Drawn:
     name, effects, more = kind(rng, folder, number)
     override = {
         key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
-        for key in map(str, rng.choice(CHANGED, 4, replace=False))
+        for key in map(str, rng.choice(CHANGED_PARAMETERS, 4, replace=False))
     }
     table = {
         "title": f"scene {number}, {name}",
@@ -101,7 +108,7 @@ def drawn(number: int, folder: Path) -> Drawn:
     quantity, common = "enforced_moment", ["pitch", "z3", "f3,f4"]
     if "prescribed_pitch" not in effects:
         quantity = str(rng.choice(common if "wheel_forces" in effects else ["f1,f2", *common]))
-    return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*PARTS))
+    return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS))
 
 
 Random = np.random.Generator
@@ -209,7 +216,7 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine(scene, math.lcm(*parts.values()))
-    if scene.base / common < SHORTEST:
+    if scene.base / common < FINE_SPACING:
         parts = {setting: _fine(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
@@ -218,12 +225,12 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
 
 
 def _fine(scene: PricedPitchPlane, parts: int) -> int:
-    """A multiple of ``parts`` in which rows lie no further apart than LONGEST."""
-    return parts * math.ceil(scene.base / parts / LONGEST * (1 - 1e-9))
+    """A multiple of ``parts`` in which rows lie no further apart than COARSE_SPACING."""
+    return parts * math.ceil(scene.base / parts / COARSE_SPACING * (1 - 1e-9))
 
 
 def _exact_answer(scene: PricedPitchPlane, spacing: float) -> Answer:
-    return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TIGHT)))
+    return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
 
 
 def slower(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
@@ -259,4 +266,7 @@ def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, r
         partial(recommendation.scene.solve, attempt.setting, recommendation.scene.first)
         for attempt in (choice.tried, rival)
     ]
-    return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER for rounds in ROUNDS)
+    return all(
+        paired_ratio(*interleave(jobs, rounds, SHORTEST_TURN, clock=time.process_time))[1] > SLOWER_RATIO
+        for rounds in ROUNDS
+    )

@@ -21,9 +21,9 @@ from validation.price.unseen import Drawn, Random, Verdict, verdicts
 SEED = 908
 ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
 """Engines that are asked about."""
-FINER, LEAST, MOST = 4, 60, 200
+TRUTH_CELLS_RATIO, FEWEST_CELLS, MOST_CELLS = 4, 60, 200
 """Times the cells recommended, and the fewest and most cells of a contact."""
-MORE = 3
+TRUTH_STEPS_RATIO = 3
 """Times the steps of the search's own truth."""
 TOLERANCES = {
     "y": (1e-6, 1e-4),
@@ -105,7 +105,9 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
     """Largest error of each setting over the whole run, beside a truth of another kind than the search's."""
     scene: Any = recommendation.scene
     ladder = scene.reference()
-    finer = Setting(ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / MORE, ladder.order)
+    finer = Setting(
+        ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / TRUTH_STEPS_RATIO, ladder.order
+    )
 
     def error(setting: Setting) -> float:
         exact = (
@@ -119,6 +121,6 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
 
 
 def _exact_answer(scene: MeshedScene, setting: Setting) -> Answer:
-    cells = min(MOST, max(LEAST, FINER * round(1.0 / setting.value))) if scene.cells else 0
+    cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))

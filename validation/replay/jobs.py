@@ -12,17 +12,17 @@ import numpy as np
 
 SCENES = Path(__file__).with_name("scenes")
 """Base scenes: each names as many tables as go together, short to run, and the files that they read."""
-SHORTER = Path(__file__).with_name("shipped.toml")
+SHORT_RUN_SETTINGS = Path(__file__).with_name("shipped.toml")
 """By shipped scene what makes it short to run, as arguments of --set."""
 COMMANDS = Path(__file__).with_name("commands.toml")
 """Jobs of several commands each."""
 VARIED, SEED = 300, 20
-DROPPED, CHANGED, MISTAKEN = 0.25, 0.6, 0.2
+DROPPED_CHANCE, CHANGED_CHANCE, MISTAKE_CHANCE = 0.25, 0.6, 0.2
 """Chances that a table goes, that numbers change, that the scene has a mistake."""
 FACTORS = (0.7, 1.4)
 """By which a number that changes is multiplied, at random between them."""
 ENGINES = ("reference", "exudyn", "mujoco", "all")
-KEPT = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
+KEPT_KEYS = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
 """Keys that never go by chance."""
 
 Table = dict[str, Any]
@@ -45,7 +45,7 @@ def jobs(command: str) -> list[Job]:
 
 def _shipped(command: str) -> Iterator[Job]:
     """Every scene that is listed: shown, and run."""
-    shorter = tomllib.loads(SHORTER.read_text())
+    shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
     said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
     for line in said.splitlines()[1:]:
         if not line.startswith("  "):
@@ -90,10 +90,10 @@ def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> Job:
     engines = scene.pop("engines_asked", ENGINES)
     engine = str(random.choice(engines)) if engines else ""
     _drop(scene, random)
-    if random.random() < CHANGED:
+    if random.random() < CHANGED_CHANCE:
         for place in random.permutation(list(_places_of_numbers(scene)))[:3]:
             _change(scene, str(place), float(random.uniform(*FACTORS)))
-    if random.random() < MISTAKEN:
+    if random.random() < MISTAKE_CHANCE:
         engine = _mistake(scene, engine, random)
     return Job(name, (_run(engine),), dumps(scene))
 
@@ -102,7 +102,7 @@ def _drop(scene: Table, random: np.random.Generator) -> None:
     effects = scene.get("effects")
     for table in (scene, effects if isinstance(effects, dict) else {}):
         for key in list(table):
-            if isinstance(table[key], dict) and key not in (*KEPT, "effects") and random.random() < DROPPED:
+            if isinstance(table[key], dict) and key not in (*KEPT_KEYS, "effects") and random.random() < DROPPED_CHANCE:
                 del table[key]
 
 

@@ -7,7 +7,7 @@ from validation.blind_spots.shared import compiled_functions
 from validation.blind_spots.table import JOINED, KEPT, Line, read, uncovered
 from validation.common.rows import Saved
 
-SHOWN = 3
+SHOWN_IDS = 3
 """Ids of rows and of tests that a line names; of the others it tells how many they are."""
 
 
@@ -31,10 +31,10 @@ def _function_record(line: Line) -> Saved:
     return {
         "function": line.function.replace(".<locals>", ""),
         "independent": line.is_covered,
-        "rows": rows[:SHOWN],
-        "more_rows": len(rows[SHOWN:]),
-        "tests": [test.rpartition("/")[2] for test in tests[:SHOWN]],
-        "more_tests": len(tests[SHOWN:]),
+        "rows": rows[:SHOWN_IDS],
+        "more_rows": len(rows[SHOWN_IDS:]),
+        "tests": [test.rpartition("/")[2] for test in tests[:SHOWN_IDS]],
+        "more_tests": len(tests[SHOWN_IDS:]),
         "ended": line.ended,
         "calling": line.calling,
         "left": line.left,

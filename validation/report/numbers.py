@@ -72,7 +72,7 @@ def duration(seconds: float) -> str:
     return f"{seconds:.1f} s" if seconds < 10 else f"{whole} s" if whole < 120 else f"{round(whole / 60)} min"
 
 
-POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
+POWER_OF_TEN = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
 NUMERIC = re.compile(
     r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
     r"|[-–]?|never|refused|not met"
@@ -87,7 +87,7 @@ def powers(cell: Any) -> Markup:
         power = int(match[2])
         return f"{float(match[0]):g}" if power in range(4) else f"{match[1]}e{power}"
 
-    return Markup(POWER.sub(written, str(escape(cell))))
+    return Markup(POWER_OF_TEN.sub(written, str(escape(cell))))
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:

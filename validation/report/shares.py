@@ -16,7 +16,7 @@ from models.core.whole_files import write_whole
 from validation.cases import CASES
 from validation.common.rows import Saved, System
 
-KEPT = Path(__file__).with_name("full_report.json")
+KEPT_REPORT = Path(__file__).with_name("full_report.json")
 QUICK_SHARES = {
     "pitch-plane": 13,
     "drift": 16,
@@ -30,15 +30,15 @@ QUICK_SHARES = {
     "effects": 12,
 }
 """Seconds of two cores that each system may take of the quick report's minute, once kernels are compiled."""
-REST = 20
+DRAWING_SECONDS = 20
 """Seconds of the minute that are left for starting and drawing."""
-assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values()) + REST == 120
+assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values()) + DRAWING_SECONDS == 120
 
 
 @cache
 def full() -> dict[str, Saved]:
     """Shares of each case in the last full report: "rows" by system, "seconds", "commit"."""
-    kept: dict[str, Saved] = json.loads(KEPT.read_text(encoding="utf-8"))
+    kept: dict[str, Saved] = json.loads(KEPT_REPORT.read_text(encoding="utf-8"))
     return kept
 
 
@@ -101,7 +101,7 @@ def keep(folder: Path) -> None:
         for case, systems in _row_counts(results["rows"]).items()
         if case in source["seconds"]
     }
-    write_whole(KEPT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())
+    write_whole(KEPT_REPORT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -147,11 +147,11 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
 
 def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple[str, Any]:
     """Left the spectra over the wavenumber, right the coherency of left and right; measured roads thin."""
-    from models.drawing.figures import WIDE, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
     isotropic = isotropic_like(road, half_track)
-    figure, (left, right) = subplots(1, 2, figsize=(WIDE, 4.8))
+    figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.8))
     left.fill_between(
         k,
         level_of_class("C") / 2 / k**2,

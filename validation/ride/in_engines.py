@@ -25,11 +25,11 @@ SYSTEM: System = "ride"
 ENGINES = ("exudyn", "mujoco")
 SEED, GRAVITY, SPEED = 2211, 9.81, 20.0
 NONLINEAR = "quarter_car_nonlinear"
-STEP, DRIVEN, SKIPPED = 2.5e-3, 24.0, 4.0
+STEP, RUN_DURATION, SKIPPED_SECONDS = 2.5e-3, 24.0, 4.0
 """Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
 NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
-SHOWN = ("body centre", "left occupant", "travel front left", "tyre force front left")
-SAME = "the same tableau, road and laws; the sums are taken in another order"
+SHOWN_OUTPUTS = ("body centre", "left occupant", "travel front left", "tyre force front left")
+SAME_LAWS = "the same tableau, road and laws; the sums are taken in another order"
 
 
 @cache
@@ -45,7 +45,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
     road = road_path(excitation_, SPEED, NONLINEAR_STEP)
     runs = {
         engine: ridden(
-            engine, vehicle, road, NONLINEAR_DRIVEN[not quick], seed=SEED, skipped=SKIPPED * (not quick), every=5
+            engine,
+            vehicle,
+            road,
+            NONLINEAR_DRIVEN[not quick],
+            seed=SEED,
+            skipped=SKIPPED_SECONDS * (not quick),
+            every=5,
         )
         for engine in ENGINES
     }
@@ -55,7 +61,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
     linear = statistically_linear(vehicle, excitation_, SPEED)
     travel, force = (linear.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
     size, left = linear.covariance.deviation, linear.left_out
-    error, _ = standard_errors(linear.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
+    error, _ = standard_errors(linear.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED_SECONDS)
     for engine, run in runs.items():
         shift = abs(run.outputs[:, travel].mean() - linear.mean[travel]) / size[travel]
         rows.append(
@@ -90,18 +96,21 @@ def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
         f"largest difference of all states between Exudyn and MuJoCo, {what} on the same random road",
         float(gap),
         "m, rad, m/s, rad/s",
-    ).at_most(1e-12, SAME, "native")
+    ).at_most(1e-12, SAME_LAWS, "native")
 
 
 def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     """19 freedoms, gravity on, one path of the random road: variances and means against the covariance."""
     vehicle, excitation_ = ride("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
-    runs = {engine: ridden(engine, vehicle, road, DRIVEN, seed=SEED, skipped=SKIPPED, every=2) for engine in ENGINES}
+    runs = {
+        engine: ridden(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, every=2)
+        for engine in ENGINES
+    }
     linear = linearise(vehicle)
     exact = stationary(excited(linear, excitation_, SPEED))
-    errors = standard_errors(linear, excitation_, SPEED, DRIVEN - SKIPPED)
-    rows = [_engine_difference_row("r19_ride", f"r19_ride under gravity, {DRIVEN:g} s", runs)]
+    errors = standard_errors(linear, excitation_, SPEED, RUN_DURATION - SKIPPED_SECONDS)
+    rows = [_engine_difference_row("r19_ride", f"r19_ride under gravity, {RUN_DURATION:g} s", runs)]
     for engine, run in runs.items():
         mean = run.outputs.mean(axis=0) / errors[0]
         square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]
@@ -111,7 +120,7 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
                 f"ride_nonlinear.variance.{engine}",
                 SYSTEM,
                 f"largest |z| of the variances of 16 outputs of r19_ride in {engine} against the "
-                f"covariance, {DRIVEN - SKIPPED:g} s (deviations to {100 * share:.1f} %)",
+                f"covariance, {RUN_DURATION - SKIPPED_SECONDS:g} s (deviations to {100 * share:.1f} %)",
                 float(np.abs(square).max()),
                 "",
             ).at_most(4.0, "standard errors by the densities: samples of a path know of each other", "none"),
@@ -132,7 +141,10 @@ def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitatio
     sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
     sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
     return {
-        side: {"frequency": f.tolist(), **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN}}
+        side: {
+            "frequency": f.tolist(),
+            **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN_OUTPUTS},
+        }
         for side, (f, density) in sides.items()
     }
 
@@ -141,12 +153,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra of both engines' runs over the covariance's own."""
     if not data["spectra"]:
         return []
-    from models.drawing.figures import COLOURS, DARK, LABELS, WIDE, heading, legend_below, subplots
+    from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, heading, legend_below, subplots
 
     shown = data["spectra"]
     units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
-    figure, axes = subplots(2, 2, figsize=(WIDE, 6.0), sharex=True)
-    for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
+    figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 6.0), sharex=True)
+    for axis, name, unit in zip(axes.ravel(), SHOWN_OUTPUTS, units, strict=True):
         for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
             curves = shown[engine]
             axis.loglog(
@@ -155,7 +167,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
                 style,
                 color=COLOURS[engine],
                 linewidth=width,
-                label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
+                label=f"{LABELS[engine]}, {RUN_DURATION - SKIPPED_SECONDS:g} s in time",
             )
         axis.loglog(shown["own"]["frequency"], shown["own"][name], color=DARK, linewidth=1.2, label="of the covariance")
         top = max(shown["own"][name])

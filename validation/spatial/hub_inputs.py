@@ -18,9 +18,9 @@ from validation.common.rows import Observed, Row, System
 from validation.spatial.cars import anywhere, static
 from validation.spatial.written_equations import FRAMES
 
-SEED, SAMPLES, STEP, EVERY = 37, 12, 2e-3, 4
+SEED, SAMPLES, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
 """Seed and count of the samples, s, and steps from one sample to the next."""
-TIGHT = 1e-11
+SOLVER_TOLERANCE = 1e-11
 """Relative tolerance of methods that pick their own steps."""
 QUICK = {"DOPRI5": "exudyn", "LSODA": "reference"}
 METHODS = QUICK | {"DOP853": "reference"}
@@ -47,7 +47,7 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
             f"centre of mass by {names}, which pick their own steps: largest distance from its parabolas",
             max(centre_gap(vehicle, m, how, name) for name, m in methods.items() for how in ("held", "linear")),
             "m",
-        ).at_most(1e-10, f"a tolerance of {TIGHT:g} per step", "closed form"),
+        ).at_most(1e-10, f"a tolerance of {SOLVER_TOLERANCE:g} per step", "closed form"),
         Observed(
             "hub_forces.own_steps_path",
             SYSTEM,
@@ -69,21 +69,21 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
 
 def settings(integrator: str = FIXED) -> Settings:
     """Of a run over all samples."""
-    return Settings(integrator, STEP, (SAMPLES - 1) * EVERY * STEP, TIGHT)
+    return Settings(integrator, STEP, (SAMPLES - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
 
 def samples(vehicle: CutVehicle) -> HubForces:
     """Static loads and 400 N, 40 N m at random, in the axes of space."""
     rest = static(vehicle, SAMPLES, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
-    return HubForces(rest.hubs, EVERY * STEP, "inertial").noisy(deviations, SEED)
+    return HubForces(rest.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
     """Largest error (m) of the centre of mass on any axis: at the samples, against the closed form."""
     forces, how = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
-    moved = centres(vehicle, run.positions[::EVERY])
+    moved = centres(vehicle, run.positions[::STEPS_PER_SAMPLE])
     return float(np.abs(moved - moved[0] - _fallen(vehicle, forces, interpolation == "held")).max())
 
 

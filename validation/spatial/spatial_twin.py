@@ -22,11 +22,11 @@ from models.vehicles.spatial import (
     Vector,
 )
 
-LARGE = ((200.0, 5.0, -10.0), (5.0, 900.0, 7.0), (-10.0, 7.0, 1000.0))
-SMALL = ((9.0, 0.5, -1.0), (0.5, 12.0, 0.7), (-1.0, 0.7, 14.0))
+LARGE_INERTIA = ((200.0, 5.0, -10.0), (5.0, 900.0, 7.0), (-10.0, 7.0, 1000.0))
+SMALL_INERTIA = ((9.0, 0.5, -1.0), (0.5, 12.0, 0.7), (-1.0, 0.7, 14.0))
 FRONT_LEFT, FRONT_RIGHT = (1.2, 0.7, 0.33), (1.25, -0.72, 0.33)
 UP: Vector = (0.0, 0.0, 1.0)
-STEEP, FLAT = (np.sin(0.07), 0.0, np.cos(0.07)), (np.cos(0.07), 0.0, -np.sin(0.07))
+STEEP_AXIS, FLAT_AXIS = (np.sin(0.07), 0.0, np.cos(0.07)), (np.cos(0.07), 0.0, -np.sin(0.07))
 SKEW = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
 """A direction along no axis of anything."""
 
@@ -49,15 +49,15 @@ def vehicle(gravity: float = 0.0) -> SpatialVehicle:
 
 def _bodies() -> tuple[Body, ...]:
     return (
-        Body("axle", 90.0, (-1.4, 0.0, 0.35), ("z", "rx"), SMALL),
-        Body("body", 800.0, (0.1, 0.02, 0.6), ("z", "rx", "ry"), LARGE),
-        Body("box", 50.0, (-1.2, 0.3, 0.9), (), SMALL, "body"),
-        Body("engine", 120.0, (0.9, 0.05, 0.5), ("x", "z", "rx", "ry", "rz"), SMALL, "body"),
+        Body("axle", 90.0, (-1.4, 0.0, 0.35), ("z", "rx"), SMALL_INERTIA),
+        Body("body", 800.0, (0.1, 0.02, 0.6), ("z", "rx", "ry"), LARGE_INERTIA),
+        Body("box", 50.0, (-1.2, 0.3, 0.9), (), SMALL_INERTIA, "body"),
+        Body("engine", 120.0, (0.9, 0.05, 0.5), ("x", "z", "rx", "ry", "rz"), SMALL_INERTIA, "body"),
         Body("fl", 40.0, FRONT_LEFT, ("x", "z")),
         Body("fr", 42.0, FRONT_RIGHT, ("x", "z")),
-        Body("pump", 10.0, (1.1, 0.1, 0.7), ("ry",), SMALL, "engine"),
-        Body("hub", 12.0, (-1.5, 0.6, 0.4), ("ry",), SMALL, "axle"),
-        Body("lid", 5.0, (1.1, 0.3, 0.9), (), SMALL, "pump"),
+        Body("pump", 10.0, (1.1, 0.1, 0.7), ("ry",), SMALL_INERTIA, "engine"),
+        Body("hub", 12.0, (-1.5, 0.6, 0.4), ("ry",), SMALL_INERTIA, "axle"),
+        Body("lid", 5.0, (1.1, 0.3, 0.9), (), SMALL_INERTIA, "pump"),
     )
 
 
@@ -68,12 +68,12 @@ def _spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k:
 def _springs() -> tuple[SpringDamper, ...]:
     """Suspensions first, then the mounts along three skew axes that are at right angles, then the riders'."""
     suspensions = (
-        _spring("spring fl", "body", "fl", FRONT_LEFT, STEEP, 2.0e4, 1500.0),
-        _spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP, 2.2e4, 1400.0),
+        _spring("spring fl", "body", "fl", FRONT_LEFT, STEEP_AXIS, 2.0e4, 1500.0),
+        _spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP_AXIS, 2.2e4, 1400.0),
         SpringDamper("spring rl", "body", "axle", (-1.4, 0.5, 0.7), (-1.4, 0.5, 0.35), UP, 2.0e4, 1500.0),
         SpringDamper("spring rr", "body", "axle", (-1.4, -0.6, 0.7), (-1.4, -0.6, 0.35), UP, 1.9e4, 1600.0),
-        _spring("bush fl", "body", "fl", FRONT_LEFT, FLAT, 2.0e5, 900.0),
-        _spring("bush fr", "body", "fr", FRONT_RIGHT, FLAT, 2.1e5, 800.0),
+        _spring("bush fl", "body", "fl", FRONT_LEFT, FLAT_AXIS, 2.0e5, 900.0),
+        _spring("bush fr", "body", "fr", FRONT_RIGHT, FLAT_AXIS, 2.1e5, 800.0),
     )
     skew = np.linalg.qr(np.array([SKEW, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]).T)[0].T
     mounts = tuple(

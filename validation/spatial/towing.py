@@ -8,13 +8,13 @@ import numpy as np
 
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
-from models.systems.handling.run import Drive, driven
+from models.systems.handling.run import Drive, drive_run
 from models.systems.handling.single_track import steady_turn
 from models.vehicles.spatial import SpatialVehicle, hitch_of
 from models.vehicles.towing import hitch_load
 from validation.spatial.trains import caravan
 
-SMALL = 2e-5
+SMALL_STEER = 2e-5
 """rad of steer: slip so small that no bristle slides."""
 
 
@@ -63,14 +63,14 @@ def towed_turn(
     duration : s.
     """
     turns = []
-    for steer in (SMALL, -SMALL):
+    for steer in (SMALL_STEER, -SMALL_STEER):
         car = Handling(replace(vehicle, drags=()), controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
         wanted = steady_turn(car, speed)
         if change is not None:
             change(car)
-        turns.append(driven("mujoco", car, speed, duration))
+        turns.append(drive_run("mujoco", car, speed, duration))
     left, right = (np.array([turn.velocity()[-1, 2], *headings(turn)]) for turn in turns)
-    yaw, *towed = (left - right) / (2.0 * SMALL)
+    yaw, *towed = (left - right) / (2.0 * SMALL_STEER)
     return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.headings)
 
 
@@ -95,7 +95,7 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     hitch = car.vehicle.body(hitch_of(car.vehicle.towed[0])).position[0]
     radius, back, bar = (front - rear) / math.tan(steer), rear - hitch, hitch - axle
     wanted = math.atan(back / radius) + math.asin(bar / math.hypot(radius, back))
-    (angle,) = headings(driven("mujoco", car, speed, 8.0))
+    (angle,) = headings(drive_run("mujoco", car, speed, 8.0))
     return -angle / wanted - 1.0
 
 

@@ -15,9 +15,9 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.linear_theory import forces as linear_forces
 from models.rail.wheelset import Wheelset
 
-SLOWEST = 0.1
+SLOWEST_SPEED = 0.1
 """Speed (m/s) below which creepage is relative to this one, and both directions of rolling are mixed."""
-LEAST = 1e-12
+LEAST_ECCENTRICITY = 1e-12
 """Least share of the squared eccentricity, and of what it lacks to 1, that is looked for."""
 
 
@@ -90,7 +90,7 @@ def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[
     def shape(m: float) -> float:
         return float((ellipe(m) / (1.0 - m) - ellipk(m)) * flat - (ellipk(m) - ellipe(m)) * steep)
 
-    m = brentq(shape, LEAST, 1.0 - LEAST, xtol=1e-16) if steep > flat else 0.0
+    m = brentq(shape, LEAST_ECCENTRICITY, 1.0 - LEAST_ECCENTRICITY, xtol=1e-16) if steep > flat else 0.0
     part = (ellipk(m) - ellipe(m)) / m if m > 1e-6 else np.pi / 4.0
     long = np.sqrt(depth * part / (ellipk(m) * flat))
     short = long * np.sqrt(1.0 - m)
@@ -121,7 +121,7 @@ def patch(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ at.normal]), velocity @ at.normal
     elastic, a, b = pressed(at.depth, at.along, 0.5 / w.head_radius, w.pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
-    forwards, by = float(np.clip(0.5 + 0.5 * speed / SLOWEST, 0.0, 1.0)), max(abs(speed), SLOWEST)
+    forwards, by = float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)), max(abs(speed), SLOWEST_SPEED)
     mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
     if forwards > 0.0:
         creep += forwards * creeping(w, (load, a, b), slip / by, law, cells)

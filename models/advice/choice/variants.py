@@ -14,9 +14,17 @@ from models.advice.choice.answer import Answer
 from models.core.assumptions import Broken, breaches, watching
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
-from models.core.scene_effects import absent_effects, module_of, named, own_table, rebuilt, with_effects, without
+from models.core.scene_effects import (
+    absent_effects,
+    module_of,
+    named_effects,
+    own_table,
+    rebuilt,
+    with_effects,
+    without,
+)
 from models.core.systems import modules_of
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 
 Set = frozenset[str]
 Key = tuple[Set, int]
@@ -78,7 +86,7 @@ class Variants:
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that the scene names."""
-        return tuple(self.scene.named) if self._opened else named(self.scene)
+        return tuple(self.scene.named) if self._opened else named_effects(self.scene)
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -108,7 +116,7 @@ class Variants:
         is."""
         if self.executor is not None:
             new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._ready]
-            self._ready |= zip(new, each_of(self._job, new, self.executor), strict=True)
+            self._ready |= zip(new, block_results(self._job, new, self.executor), strict=True)
 
     def run(self, key: Key) -> Outcome:
         """The run of a variant, made anew."""

@@ -8,9 +8,9 @@ import numpy as np
 
 HOLLOW = 10.0
 """A point is hollow if its error is below this many times the uncertainty of the reference."""
-FINEST = 3
+FITTED_POINTS = 3
 """How many of the finest points an observed order is fitted to: the coarse end is not asymptotic yet."""
-SAME = 0.01
+EQUAL_ERROR_SHARE = 0.01
 """Errors within this part of each other count as the same."""
 
 
@@ -23,12 +23,12 @@ def slope(sizes: Sequence[float], errors: Sequence[float]) -> float:
 
 def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
     """Slope over the finest points that stand clear of the floor (in the unit of the errors)."""
-    clear = sorted((h, e) for h, e in zip(sizes, errors, strict=True) if e >= floor)[:FINEST]
+    clear = sorted((h, e) for h, e in zip(sizes, errors, strict=True) if e >= floor)[:FITTED_POINTS]
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
 def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
-    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to SAME.
+    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to EQUAL_ERROR_SHARE.
 
     At least three settings must be common: two curves that merely cross are not the same.
     """
@@ -41,7 +41,7 @@ def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, .
 
 def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
     common = set(a) & set(b)
-    return len(common) >= 3 and all(abs(a[x] - b[x]) <= SAME * max(a[x], b[x]) for x in common)
+    return len(common) >= 3 and all(abs(a[x] - b[x]) <= EQUAL_ERROR_SHARE * max(a[x], b[x]) for x in common)
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,6 @@ def pareto(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     order = sorted(range(len(costs)), key=lambda i: (costs[i], errors[i]))
     front: list[int] = []
     for i in order:
-        if not front or errors[i] < (1 - SAME) * errors[front[-1]]:
+        if not front or errors[i] < (1 - EQUAL_ERROR_SHARE) * errors[front[-1]]:
             front.append(i)
     return front

@@ -21,7 +21,7 @@ from models.systems.ride.of_scene import goes_in_time
 
 STEPS = 960
 """Of every run, so many are priced."""
-ROUNDS, LEAST_ROUNDS, PATIENCE = 7, 3, 10.0
+ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
 """Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
 SEED = 11
 
@@ -129,7 +129,7 @@ def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
     micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
     for i in range(ROUNDS):
-        if i >= LEAST_ROUNDS and (time.process_time() - begun) * (i + 1) > i * PATIENCE:
+        if i >= LEAST_ROUNDS and (time.process_time() - begun) * (i + 1) > i * LONG_ROUNDS_SECONDS:
             break
         for j in order.permutation(len(names)):
             outcome = runs[names[j]]()

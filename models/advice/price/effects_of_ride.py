@@ -16,7 +16,7 @@ from models.core.errors import InputError
 from models.core.runge_kutta import step_on
 from models.core.scene_effects import absent_effects, listing, with_effects
 from models.machine.timing import paired_ratio
-from models.systems.ride.of_scene import told_by
+from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal, without
 
@@ -29,11 +29,11 @@ def price_list_of_ride(scene: Any) -> PriceList:
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()
-    with told_by(scene):
+    with scene_errors(scene):
         whole = FullScene(ReducedScene.complete(scene), float(speeds[len(speeds) // 2]))
         effects = effects_of(whole.scene)
-        rests = {effect.name: _rest(whole, effect) for effect in effects}
-    more = {name: _beside(scene, name, whole.speed) for name in absent_effects(scene)}
+        rests = {effect.name: _without_effect(whole, effect) for effect in effects}
+    more = {name: _with_one_more(scene, name, whole.speed) for name in absent_effects(scene)}
     systems = {name: rest for name, rest in ({"": whole.full} | rests | more).items() if isinstance(rest, Reduced)}
     micros = _turns(systems)
     says = listing(scene.system)
@@ -50,7 +50,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
     )
 
 
-def _rest(full_scene: FullScene, effect: Effect) -> Reduced | str:
+def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
     """The scene without an effect, or why there is none."""
     why = illegal([effect])
     if why:
@@ -61,7 +61,7 @@ def _rest(full_scene: FullScene, effect: Effect) -> Reduced | str:
         return error.allowed
 
 
-def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
+def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
     """The scene with one more effect at its usual values, or why there is none."""
     try:
         return FullScene(ReducedScene.complete(with_effects(scene, name)), speed).full
@@ -81,11 +81,11 @@ def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     for i in range(ROUNDS):
         for j in order.permutation(len(systems)):
             name, system = list(systems.items())[j]
-            micros[name][i] = _timed(system.system.A[: system.states, : system.states])
+            micros[name][i] = _step_microseconds(system.system.A[: system.states, : system.states])
     return micros
 
 
-def _timed(A: np.ndarray) -> float:
+def _step_microseconds(A: np.ndarray) -> float:
     """Microseconds of a step."""
     x, step = np.ones(len(A)), 1e-6
     begun = time.process_time()

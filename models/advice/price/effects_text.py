@@ -7,11 +7,11 @@ import numpy as np
 
 from models.advice.price.effects import Changed, Price, PriceList
 
-SHOWN = 3
+SHOWN_QUANTITIES = 3
 """Quantities of an effect that are printed; JSON has all."""
 WIDTH = 26
 """Of the column of names."""
-NOTHING = 1e-12
+ROUNDING_CHANGE = 1e-12
 """Relative change that is rounding."""
 
 
@@ -59,7 +59,8 @@ def _price(price: Price, quantities: list[str]) -> list[str]:
     ratio = f"{price.ratio[0]:.3g} times ({price.ratio[1]:.3g} to {price.ratio[2]:.3g})"
     plus = "+" if price.micros[0] >= 0.0 else ""
     cost = f"{name}{plus}{_micros(price.micros)} a step, {ratio}{_counts(price)}"
-    new = f"; there with it alone: {', '.join(price.gone[:SHOWN])}{', ...' if len(price.gone) > SHOWN else ''}"
+    further = ", ..." if len(price.gone) > SHOWN_QUANTITIES else ""
+    new = f"; there with it alone: {', '.join(price.gone[:SHOWN_QUANTITIES])}{further}"
     rows = [f"{_changes(price, quantities)}{new if price.gone else ''}"]
     rows += [f"keeps an assumption that is broken without it: {says}" for says in price.keeps]
     return [cost, *(f"    {'':<{WIDTH}} {row}" for row in rows)]
@@ -75,7 +76,7 @@ def _counts(price: Price) -> str:
 def _changes(price: Price, quantities: list[str]) -> str:
     """The quantities that were asked for, or those that change most."""
     asked = [change for change in price.changes if change.name in quantities]
-    shown = asked or [change for change in price.changes if change.relative > NOTHING][:SHOWN]
+    shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
     return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
 
 

@@ -14,15 +14,15 @@ from models.core.errors import InputError
 
 CELLS = (3, 5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 200)
 """Cells along a contact that are tried, and those of the scene."""
-LONGER = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
+STEP_FACTORS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
 """Steps that are tried, by the scene's own; without cells, halvings of the shortest too."""
 HALVINGS = 8
-ROUGH, DOUBLED, SURE = 12, 5, 6.0
+FIRST_CELLS, RUNGS, SURE = 12, 5, 6.0
 """Cells of the reference's first rung, how many rungs there are, and the part of a tolerance that the last one may
 change: the error that is left is a third of that."""
-TOGETHER, EXACT = "RK4 with cells and steps refined together", "DOP853"
+REFINED_TOGETHER, OTHER_METHOD = "RK4 with cells and steps refined together", "DOP853"
 """Methods of the reference, and of another family."""
-TIGHT = 1e-8
+OTHER_TOLERANCE = 1e-8
 """Relative tolerance of the second solver, which has its own steps."""
 
 
@@ -73,7 +73,7 @@ class MeshedScene(ABC):
     @cached_property
     def steps(self) -> dict[str, float]:
         """Methods with their steps (s), each a part of ``first``."""
-        steps = dict.fromkeys(self._part(self.step * k) for k in LONGER)
+        steps = dict.fromkeys(self._part(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[Ladder]:
@@ -95,8 +95,8 @@ class MeshedScene(ABC):
             return Ladder(self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4)
         return Ladder(
             self.reference_engine,
-            TOGETHER,
-            tuple(1.0 / (ROUGH * 2**k) for k in range(DOUBLED)),
+            REFINED_TOGETHER,
+            tuple(1.0 / (FIRST_CELLS * 2**k) for k in range(RUNGS)),
             2,
             cells=True,
             sure=SURE,
@@ -104,15 +104,15 @@ class MeshedScene(ABC):
 
     def second(self, last: Setting) -> Setting | None:
         """DOP853; None where there are cells, for all solvers share the error that these have."""
-        return None if self.cells else Setting("reference", EXACT, last.value, 0)
+        return None if self.cells else Setting("reference", OTHER_METHOD, last.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> Any:
         """Cells and run."""
         cells = round(1.0 / setting.value) if self.cells else 0
-        rung = round(math.log2(cells / ROUGH)) if self.cells else 0
-        if setting.method == EXACT:
+        rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
+        if setting.method == OTHER_METHOD:
             return cells, self.exact(cells, self._tied(rung) if self.cells else setting.value, duration)
-        if setting.method == TOGETHER:
+        if setting.method == REFINED_TOGETHER:
             return cells, self.run(setting.engine, cells, self._tied(rung), duration)
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
@@ -137,7 +137,7 @@ def chosen(quantity: str, known: dict[str, Any]) -> str:
     return quantity
 
 
-def part_of(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
+def run_and_quantity(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
     """The run and the quantity of a scene that a user names: RUN.QUANTITY, of the first run where none is named."""
     name, _, asked = (quantity or usual).rpartition(".")
     name = name or next(iter(runs))

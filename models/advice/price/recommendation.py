@@ -2,8 +2,8 @@
 
 Counts are the same in every run, so the least count wins. Seconds wander: they are those of the processor, in rounds in
 which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
-interval of its ratio to the fastest lies above SLOWER. So what is recommended in its place is faster beyond doubt, and
-what is recommended beside it is never slower than it by more than that.
+interval of its ratio to the fastest lies above SLOWER_RATIO. So what is recommended in its place is faster beyond
+doubt, and what is recommended beside it is never slower than it by more than that.
 
 Whatever is timed runs in this process, with nothing beside it. What is not may be shared among workers: the first two
 settings of a reference, the runs that confirm the winners, and those whose errors are told against a finer truth.
@@ -25,26 +25,27 @@ from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, places_of
 from models.machine.timing import interleave, paired_ratio
 
-NEAR = 2.0
+CLOSE_SECONDS_RATIO = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
-FAR = 8.0
+DEFAULT_SECONDS_RATIO = 8.0
 """The same for a default: it must never be given up because one run of it was disturbed."""
-ROUNDS, LEAST = 9, 0.002
+ROUNDS, SHORTEST_TURN = 9, 0.002
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
-FEWEST, PATIENCE = 3, 5.0
+FEWEST_ROUNDS, LONG_ROUNDS_SECONDS = 3, 5.0
 """Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
-BEHIND, USUAL_BEHIND = 1.5, 3.0
+DROPPED_SECONDS_RATIO, DEFAULT_DROPPED_RATIO = 1.5, 3.0
 """What took so many times the seconds of its engine's best in the first rounds is out of the race; a default later."""
-SLOWER = 1.05
+SLOWER_RATIO = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
 ATTEMPTS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
 RESOLVED = 3.0
-"""An error is told against a truth which is known that many times better, where one can be had within PATIENCE."""
+"""An error is told against a truth which is known that many times better, where one can be had within
+LONG_ROUNDS_SECONDS."""
 SHARED = 8
 """Runs at once that are not timed, about: two settings of a reference, or two for each engine."""
 DEARER = 8.0
@@ -130,7 +131,7 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
     """
     searched = known = truth(scene, tolerance, scene.first, executor=executor)
     search = Search(scene, searched, tolerance, scene.first).everything()
-    timed = _timed(search)
+    timed = _timed_settings(search)
     engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
     winners = _winners(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.whole > scene.first * (1 + 1e-9) and winners:
@@ -139,12 +140,12 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
     defaults = {
         ladder.engine: settings
         for ladder in scene.ladders()
-        if ladder.default and (settings := _default(search, ladder, timed)) is not None
+        if ladder.default and (settings := _default_cost(search, ladder, timed)) is not None
     }
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
 
 
-def _timed(search: Search) -> list[SettingChoice]:
+def _timed_settings(search: Search) -> list[SettingChoice]:
     """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
     curves: dict[str, Tried] = {}
     for attempt in search.meeting():
@@ -168,14 +169,18 @@ def _rivals(attempts: list[Tried]) -> list[Tried]:
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
         alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
         least = min(attempt.seconds for attempt in alike)
-        near = [attempt for attempt in alike if attempt.seconds <= (FAR if attempt.setting.default else NEAR) * least]
+        near = [
+            attempt
+            for attempt in alike
+            if attempt.seconds <= (DEFAULT_SECONDS_RATIO if attempt.setting.default else CLOSE_SECONDS_RATIO) * least
+        ]
         rivals |= dict.fromkeys(near if len(near) > 1 else [])
     return list(rivals)
 
 
 def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
-    seconds = _rounds(search, rivals, FEWEST)
+    seconds = _rounds(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
     least: dict[str, float] = {}
     for setting, took in middle.items():
@@ -184,9 +189,12 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
         attempt
         for attempt in rivals
         if middle[attempt.setting]
-        <= (USUAL_BEHIND if attempt.setting.default else BEHIND) * least[attempt.setting.engine]
+        <= (DEFAULT_DROPPED_RATIO if attempt.setting.default else DROPPED_SECONDS_RATIO) * least[attempt.setting.engine]
     ]
-    more = min(ROUNDS, int(PATIENCE / max(sum(middle[attempt.setting] for attempt in left), 1e-9))) - FEWEST
+    more = (
+        min(ROUNDS, int(LONG_ROUNDS_SECONDS / max(sum(middle[attempt.setting] for attempt in left), 1e-9)))
+        - FEWEST_ROUNDS
+    )
     further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
     return seconds | {
         setting: np.concatenate((seconds[setting], seconds_again)) for setting, seconds_again in further.items()
@@ -196,7 +204,7 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
 def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, np.ndarray]:
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
-    taken = interleave(jobs, rounds, LEAST, lasted=lasted, clock=time.process_time)
+    taken = interleave(jobs, rounds, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
     return dict(zip((attempt.setting for attempt in rivals), taken, strict=True))
 
 
@@ -220,9 +228,9 @@ def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoi
 def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
     """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
     both = min(len(choice.rounds), len(best.rounds))
-    if both < FEWEST:
+    if both < FEWEST_ROUNDS:
         return choice.seconds > best.seconds
-    return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER
+    return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER_RATIO
 
 
 Known = tuple[Truth, list[SettingChoice], Winners]
@@ -234,16 +242,16 @@ def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, exe
     rung = max(0, search.truth.rung - 1)
     known = truth(scene, search.tolerance, scene.whole, rung, twice=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
-    able = {choice.tried.setting: choice for choice in _shown(timed, winners)}
+    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed, winners)}
     over = Search(scene, known, search.tolerance, scene.whole)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
-    confirmed = each_of(partial(_over_all, over), blocks, executor)
+    confirmed = block_results(partial(_valid_over_run, over), blocks, executor)
     held = [each.choice for each in confirmed if each.choice is not None]
     search.tried += [attempt for each in confirmed for attempt in each.failed]
     return known, held, _winners(held, winners)
 
 
-def _shown(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
+def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
     """The winners and the defaults."""
     return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
 
@@ -257,7 +265,7 @@ class _Confirmed:
     failed: list[Tried] = field(default_factory=list)
 
 
-def _over_all(over: Search, block: tuple[Ladder, SettingChoice]) -> _Confirmed:
+def _valid_over_run(over: Search, block: tuple[Ladder, SettingChoice]) -> _Confirmed:
     """A setting, or the next finer one of its method that meets the tolerance over the whole run.
 
     The seconds of all attempts are told by the rounds in which the first was timed.
@@ -285,11 +293,11 @@ def _resolved(
 ) -> Known:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
-    shown = _shown(timed, winners)
+    shown = _winners_and_defaults(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _blurred(known, errors):
-        answers = dict(zip(errors, each_of(partial(_whole_answer, scene), errors, executor), strict=True))
-        known, errors = _finer(scene, known, answers, executor)
+        answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
+        known, errors = _finer_truth(scene, known, answers, executor)
     told = {
         choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], known.uncertainty))
         for choice in shown
@@ -307,10 +315,13 @@ def _whole_answer(scene: PricedScene, setting: Setting) -> Answer:
 
 def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
     """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
-    return min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE
+    return (
+        min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty
+        and DEARER * known.seconds < LONG_ROUNDS_SECONDS
+    )
 
 
-def _finer(
+def _finer_truth(
     scene: PricedScene, known: Truth, answers: dict[Setting, Answer], executor: Executor | None
 ) -> tuple[Truth, dict[Setting, float]]:
     """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
@@ -327,7 +338,7 @@ def _finer(
     return known, errors
 
 
-def _default(search: Search, ladder: Ladder, timed: list[SettingChoice]) -> Default | None:
+def _default_cost(search: Search, ladder: Ladder, timed: list[SettingChoice]) -> Default | None:
     """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]

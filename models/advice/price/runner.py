@@ -30,13 +30,14 @@ RIVALS = ("exudyn", "mujoco")
 """Engines whose own cheapest setting is told, where a problem has them."""
 CLOCK = time.process_time
 """Seconds of the processor: what else the machine does is not in them, nor in which settings have rounds."""
-NEAR = 1.25
+CLOSE_SECONDS_RATIO = 1.25
 """A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
-SLOW = 0.05
-"""A setting that takes longer (s) has FEWEST rounds, its first run as the first of them: a long run wanders less."""
-LONG = 0.25
+SLOW_RUN_SECONDS = 0.05
+"""A setting that takes longer (s) has FEWEST_ROUNDS rounds, its first run as the first of them: a long run wanders
+less."""
+LONG_RUN_SECONDS = 0.25
 """A setting that takes longer (s) has rounds for the tolerance in the middle alone, which the rows are about."""
-FEWEST = 5
+FEWEST_ROUNDS = 5
 """With fewer rounds no interval is told: that of one would look exact."""
 DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
@@ -194,7 +195,7 @@ class Measured:
         if kind == "seconds" and best[0] != default:
             pair = [resting(self.curves()[curve], least) for curve, least in ((default, usual), best)]
             rounds = min(len(p.seconds) for side in pair for p in side)
-            if rounds < FEWEST:
+            if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
             sides = [self._resampled(side, target, rounds) for side in pair]
             factor, low, high = interval(sides[0] / sides[1])
@@ -211,21 +212,21 @@ class Measured:
     def racing(self) -> list[Point]:
         """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on,
         and what those may that take little longer, of all and of each engine; what a default rests on that is refined;
-        of the front of the figure what is not slow; what takes LONG, for the middle tolerance alone. Work is counted,
-        so what wins by it needs no rounds.
+        of the front of the figure what is not slow; what takes LONG_RUN_SECONDS, for the middle tolerance alone. Work
+        is counted, so what wins by it needs no rounds.
         """
         curves, usual = self.curves(), self.defaults.values()
         chosen = [p for p in usual if p.status == "ok"] + [
-            p for p in self.front("seconds") if p.cost("seconds") <= SLOW
+            p for p in self.front("seconds") if p.cost("seconds") <= SLOW_RUN_SECONDS
         ]
         for target in self.tolerances:
             met, refined = (self.reaches(target, "seconds", extrapolate) for extrapolate in (False, True))
             near: Reaches = {}
             for engine in ("", *RIVALS, *(p.setting.engine for p in usual)):
-                near |= _near(met, engine)
+                near |= _nearly_cheapest(met, engine)
             near |= {p.setting.curve: refined[p.setting.curve] for p in usual if p.setting.curve in refined}
             rests = (p for curve, least in near.items() for p in resting(curves[curve], least))
-            chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG]
+            chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG_RUN_SECONDS]
         return list({p.setting: p for p in chosen}.values())
 
 
@@ -293,11 +294,11 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measure
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
         attempt(problem, first)  # imports and compiled code are loaded before anything is timed
     once = measured(problem, [attempt(problem, setting) for setting in settings])
-    rerun = _timed(problem, once.racing(), rounds, least)
+    rerun = _timed_points(problem, once.racing(), rounds, least)
     return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
-def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
+def _timed_points(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
     """The points with the seconds of their rounds, and whether their last run counted and gave what their first did."""
     last: dict[Setting, Any] = {}
 
@@ -305,8 +306,8 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
         last[setting] = problem.build(setting).run()
 
     lasted = [p.cost("seconds") for p in points]
-    apart = -(-rounds // FEWEST) if rounds >= FEWEST else rounds
-    every = [apart if seconds > SLOW else 1 for seconds in lasted]
+    apart = -(-rounds // FEWEST_ROUNDS) if rounds >= FEWEST_ROUNDS else rounds
+    every = [apart if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
     jobs = [partial(run, p.setting) for p in points]
     timed = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
     return {
@@ -320,13 +321,13 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     }
 
 
-def _near(reaches: Reaches, among: str) -> Reaches:
+def _nearly_cheapest(reaches: Reaches, among: str) -> Reaches:
     """The cheapest curve among those of one engine, or of all, and those that take little longer."""
     best = cheapest(reaches, among)
     return {
         curve: least
         for curve, least in reaches.items()
-        if best and curve.startswith(among) and least.cost <= NEAR * best[1].cost
+        if best and curve.startswith(among) and least.cost <= CLOSE_SECONDS_RATIO * best[1].cost
     }
 
 

@@ -15,19 +15,19 @@ from models.core.errors import InputError, RunFailed
 
 START = 2e-3
 """s: the step that is tried first; an engine's default method begins with its default step."""
-COARSE = 1 / 11
+FIRST_CELLS_SHARE = 1 / 11
 """Of a contact: the cells that are tried first."""
 LOOSE = 1e-3
 """The tolerance that an adaptive method is tried with first."""
-WORTH = 2.0
+GIVEN_UP_RATIO = 2.0
 """A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
-PATIENCE = 0.05
+REFINED_SECONDS = 0.05
 """s: an engine's default method is refined for as long as a run takes no longer than this, or than the engine's best
 that has met the tolerance, if one has.
 """
 TOO_LONG = 10.0
 """s: a run that would take longer is not made where another engine meets the tolerance in half of that, or less."""
-BEYOND = 10.0
+LARGEST_RELATIVE_ERROR = 10.0
 """An error of so many times the quantity's own size is no answer any more."""
 
 
@@ -82,7 +82,7 @@ class Search:
         else:
             error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
             attempt = Tried(setting, "ok", "", error_of, calls, seconds)
-            if not error_of <= BEYOND * max(self.truth.size, self.tolerance):
+            if not error_of <= LARGEST_RELATIVE_ERROR * max(self.truth.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
                 attempt = replace(attempt, status="SILENT", reason=why)
             elif alone := self.truth.beside(broken):
@@ -131,9 +131,9 @@ class Search:
         return max((value for value in alike if value in ladder.values), default=0.0)
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
-        """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
+        """The finest rung whose run takes no longer than REFINED_SECONDS, or than what the engine has that meets."""
         best = min(attempt.seconds for attempt in self.meeting(ladder.engine))
-        most = max(PATIENCE, best) / max(last.seconds, 1e-9)
+        most = max(REFINED_SECONDS, best) / max(last.seconds, 1e-9)
         work = [ladder.work(last.setting.value, value) for value in ladder.values]
         return max(i for i, times in enumerate(work) if i == 0 or times <= most)
 
@@ -143,13 +143,13 @@ class Search:
         if last is None or not last.seconds or ladder.default or not best:
             return False
         finer = ladder.work(last.setting.value, ladder.values[i])
-        return all(finer * cost(last) > WORTH * min(map(cost, best)) for cost in (_seconds, _calls))
+        return all(finer * cost(last) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds, _calls))
 
     def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
         best = min((attempt.seconds for attempt in self.meeting()), default=float("inf"))
         seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
-        if seconds <= max(TOO_LONG, WORTH * best):
+        if seconds <= max(TOO_LONG, GIVEN_UP_RATIO * best):
             return False
         why = f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s"
         self.tried.append(Tried(ladder.setting(i), "refused", why))
@@ -162,7 +162,7 @@ _seconds, _calls = attrgetter("seconds"), attrgetter("calls")
 def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
     """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
     if last is None:
-        wanted = LOOSE if ladder.adaptive else ladder.default or (COARSE if ladder.cells else START)
+        wanted = LOOSE if ladder.adaptive else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else START)
     elif last.status == "ok" and last.error > 0.0:
         wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
     else:

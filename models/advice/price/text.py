@@ -10,7 +10,7 @@ from models.advice.price.search import Tried
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
 
-SAME = 0.005
+EQUAL_RATIO_MARGIN = 0.005
 """Ratios so near to one are not worth a word."""
 HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
@@ -111,7 +111,7 @@ def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | 
         for whose, key in ((f"{LABELS[engine]}'s cheapest", engine), ("the cheapest of all", ""))
         for kind in ("calls", "seconds")
         if (best := recommendation.winners.get((key, kind))) is not None
-        and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > SAME
+        and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > EQUAL_RATIO_MARGIN
     ]
     met = f"within the tolerance at {refined.tried.setting.label()}{' (extrapolated)' if extrapolated else ''}"
     return f"; {met}: {', '.join(parts) or 'nothing is cheaper'}"

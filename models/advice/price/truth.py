@@ -13,7 +13,7 @@ from models.advice.price import Answer, Ladder, PricedScene
 from models.advice.price.problem import Setting
 from models.core.assumptions import Broken, breaches
 from models.core.errors import InputError, RunFailed
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 
 AGREED = 4.0
 """A solver of another family differs by less than this part of the tolerance."""
@@ -47,7 +47,7 @@ class Truth:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
         if not np.isfinite(other.values).all():
             return float("inf")
-        return float(np.abs(other.values - at(self.answer, other.times, self.kink_period)).max())
+        return float(np.abs(other.values - values_at(self.answer, other.times, self.kink_period)).max())
 
     @property
     def size(self) -> float:
@@ -55,7 +55,7 @@ class Truth:
         return float(np.abs(self.answer.values).max())
 
 
-def at(answer: Answer, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
+def values_at(answer: Answer, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
     """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
     all of them of one period."""
     last = len(answer.times) - 1
@@ -92,7 +92,7 @@ def truth(
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    settled, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung, executor)
+    settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
@@ -136,7 +136,7 @@ def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
     return _Rung(answer, "", time.process_time() - begun, broken)
 
 
-def _settled(
+def _settled_answer(
     scene: PricedScene, ladder: Ladder, tolerance: float, duration: float, rung: int, executor: Executor | None
 ) -> tuple[Answer, int, float, float, dict[str, Broken]]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
@@ -146,7 +146,7 @@ def _settled(
     rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
     job = partial(_of_rung, scene, duration)
     together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
-    ready = dict(zip(rungs, each_of(job, together, executor), strict=False))
+    ready = dict(zip(rungs, block_results(job, together, executor), strict=False))
     for i in rungs:
         now, failed, seconds, broken = ready.pop(i, None) or job(ladder.setting(i))
         if now is None:

@@ -21,9 +21,9 @@ from models.systems.ride.scene import RideScene
 
 SCREENED = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
-CERTAIN = 1e-12
+IDENTITY_ERROR = 1e-12
 """Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
-SAME = 1e-9
+VARIANCE_DIFFERENCE = 1e-9
 """By how much a variance by motions may differ from the one in extended precision."""
 
 Set = frozenset[Effect]
@@ -117,7 +117,7 @@ class Candidates:
     @remembered
     def predicted(self, chosen: Set) -> np.ndarray:
         """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
-        return largest(np.array([self._predicted_at(full_scene, chosen) for full_scene in self.screened]))
+        return largest_changes(np.array([self._predicted_at(full_scene, chosen) for full_scene in self.screened]))
 
     @remembered
     def _predicted_at(self, full_scene: FullScene, chosen: Set) -> np.ndarray:
@@ -137,12 +137,16 @@ class Candidates:
     @remembered
     def confirm(self, chosen: Set) -> np.ndarray:
         """The same by the exact solve, of all listed speeds."""
-        return largest(np.array([self._change(full_scene, chosen, self._confirm) for full_scene in self.full_scenes]))
+        return largest_changes(
+            np.array([self._change(full_scene, chosen, self._confirm) for full_scene in self.full_scenes])
+        )
 
     @remembered
     def solved(self, chosen: Set) -> np.ndarray:
         """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
-        return largest(np.array([self._change(full_scene, chosen, self._solve) for full_scene in self.full_scenes]))
+        return largest_changes(
+            np.array([self._change(full_scene, chosen, self._solve) for full_scene in self.full_scenes])
+        )
 
     def certified(self, chosen: Set) -> bool:
         """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
@@ -156,8 +160,8 @@ class Candidates:
         self.solved_equations += 1 + len(self.rows)
         two, variance = screen.identity(reduced)
         by_motions = solved_in_motions(reduced, self.rows)
-        same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= SAME).all())
-        return same and bool((abs(two / variance - 1.0) <= CERTAIN).all())
+        same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all())
+        return same and bool((abs(two / variance - 1.0) <= IDENTITY_ERROR).all())
 
     def _predict(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, chosen)
@@ -188,13 +192,13 @@ class Candidates:
         reduced = self.system(self.full_scenes[0], chosen)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
-        return largest(self.near.changes(self.rest(chosen)))
+        return largest_changes(self.near.changes(self.rest(chosen)))
 
     @remembered
     def off(self, chosen: Set) -> np.ndarray:
         """The same with parameters off, in the corner that is worst for each quantity."""
         rest = self.rest(chosen)
-        return largest(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
+        return largest_changes(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
@@ -242,6 +246,6 @@ class Candidates:
         return Cost(self.cost(chosen).states, step, STAGES / step if step else inf)
 
 
-def largest(changes: np.ndarray) -> np.ndarray:
+def largest_changes(changes: np.ndarray) -> np.ndarray:
     """Of changes (n, quantities) the largest of each quantity, with its sign."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

@@ -29,12 +29,12 @@ from models.systems.ride.reduced_scene import Effect, illegal
 
 ROUNDS = 30
 """Choices that are confirmed at most."""
-WORTH, EVEN = 0.05, 1e-3
+EQUAL_COST_LOG, EVEN = 0.05, 1e-3
 """Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
 them."""
-SHORTER = 0.9
+STEP_FACTOR = 0.9
 """A step that no run confirms becomes so many times as long."""
-LEAST = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 
 Saved = Callable[[Set, Set], float]
@@ -121,7 +121,7 @@ class Chooser(Candidates):
         """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
         step, marches = self.accurate(chosen).step, self.marches(chosen)
         while step and not confirms(marches[len(marches) // 2], step):
-            step *= SHORTER
+            step *= STEP_FACTOR
         return self.at_step(chosen, step)
 
     def choose(self) -> RideChoice:
@@ -151,7 +151,7 @@ class Chooser(Candidates):
         while rounds < ROUNDS:
             chosen, tested = self._greedy()
             chosen, rounds = self._worthwhile(chosen), rounds + tested
-            saves = self.accurate(chosen).calls * (1 + WORTH) <= self.accurate(frozenset()).calls
+            saves = self.accurate(chosen).calls * (1 + EQUAL_COST_LOG) <= self.accurate(frozenset()).calls
             if not chosen or not saves:
                 break
             if self.certified(chosen):
@@ -200,11 +200,11 @@ class Chooser(Candidates):
     def _costs_the_same(self, less: Set, chosen: Set) -> bool:
         """Whether a smaller set has no shorter stable step than a larger one, or as few calls at equal accuracy."""
         stable = self.cost(less).step
-        if stable >= self.cost(chosen).step * (1 - WORTH):
+        if stable >= self.cost(chosen).step * (1 - EQUAL_COST_LOG):
             return True
-        if stable < self.accurate(chosen).step * (1 - WORTH):
+        if stable < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
             return False  # what is in the larger one alone bounds the step
-        return self.accurate(less).calls <= self.accurate(chosen).calls * (1 + WORTH)
+        return self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
 
     def further(self, chosen: Set) -> dict[Effect, float]:
         """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
@@ -230,7 +230,7 @@ class Chooser(Candidates):
         """Logarithm, of savings worth the tolerance they take."""
         then = self.cost(further).calls
         saved = log(self.cost(chosen).calls / then) if then < inf else 0.0
-        return saved if saved > WORTH else 0.0
+        return saved if saved > EQUAL_COST_LOG else 0.0
 
     def _work_saved(self, chosen: Set, further: Set) -> float:
         now, then = self.cost(chosen), self.cost(further)
@@ -251,10 +251,10 @@ class Chooser(Candidates):
             if further == chosen or step - chosen in banned or step in banned or illegal(further):
                 continue
             saves = saved(chosen, further)
-            if saves <= LEAST * most:
+            if saves <= NEGLIGIBLE_SHARE * most:
                 continue  # whatever error it adds
             share = self.share(further)
-            score = saves / max(share - now, LEAST) if share <= 1.0 else 0.0
+            score = saves / max(share - now, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
             if score > most:
                 best, most = step - chosen, score
         return best

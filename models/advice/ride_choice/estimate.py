@@ -7,7 +7,7 @@ import numpy as np
 
 from models.advice.ride_choice.candidates import SCREENED
 from models.road.excitation import Excitation
-from models.systems.ride.of_scene import told_by
+from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
@@ -34,7 +34,7 @@ class Estimate:
 def estimate(ride: RideScene) -> Estimate:
     """Of a linear scene at constant speeds that asks for a choice."""
     assert ride.speeds is not None
-    with told_by(ride):
+    with scene_errors(ride):
         scene = ReducedScene.complete(ride)
         effects, speeds, states = len(effects_of(scene)), len(ride.speeds.all()), _states(scene, scene.excitation())
     screened = min(speeds, SCREENED)

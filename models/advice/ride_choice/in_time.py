@@ -13,9 +13,9 @@ from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import absent_effects, with_effects
-from models.core.strict import LARGEST, Strict, quantity
+from models.core.strict import LARGEST_QUANTITY, Strict, quantity
 from models.ride.gaussian_laws import of_curve, of_friction
-from models.ride.nonlinear_copies import EVERY, CopiesMarch, forgotten, usual_step
+from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, forgotten, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import BentSpring, statistically_linear
 from models.road.excitation import Excitation
@@ -26,18 +26,20 @@ from models.systems.ride.reduced_scene import without as without_effects
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
-FEWEST = 12
+FEWEST_COPIES = 12
 """Copies of which a standard error can be told, its own error about a fifth."""
 UNIT = 48
 """Steps are whole numbers of so many, before and while outputs count: a step may be any divisor of it times as long."""
-ROOM = 3e8
+ROADS_BYTES = 3e8
 """Bytes of roads that are kept, which many variants share, before one more."""
 
 
 class Samples(Strict):
     """Number and length of the copies by a scene's [options]."""
 
-    copies: int = Field(default=48, ge=FEWEST, le=100_000, description="of the vehicle, each on a road of its own")
+    copies: int = Field(
+        default=48, ge=FEWEST_COPIES, le=100_000, description="of the vehicle, each on a road of its own"
+    )
     lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
     seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads")
 
@@ -118,7 +120,7 @@ class InTime:
 
     def fewer(self, steps: int) -> "InTime":
         """The scene with as many copies as take about so many steps, and no fewer than tell a standard error."""
-        copies = max(FEWEST, -(-self.samples.copies * steps // self.steps))
+        copies = max(FEWEST_COPIES, -(-self.samples.copies * steps // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
     @cached_property
@@ -127,7 +129,7 @@ class InTime:
 
     def vehicle(self, pace: Pace) -> SpatialVehicle:
         """The vehicle without the effects at a speed; InputError where a run in time needs an effect."""
-        return left(self.scene, pace.springs)
+        return reduced_vehicle(self.scene, pace.springs)
 
     def roads(self, pace: Pace) -> np.ndarray:
         """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
@@ -138,11 +140,11 @@ class InTime:
         """Outputs, and each copy's mean square (copies, p) about the mean of all."""
         step = 2.0 * pace.half * self.times
         march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
-        every = max(1, EVERY // self.times)
+        every = max(1, STEPS_PER_READING // self.times)
         march.over(roads, pace.settling // self.times, every)
         count = len(range(0, pace.counted // self.times, every))
         first, second = march.sums[0].T / count, march.sums[1].T / count
-        if not (second < LARGEST).all():
+        if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
         mean = first.mean(axis=0)
         return march.plain.outputs, second - 2 * mean * first + mean**2
@@ -187,7 +189,7 @@ def _may_go(scene: ReducedScene, effect: Effect) -> bool:
     )
 
 
-def left(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
+def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
     """The vehicle of what is left; ``moving``: how bent springs move, for the gains of straight laws."""
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
@@ -231,7 +233,7 @@ def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     of_run = path.speed, path.half, steps, samples.copies, samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
     if key not in _kept:
-        while sum(roads.nbytes for roads in _kept.values()) > ROOM:
+        while sum(roads.nbytes for roads in _kept.values()) > ROADS_BYTES:
             del _kept[next(iter(_kept))]
         _kept[key] = next(path.blocks(steps, samples.copies, samples.seed))
     return _kept[key]

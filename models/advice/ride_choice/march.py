@@ -28,9 +28,9 @@ ALIKE, BEYOND = 6, 6.0
 stand for all beyond, which fall with their square."""
 LOWEST = 1e-4
 """Where panels of frequencies begin, by the highest frequency that steps can tell."""
-SHORTEST, STEPS, FINE = 1 / 32, 8, 64
+SHORTEST_STEP_SHARE, STEPS, FINE = 1 / 32, 8, 64
 """Shortest step that is tried, by the longest stable one; steps from there on, and parts of what lies between two."""
-TINY = 1e-12
+NEGLIGIBLE_SHARE = 1e-12
 """An error, by the tolerance, that is none."""
 
 
@@ -181,11 +181,11 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
             if not error <= 1.0:
                 runs.insert(0, runs.pop(i))  # what broke it here is likely to break it elsewhere
                 return float(np.log(error)) if error < np.inf else np.inf
-            worst = max(worst, float(np.log(max(error, TINY))))
+            worst = max(worst, float(np.log(max(error, NEGLIGIBLE_SHARE))))
         return worst
 
     high = 0.999 * min(march.longest for march in marches)
-    steps = np.geomspace(SHORTEST * high / 0.999, high, STEPS)
+    steps = np.geomspace(SHORTEST_STEP_SHARE * high / 0.999, high, STEPS)
     shares, low, broken = dict[int, float](), -1, STEPS
     while broken - low > 1:
         middle = (low + broken) // 2

@@ -14,20 +14,20 @@ from models.core.runge_kutta import STAGES, step_on
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
-FINER = 4
+REFINEMENT = 4
 """Steps of the run beside it are so many times as short."""
-COPIES, LONGEST, STEPS = 48, 20.0, 1500
+COPIES, LONGEST_RUN_SECONDS, LONGEST_RUN_STEPS = 48, 20.0, 1500
 """Copies; each runs for so many seconds (s), or for so many steps if that is shorter."""
 BLOCK = 250
 """Steps whose states are kept before they are summed."""
 BEGIN = 0.2
 """Share of a run in which it forgets its beginning, and nothing counts."""
 SEED = 1
-ALIKE = 0.1
+ALLOWED_SHARE = 0.1
 """Share of what steps change by which run and closed form may differ: a few per cent of a step."""
-LEAST = 1e-4
+CLOSED_FORM_ERROR = 1e-4
 """What the closed form leaves out of a ratio."""
-SURE = 4.0
+ALLOWED_STANDARD_ERRORS = 4.0
 """Standard errors by which a run may differ from the closed form; more does not happen by chance."""
 
 
@@ -42,10 +42,10 @@ class Marched:
 
 def marched(march: March, step: float, copies: int = COPIES) -> Marched:
     """Run a scene in steps (s)."""
-    steps = max(int(min(LONGEST / step, STEPS)), 10)
-    road = _states(march, step / FINER, steps * FINER, copies)
-    coarse, calls = _squares(march, road[::FINER], step)
-    fine, _ = _squares(march, road, step / FINER)
+    steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
+    road = _states(march, step / REFINEMENT, steps * REFINEMENT, copies)
+    coarse, calls = _squares(march, road[::REFINEMENT], step)
+    fine, _ = _squares(march, road, step / REFINEMENT)
     mean = fine.mean(axis=0)
     squared = coarse.mean(axis=0) / mean
     error = (coarse - squared * fine).std(axis=0, ddof=1) / (np.sqrt(copies) * mean * 2 * np.sqrt(squared))
@@ -56,8 +56,13 @@ def confirms(march: March, step: float) -> bool:
     """Whether a run in steps (s) finds what the closed form says that they do to deviations, before weightings."""
     plain = replace(march, weightings=())
     run = marched(plain, step)
-    said = plain.deviations(step) / plain.deviations(step / FINER)
-    return bool((abs(run.ratio - said) <= SURE * run.error + ALIKE * abs(said - 1.0) + LEAST).all())
+    said = plain.deviations(step) / plain.deviations(step / REFINEMENT)
+    return bool(
+        (
+            abs(run.ratio - said)
+            <= ALLOWED_STANDARD_ERRORS * run.error + ALLOWED_SHARE * abs(said - 1.0) + CLOSED_FORM_ERROR
+        ).all()
+    )
 
 
 def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:

@@ -19,7 +19,7 @@ alike to tell."""
 INVERSE = 1e-9
 """By how much W V may differ from the unit matrix."""
 
-REACH = np.linspace(0.0, 3.0, 601)[1:]
+STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
 """Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
 
 
@@ -70,7 +70,7 @@ def modes_of(A: np.ndarray) -> Modes | None:
         return None
 
 
-def driven(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
+def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
     """Motions of u' = A_u u, x' = A_x x + coupling u together, the state (u, x); None where they are not told apart."""
     if driver is None or system is None:
         return None
@@ -95,7 +95,7 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
     n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
-    both = driven(road, A[:n, n:], vehicle)
+    both = driven_motions(road, A[:n, n:], vehicle)
     if both is None:
         return None
     order = np.concatenate([np.arange(len(A) - n, len(A)), np.arange(len(A) - n)])
@@ -108,7 +108,7 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
     if system is None or filters is None:
         return None
     n = len(system.rates)
-    both = driven(system, A[n:, :n], filters)
+    both = driven_motions(system, A[n:, :n], filters)
     return None if both is None else both.of(A)
 
 
@@ -133,8 +133,8 @@ def _weightings(names: tuple[str, ...]) -> Modes | None:
 def stable_step(values: np.ndarray) -> float:
     """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
     values = values[(abs(values) > 0) & (values.imag >= 0)]  # those of a pair allow the same step
-    z = values[:, None] / abs(values)[:, None] * REACH
+    z = values[:, None] / abs(values)[:, None] * STEP_TIMES_EIGENVALUE
     grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
-    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(REACH))
-    reach = np.where(first > 0, REACH[np.maximum(first, 1) - 1], 0.0)
+    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(STEP_TIMES_EIGENVALUE))
+    reach = np.where(first > 0, STEP_TIMES_EIGENVALUE[np.maximum(first, 1) - 1], 0.0)
     return float((reach / abs(values)).min(initial=np.inf))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigvals
 
-from models.advice.ride_choice.parameters import OFF, Parameter, changed, parameters
+from models.advice.ride_choice.parameters import PARAMETER_ERROR, Parameter, parameters, scaled_vehicle
 from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, of_speed
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.slopes import Sensitivity, Shifts
@@ -24,11 +24,11 @@ from models.vehicles.spatial import SpatialVehicle
 
 LOBES, EVEN = 12.0, 10
 """Speeds so close that waves of this frequency (Hz) turn by an eighth between axles, and at least so many."""
-FEW = 9
+SLOPE_SPEEDS = 9
 """Speeds at which slopes are told."""
-ENDS = 1e-3, 1e5
+FREQUENCY_ENDS = 1e-3, 1e5
 """First and last frequency, by the slowest and the fastest motion."""
-VANISHING = 1e-9
+ROUNDING_SHARE = 1e-9
 """Share of the largest slope up to which one is nothing but rounding."""
 
 
@@ -69,7 +69,7 @@ class Neighbourhood:
         self.vehicles = Vehicles(scene.vehicle, float(self.speeds[0])) if vehicles is None else vehicles
         self.off = 0
         self.parameters = parameters(scene.vehicle)
-        self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, FEW).round().astype(int))]
+        self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, SLOPE_SPEEDS).round().astype(int))]
         self._shifts: dict[Hashable, Shifts] = {}
         self.whole, self.at_few = self._variances(scene, self.vehicles), self._slopes(scene)
 
@@ -77,7 +77,7 @@ class Neighbourhood:
         """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
         if not factors:
             return np.asarray(np.sqrt(self._variances(rest, self.vehicles) / self.whole) - 1.0)
-        scene, rest = (replace(each, vehicle=changed(each.vehicle, factors)) for each in (self.scene, rest))
+        scene, rest = (replace(each, vehicle=scaled_vehicle(each.vehicle, factors)) for each in (self.scene, rest))
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)
         changes = np.sqrt(self._variances(rest, vehicles) / self._variances(scene, vehicles)) - 1.0
         self.off += len(vehicles)
@@ -92,7 +92,7 @@ class Neighbourhood:
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
         worst = (abs(ratio - 1) + abs(slopes).sum(axis=2)).argmax(axis=0)
         signs = [_signs(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
-        return [dict(zip(self.parameters, 1.0 + OFF * sign, strict=True)) for sign in signs]
+        return [dict(zip(self.parameters, 1.0 + PARAMETER_ERROR * sign, strict=True)) for sign in signs]
 
     def _variances(self, scene: ReducedScene, vehicles: Vehicles) -> np.ndarray:
         """Variances (v, q) at all speeds."""
@@ -125,8 +125,8 @@ class Neighbourhood:
     def _made(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
         key = vehicle, of_speed(vehicle, speed)
         if key not in self._shifts:
-            linear, factor = self.vehicles.linear, 1.0 + OFF
-            others = [linear(changed(vehicle, {each: factor}), speed) for each in self.parameters]
+            linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR
+            others = [linear(scaled_vehicle(vehicle, {each: factor}), speed) for each in self.parameters]
             self._shifts[key] = Shifts.of(linear(vehicle, speed), others, [row for row, _ in self.quantities])
         return self._shifts[key]
 
@@ -139,7 +139,7 @@ class Sum:
     ) -> None:
         self.excitation, self.speeds = excitation, speeds
         rates = vehicle.modes.rates if vehicle.modes else _rates(vehicle.linear)
-        ends = ENDS[0] * abs(rates).min(), ENDS[1] * abs(rates).max()
+        ends = FREQUENCY_ENDS[0] * abs(rates).min(), FREQUENCY_ENDS[1] * abs(rates).max()
         self.omega, weights, self.apart = frequencies(rates, max(self.excitation.lengths) / float(speeds[0]), ends)
         factors = weighting_factors([name for _, name in quantities], self.omega).T
         self.weights = weights[:, None] * abs(factors) ** 2 / np.pi
@@ -162,7 +162,7 @@ class Sum:
 
 def _signs(slopes: np.ndarray) -> np.ndarray:
     """Of slopes (p,): 1 or -1, and 1 for those that vanish, whose sign would be that of rounding."""
-    return np.where(slopes < -VANISHING * abs(slopes).max(initial=0.0), -1.0, 1.0)
+    return np.where(slopes < -ROUNDING_SHARE * abs(slopes).max(initial=0.0), -1.0, 1.0)
 
 
 def _alike(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:

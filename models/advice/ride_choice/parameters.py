@@ -8,9 +8,9 @@ import numpy as np
 
 from models.vehicles.spatial import SpatialVehicle
 
-OFF = 0.05
+PARAMETER_ERROR = 0.05
 """Share by which every mass, inertia, stiffness and damping may be off, each for itself."""
-PARTS = {
+PARAMETERS_OF_PARTS = {
     "bodies": ("mass", "inertia"),
     "springs": ("stiffness", "damping"),
     "tyres": ("stiffness", "damping"),
@@ -26,22 +26,24 @@ def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
     """All values that may be off."""
     return [
         (group, part.name, key)
-        for group, keys in PARTS.items()
+        for group, keys in PARAMETERS_OF_PARTS.items()
         for part in getattr(vehicle, group)
         for key in keys
         if np.any(getattr(part, key))
     ]
 
 
-def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
+def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with these values so many times as large; those that it has not are passed over."""
 
     def part(group: str, before: Any) -> Any:
-        known = [key for key in PARTS[group] if (group, before.name, key) in factors]
+        known = [key for key in PARAMETERS_OF_PARTS[group] if (group, before.name, key) in factors]
         after = {key: _times(getattr(before, key), factors[group, before.name, key]) for key in known}
         return replace(before, **after) if after else before
 
-    groups: dict[str, Any] = {group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARTS}
+    groups: dict[str, Any] = {
+        group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARAMETERS_OF_PARTS
+    }
     return replace(vehicle, **groups)
 
 

@@ -11,7 +11,7 @@ from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.vehicle_file import vehicle_path
 
 SCENE, VEHICLE = "reduced.toml", "reduced_vehicle.toml"
-ASKED = ("quantities", "tolerance", "options")
+QUESTION_KEYS = ("quantities", "tolerance", "options")
 """Keys of a scene that belong to its question."""
 
 
@@ -23,7 +23,7 @@ def write(rest: ReducedScene, folder: Path) -> Path:
     notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
     with (folder / VEHICLE).open("x") as file:
         file.write(toml({**vehicle, "notes": notes}))
-    table = {key: value for key, value in scene.items() if key not in ASKED and value != "auto"}
+    table = {key: value for key, value in scene.items() if key not in QUESTION_KEYS and value != "auto"}
     road = dict(table.get("road", {}))
     if "file" in road:
         road["file"] = str(rest.ride.path(road["file"], "road.file").resolve())

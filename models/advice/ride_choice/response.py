@@ -12,7 +12,7 @@ import numpy as np
 from models.advice.ride_choice.reduced import ReducedVehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 
-SAME = 1e-7
+RESPONSE_DIFFERENCE = 1e-7
 """Share of the largest response by which motions and the solve may differ at the frequency that is looked at."""
 
 
@@ -56,7 +56,7 @@ class Response:
         one = [np.eye(len(self.vehicle.linear.mass))]
         by_motions = self._sum(fractions[at], one, self.by_heights, self.s[at])
         by_solve = self._solved(one, self.by_heights, self.s[at])
-        same = abs(by_motions - by_solve).max() <= SAME * abs(by_solve).max()
+        same = abs(by_motions - by_solve).max() <= RESPONSE_DIFFERENCE * abs(by_solve).max()
         return fractions if same else None
 
     def _between(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> np.ndarray:

@@ -22,7 +22,7 @@ from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silen
 from models.ride.excited import DelayedSystem
 from models.ride.marginal import split_marginal
 
-SLOWEST = 1e-9
+SLOWEST_DECAY = 1e-9
 """Decay, by the fastest rate, below which a motion counts as one that does not die out."""
 HARDLY, TRUSTED = 1e-7, 1e-10
 """The same below which motions are left to the exact solve, and the share of a variance that they may miss."""
@@ -58,7 +58,7 @@ class Screen:
     def __init__(self, base: Reduced, rows: list[int]) -> None:
         self.base, self.rows = base, rows
         A, C, modes = base.system.A, base.system.C[rows], base.modes
-        if still(modes.rates if modes else np.linalg.eigvals(A)):
+        if has_undamped_motion(modes.rates if modes else np.linalg.eigvals(A)):
             raise InputError(
                 "",
                 "vehicle",
@@ -99,7 +99,7 @@ class Screen:
         return variance.astype(float), covariance.variance.astype(float)
 
 
-def still(rates: np.ndarray, slowest: float = SLOWEST) -> bool:
+def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bool:
     """Whether motions of these rates (1/s) have one that does not die out, or not to speak of."""
     return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
 
@@ -111,7 +111,7 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     rounding, where noise reaches a quantity at once, or where a motion hardly dies out, motions are not to be trusted.
     """
     system, modes = reduced.system, reduced.modes
-    if modes is None or still(modes.rates, HARDLY) or any(d[rows].any() for d in system.D):
+    if modes is None or has_undamped_motion(modes.rates, HARDLY) or any(d[rows].any() for d in system.D):
         return None
     P, C = modes.covariance(reduced.noise), system.C
     half = system.A @ P
@@ -126,10 +126,10 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
 
 def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
-    return of_rows(stationary(reduced.system), rows)
+    return row_variances(stationary(reduced.system), rows)
 
 
-def of_rows(covariance: Covariance, rows: list[int]) -> np.ndarray:
+def row_variances(covariance: Covariance, rows: list[int]) -> np.ndarray:
     """Variances (quantities,), inf where an output has none."""
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
@@ -137,4 +137,4 @@ def of_rows(covariance: Covariance, rows: list[int]) -> np.ndarray:
 def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """What ``confirmed`` finds, and variances (quantities,) up to which there is nothing but rounding."""
     covariance = stationary(reduced.system)
-    return of_rows(covariance, rows), silence(reduced.system.C[rows], covariance.P)
+    return row_variances(covariance, rows), silence(reduced.system.C[rows], covariance.P)

@@ -12,9 +12,9 @@ from models.road.excitation import Excitation
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 PER_DECADE = 8
 """Panels of ``NODES`` Gauss points per decade."""
-AROUND = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
+RESONANCE_EDGES = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
 """Edges of panels about a resonance, in half-widths."""
-TURN, LAST = 8.0, 30
+PANEL_ANGLE, NARROW_PANELS = 8.0, 30
 """Radians by which waves turn between axles within a panel, and panels so narrow; beyond them axles count as meeting
 roads that know nothing of one another, for sums over quick turns vanish."""
 
@@ -28,8 +28,8 @@ def frequencies(rates: np.ndarray, delay: float, ends: tuple[float, float]) -> t
     """
     low, high = ends
     swinging = rates[rates.imag > 0]
-    near = (swinging.imag[:, None] - swinging.real[:, None] * AROUND).ravel()
-    late = TURN / delay * np.arange(1, LAST + 1) if delay > 0 else np.array([np.inf])
+    near = (swinging.imag[:, None] - swinging.real[:, None] * RESONANCE_EDGES).ravel()
+    late = PANEL_ANGLE / delay * np.arange(1, NARROW_PANELS + 1) if delay > 0 else np.array([np.inf])
     inner = np.concatenate([near, late])
     even = np.geomspace(low, high, max(2, round(PER_DECADE * np.log10(high / low))))
     edges = np.unique(np.concatenate([[0.0], even, inner[(inner > low) & (inner < high)]]))

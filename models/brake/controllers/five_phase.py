@@ -50,7 +50,7 @@ class FivePhase(Common):
 FIRST = 0
 
 
-def end_of(phase: int, settings: FivePhase) -> tuple[float, float]:
+def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
     """Sign of the way in which the wheel's acceleration (m/s^2) ends a phase, and the level at which it does."""
     if phase in (1, 2):
         return 1.0, settings.e1 if phase == 1 else settings.e2
@@ -67,7 +67,7 @@ class _Logic:
         self._settings, self._phase, self._pressure = settings, FIRST, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        sign, level = end_of(self._phase, self._settings)
+        sign, level = end_of_phase(self._phase, self._settings)
         if sign * (gains - level) >= 0.0:
             self._phase = self._phase % 5 + 1
         elif self._rolls_on(slip, gains):

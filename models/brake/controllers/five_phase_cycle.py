@@ -15,7 +15,7 @@ import numpy as np
 
 from models.brake.brake import Brake, Brakes, of_wheels, torque
 from models.brake.controller import SAMPLE, Sample
-from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
 from models.brake.wheel_step import Grip, StepInput, Wheel, node_force, wheel_step
 from models.core.errors import InputError, RunFailed
 from models.machine.compiled import njit
@@ -181,12 +181,12 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
 
     Raises RunFailed if a phase does not end, the wheel locks while it is not released, or ``most`` cycles do not close.
     """
-    state, _ = _to_end(frozen.rolling(), 0, controller, step, frozen)
+    state, _ = _state_at_end(frozen.rolling(), 0, controller, step, frozen)
     for _ in range(most):
         state = state._replace(time=0.0, impulse=0.0)
         path, number = [state], RELEASE
         while number <= SLOW:
-            state, end = _to_end(state, number, controller, step, frozen)
+            state, end = _state_at_end(state, number, controller, step, frozen)
             path.append(state)
             number = SLOW if end == BACK else number + 1
         first = path[0]
@@ -202,11 +202,11 @@ def _cycle(at: list[WheelState], frozen: Frozen) -> Cycle:
     return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
 
 
-def _to_end(
+def _state_at_end(
     state: WheelState, number: int, controller: FivePhase, step: float, frozen: Frozen
 ) -> tuple[WheelState, int]:
     """The state at the end of a phase, and whether that is MET or BACK; raises RunFailed."""
-    sign, level = end_of(number, controller)
+    sign, level = end_of_phase(number, controller)
     back = controller.e4 if number == CLIMB else -math.inf
     state, end = phase(state, rate(number, controller), sign, level, back, step, frozen.driven)
     if end == ENDLESS or (end == LOCKS and number != 0):

@@ -13,7 +13,7 @@ from models.core.errors import InputError
 
 MEMORY = 0.1
 """s"""
-SMALLEST = 5e-324
+SMALLEST_FLOAT = 5e-324
 """What is above its negative is zero or more, and what is at most its negative is below zero."""
 ACCELERATION, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
 """Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s): no wheel, no valve is
@@ -58,13 +58,13 @@ class Common:
 
         Raises InputError; for axles that are none, ``PerWheel`` does.
         """
-        for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST, 100.0), **bounds}.items():
+        for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST_FLOAT, 100.0), **bounds}.items():
             value, place = getattr(self, name), f"controller.parameters.{name}"
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise InputError("", place, value, "must be a number")
             if not above < value <= most:
-                least = "0 or more" if above == -SMALLEST else f"above {above:g}"
-                largest = "below 0" if most == -SMALLEST else f"at most {most:g}"
+                least = "0 or more" if above == -SMALLEST_FLOAT else f"above {above:g}"
+                largest = "below 0" if most == -SMALLEST_FLOAT else f"at most {most:g}"
                 raise InputError("", place, value, f"must be {least}, {largest}")
         self.select_low = tuple(self.select_low)
 

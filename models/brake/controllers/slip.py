@@ -10,7 +10,7 @@ Rantzer, J. Ludemann, Synthesis of a model-based tire slip controller, Vehicle S
 from dataclasses import dataclass
 
 from models.brake.controller import APPLY, RELEASE
-from models.brake.controllers.per_wheel import SLIP, SMALLEST, Common
+from models.brake.controllers.per_wheel import SLIP, SMALLEST_FLOAT, Common
 from models.core.errors import InputError
 
 
@@ -51,7 +51,7 @@ class SlipPI(Common):
     mix: float = 0.0
 
     def __post_init__(self) -> None:
-        self.check(target=SLIP, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST, 10.0))
+        self.check(target=SLIP, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
         self.governed_by(_Loop, pressures=True)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 GRAVITY = 9.81
-SLOW, DAMPING, SLOWEST = 1.0, 0.7, 1e-9
+FADING_SPEED, DAMPING, SLOWEST_SPEED = 1.0, 0.7, 1e-9
 """Speed (m/s) below which the damper fades in, its damping ratio at rest, speed (m/s) that counts as rest."""
 
 
@@ -21,14 +21,14 @@ def lag_on(
     angle (W,) : before, NaN where it is to begin as in steady motion; speeds (2, W) : along and across (m/s); length
     (W,) : m; slope : largest cornering coefficient (1/rad).
     """
-    (u, v), stiffness = speeds, np.sqrt(max(slope, SLOWEST) * GRAVITY * length)
-    before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST), angle)
-    after = np.array([_taken_up(*wheel, time) for wheel in zip(before, np.abs(u), v, length, strict=True)])
-    fade = np.clip(1.0 - np.abs(u) / SLOW, 0.0, 1.0)
+    (u, v), stiffness = speeds, np.sqrt(max(slope, SLOWEST_SPEED) * GRAVITY * length)
+    before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST_SPEED), angle)
+    after = np.array([_lagging_slip(*wheel, time) for wheel in zip(before, np.abs(u), v, length, strict=True)])
+    fade = np.clip(1.0 - np.abs(u) / FADING_SPEED, 0.0, 1.0)
     return after, after + fade**2 * v * 2.0 * DAMPING / stiffness
 
 
-def _taken_up(angle: float, speed: float, across: float, length: float, time: float) -> float:
+def _lagging_slip(angle: float, speed: float, across: float, length: float, time: float) -> float:
     """sigma a' = v - |u| a over a time (s)."""
     rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
     return float((expm(rates) @ (angle, 1.0))[0])

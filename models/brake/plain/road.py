@@ -9,10 +9,10 @@ from models.brake.surfaces import Road
 def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surface]:
     """Surface under each wheel; ways (W, 2, 2) : x, y (m) at the start and at the end of the step, straight between;
     kinds (W,) : of tyres."""
-    return [_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
+    return [_surface_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
 
 
-def _under(road: Road, distance: np.ndarray, kind: int) -> Surface:
+def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
     (behind, ahead), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
     first, last = _stretch(road, behind), _stretch(road, ahead)
     if last > first:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SLOWEST = 1e-9
+SLOWEST_SPEED = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one."""
 SERIES = 1e-3
 """Argument below which a difference is summed as a series, to rounding in five terms."""
@@ -48,7 +48,7 @@ class WheelStep:
 
     def speed(self, time: float) -> float:
         """Speed (m/s) of the centre at a time (s)."""
-        u0, u1 = max(self.speeds[0], SLOWEST), max(self.speeds[1], 0.0)
+        u0, u1 = max(self.speeds[0], SLOWEST_SPEED), max(self.speeds[1], 0.0)
         return u0 + (u1 - u0) * time / self.step
 
     def torque(self, time: float) -> float:
@@ -62,7 +62,7 @@ class WheelStep:
     @property
     def mean_speed(self) -> float:
         """Mean speed (m/s), above 0."""
-        return max(0.5 * (self.speed(0.0) + self.speed(self.step)), SLOWEST)
+        return max(0.5 * (self.speed(0.0) + self.speed(self.step)), SLOWEST_SPEED)
 
     @property
     def gain(self) -> float:

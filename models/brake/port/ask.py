@@ -26,14 +26,14 @@ much; what is no answer frame; to another sample; with what is no finite number;
 -1, 0, 1, or 2 where there are such valves; with a pressure below none, or above that of the supply."""
 
 STATES = frozenset((RELEASE, HOLD, APPLY))
-WITH_SLOW = STATES | {SLOW}
+STATES_WITH_SLOW_APPLY = STATES | {SLOW}
 """States of valves, and of those that can also apply slowly."""
 
 
 ROUNDING = 1e-9
 """Share by which a pressure may exceed that of the supply."""
 HERE = Path(__file__).parent
-LONGEST = 500
+LONGEST_ERROR_TEXT = 500
 """Characters that are kept of an error's text."""
 
 
@@ -42,7 +42,7 @@ class ControllerFailed(RunFailed):
     why : the fault, as a phrase."""
 
     def __init__(self, sample: Sample, name: str, reason: str) -> None:
-        reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST]
+        reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST_ERROR_TEXT]
         self.name, self.number, self.why = name, sample.number, reason
         super().__init__("controller", f"sample {sample.number}: {name}: {reason}", 1e-9 * sample.time)
 
@@ -60,7 +60,7 @@ def ask(
         raise
     except (Exception, SystemExit) as error:
         raise ControllerFailed(sample, "crash", raised(error)) from error
-    return checked(command, sample, states, most)
+    return checked_answer(command, sample, states, most)
 
 
 def raised(error: BaseException) -> str:
@@ -71,7 +71,7 @@ def raised(error: BaseException) -> str:
         if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE
     ]
     where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
-    return f"{type(error).__name__}: {error}"[: LONGEST - len(where)] + where
+    return f"{type(error).__name__}: {error}"[: LONGEST_ERROR_TEXT - len(where)] + where
 
 
 @dataclass
@@ -86,7 +86,7 @@ class CheckedController:
         return ask(self.inner, sample, self.states, sample.supply)
 
 
-def checked(
+def checked_answer(
     command: Command, sample: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
 ) -> Command:
     """The controller's answer, returned if each wheel has one state of its valve or one pressure; raises

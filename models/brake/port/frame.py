@@ -35,7 +35,7 @@ from models.brake.controller import Command, Sample
 
 QUESTION, ANSWER = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
 MOST_WHEELS = 8
-SWITCH, GIVEN = 1, 2
+SWITCH, REQUEST_GIVEN = 1, 2
 """Bits of the question's flags."""
 
 
@@ -49,7 +49,7 @@ class WrongFrame(ValueError):
 
 def question(sample: Sample) -> bytes:
     """Frame of one sample."""
-    flags = SWITCH * sample.brake | GIVEN * (sample.speed == sample.speed)
+    flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
     return QUESTION.pack(
         b"TRQ1",
         sample.number,

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.brake.controller import Controller
-from models.brake.port.ask import WITH_SLOW, ControllerFailed, ask, raised
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, ask, raised
 from models.brake.port.frame import QUESTION, answer, sample
 from models.brake.port.socket_port import LOOPBACK
 from models.core.errors import InputError
@@ -41,7 +41,7 @@ class Guest(NamedTuple):
 
 
 @contextmanager
-def made(guest: Guest) -> Iterator[Controller]:
+def made_controller(guest: Guest) -> Iterator[Controller]:
     """The controller, for as long as the block lasts; raises InputError."""
     if guest.fmu is not None:
         from models.brake.port.fmu_port import opened
@@ -54,7 +54,7 @@ def made(guest: Guest) -> Iterator[Controller]:
         yield named_controller(str(guest.callable), guest.folder, guest.wheels, guest.parameters, guest.file)
 
 
-def told(**what: Any) -> bytes:
+def failure_frame(**what: Any) -> bytes:
     """Frame that reports a failure."""
     text = json.dumps(what, default=str).encode()
     return HEAD.pack(TOLD, len(text)) + text
@@ -67,11 +67,11 @@ def serve(link: socket.socket) -> None:
         if guest.fmu is not None:
             import fmpy.fmi2  # noqa: F401 the library's time is none of the FMU's
         link.sendall(HEAD.pack(READY, 0))
-        with made(guest) as controller:
+        with made_controller(guest) as controller:
             link.sendall(HEAD.pack(READY, 0))
             while len(frame := reader.read(QUESTION.size)) == QUESTION.size:
                 given = sample(frame)
-                link.sendall(answer(given.number, ask(controller, given, WITH_SLOW)))
+                link.sendall(answer(given.number, ask(controller, given, STATES_WITH_SLOW_APPLY)))
 
 
 def main(port: int) -> None:
@@ -82,13 +82,13 @@ def main(port: int) -> None:
             serve(link)
             return
         except ControllerFailed as error:
-            what = told(name=error.name, reason=error.why)
+            what = failure_frame(name=error.name, reason=error.why)
         except InputError as error:
-            what = told(
+            what = failure_frame(
                 file=error.file, place=error.place, value=error.value, allowed=error.allowed, choices=error.choices
             )
         except BaseException as error:
-            what = told(name="crash", reason=raised(error))
+            what = failure_frame(name="crash", reason=raised(error))
         with suppress(OSError):  # nobody is left to hear it
             link.sendall(what)
 

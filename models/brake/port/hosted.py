@@ -20,10 +20,10 @@ from models.brake.controller import Command, Sample
 from models.brake.port.ask import NAMES, ControllerFailed
 from models.brake.port.frame import ANSWER, WrongFrame, command, question
 from models.brake.port.host import HEAD, LENGTH, READY, TOLD, Guest
-from models.brake.port.socket_port import LONGER, connected, fate
+from models.brake.port.socket_port import START_REMEDY, connected, fate
 from models.core.errors import InputError, RunFailed
 
-MOST_TOLD = 100_000
+FAILURE_TEXT_BYTES = 100_000
 """Bytes of what a process may tell of its failure."""
 STARTUP = 30.0
 """s for the process to be there, with all that the host needs, before it touches the controller."""
@@ -54,7 +54,7 @@ class Hosted:
         except Failed as error:
             raise _as_input(error.what) from None
         except TimeoutError:
-            raise RunFailed("controller", f"silence: it was not made within {start:g} s; {LONGER}") from None
+            raise RunFailed("controller", f"silence: it was not made within {start:g} s; {START_REMEDY}") from None
         except (OSError, EOFError):
             raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
 
@@ -82,14 +82,16 @@ class Hosted:
         got = self._more(b"", size, end)
         if got[:4] == TOLD:
             length = HEAD.unpack_from(got)[1]
-            raise Failed(json.loads(self._more(got, min(HEAD.size + length, MOST_TOLD), end)[HEAD.size :]))
+            raise Failed(json.loads(self._more(got, min(HEAD.size + length, FAILURE_TEXT_BYTES), end)[HEAD.size :]))
         if not got.startswith(begins):
             raise EOFError
         return got
 
     def _more(self, received: bytes, size: int, end: float) -> bytes:
         """Receive up to ``size`` bytes in all; fewer if the process reports a failure in fewer."""
-        while len(received) < size and not (received[:4] == TOLD and HEAD.size <= len(received) == _told(received)):
+        while len(received) < size and not (
+            received[:4] == TOLD and HEAD.size <= len(received) == _failure_length(received)
+        ):
             part = self.link.recv(size - len(received))
             left = end - time.perf_counter()
             if left <= 0.0:
@@ -102,7 +104,7 @@ class Hosted:
         return received
 
 
-def _told(received: bytes) -> int:
+def _failure_length(received: bytes) -> int:
     """Length of a frame that tells what went wrong."""
     return HEAD.size + int(HEAD.unpack_from(received)[1])
 

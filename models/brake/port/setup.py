@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from models.brake.controller import Controller
 from models.brake.port import socket_port
-from models.brake.port.ask import STATES, WITH_SLOW, CheckedController
+from models.brake.port.ask import STATES, STATES_WITH_SLOW_APPLY, CheckedController
 from models.brake.port.faults import Fault, Faulty, missing_teeth
 from models.brake.port.host import Guest
 from models.brake.port.hosted import hosted
@@ -103,7 +103,8 @@ def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple
     check_port(table, run)
     with ExitStack() as stack:
         inner = CheckedController(
-            stack.enter_context(_behind(table, run, controller)), WITH_SLOW if run.slow else STATES
+            stack.enter_context(_possible_controllers(table, run, controller)),
+            STATES_WITH_SLOW_APPLY if run.slow else STATES,
         )
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
@@ -117,7 +118,7 @@ def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple
 
 
 @contextmanager
-def _behind(table: PortTable, run: Run, controller: Controller) -> Iterator[Controller]:
+def _possible_controllers(table: PortTable, run: Run, controller: Controller) -> Iterator[Controller]:
     """The controllers that can answer at the port for this table."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:

@@ -19,7 +19,7 @@ LOOPBACK = "127.0.0.1"
 """The only address that this port ever listens on."""
 STDERR = 2
 """Where a controller's own prints go: standard output is for the results alone."""
-LONGER = "if it needs longer, give start (s) under [port]"
+START_REMEDY = "if it needs longer, give start (s) under [port]"
 """Remedy where a controller is not there in time."""
 GRACE = 0.5
 """Seconds for a process to end by itself once its connection is closed at the end of a run."""
@@ -61,10 +61,12 @@ class SocketPort:
             except TimeoutError:
                 part = None
             if part is None or time.perf_counter() > end:
-                raise ControllerFailed(sample, "silence", f"{_some(got)} within {self.timeout:g} s")
+                raise ControllerFailed(sample, "silence", f"{_received_bytes(got)} within {self.timeout:g} s")
             if not part:
                 raise ControllerFailed(
-                    sample, "crash", f"the connection was closed after {_some(got)}{fate(self.process, self.timeout)}"
+                    sample,
+                    "crash",
+                    f"the connection was closed after {_received_bytes(got)}{fate(self.process, self.timeout)}",
                 )
             got += part
             if len(got) < ANSWER.size:
@@ -90,7 +92,7 @@ def _signal(number: int) -> str:
     return f"signal {number}"
 
 
-def _some(received: bytes) -> str:
+def _received_bytes(received: bytes) -> str:
     return f"{len(received)} of {ANSWER.size} bytes" if received else "no answer"
 
 
@@ -135,7 +137,7 @@ def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, st
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
     where = f"{LOOPBACK}:{server.getsockname()[1]}"
-    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {LONGER}")
+    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {START_REMEDY}")
 
 
 @contextmanager

@@ -64,11 +64,11 @@ def findings(evidence: Evidence) -> tuple[Finding, ...]:
     """Findings of all checks on a recording, from evidence that is also used for figures."""
     said = list(evidence.recording.noticed)
     for look in CHECKS:
-        said += [finding for finding in look(evidence) if not _named(finding, said)]
+        said += [finding for finding in look(evidence) if not _already_named(finding, said)]
     return tuple(sorted(said, key=lambda finding: ORDER.index(finding.weight)))
 
 
-def _named(finding: Finding, before: list[Finding]) -> bool:
+def _already_named(finding: Finding, before: list[Finding]) -> bool:
     """Whether what is wrong with one of these channels is what an earlier finding of no less weight has said."""
     return finding.weight != "note" and any(
         ORDER.index(other.weight) <= ORDER.index(finding.weight)

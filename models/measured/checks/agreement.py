@@ -17,22 +17,22 @@ import numpy as np
 from models.measured.signal import Signal
 
 Kind = Literal["late", "factor", "swapped", "crossed", "lever"]
-KNOWN = 0.03
+VEHICLE_ERROR = 0.03
 """Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
-REACH, GRID = 0.25, 5e-4
+LARGEST_DELAY, DELAY_SPACING = 0.25, 5e-4
 """s: delays looked at, and their spacing before the parabola through the best three."""
-TIMES = GRID * np.arange(-round(REACH / GRID), round(REACH / GRID) + 1)
-CERTAIN = 40.0
+TIMES = DELAY_SPACING * np.arange(-round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1)
+CHI_SQUARE_FALL = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR, SMALL_LEVER = 5e-4, 0.01, 0.01
 """s, a share and m: what is smaller does no harm, and no vehicle file is good enough to tell."""
-WORTH = 0.35
+EXPLAINED_SHARE = 0.35
 """Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
 in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
 a third of that."""
 FAULTS = 8
 """Faults looked for at the most."""
-TINY = float(np.finfo(float).tiny)
+SMALLEST_FLOAT = float(np.finfo(float).tiny)
 SMOOTHED = 9
 """Lines over which the unexplained spectrum is averaged."""
 
@@ -114,7 +114,7 @@ class Agreement:
     def unexplained(self) -> np.ndarray:
         """Root of the share (k,) of every reading's power that neither forces nor noise explain."""
         noise = len(self.frequencies) * self.noise
-        share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + TINY)
+        share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT)
         return np.sqrt(np.maximum(share, 0.0))
 
     def typical(self) -> float:
@@ -131,10 +131,10 @@ class Agreement:
         """Weights of the frequencies by the unexplained power, smoothed, so that a line that nobody explains counts for
         little."""
         kernel = np.ones(SMOOTHED) / SMOOTHED
-        known = KNOWN**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
+        known = VEHICLE_ERROR**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
         padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
-        return self.averages / np.maximum(np.stack(smooth, axis=1), TINY)
+        return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """All faults, the worst first, and what is left without them."""
@@ -227,7 +227,7 @@ class Agreement:
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
-        late = float(TIMES[best] + GRID * _vertex(*likely[best - 1 : best + 2]))
+        late = float(TIMES[best] + DELAY_SPACING * _vertex(*likely[best - 1 : best + 2]))
         turn = 2j * np.pi * self.frequencies
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
@@ -235,7 +235,7 @@ class Agreement:
 
     def _delay_faults(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
         late, error, fall = self.delay_of(group, weights)
-        if fall > CERTAIN and abs(late) > max(SMALL_DELAY, 4 * error):
+        if fall > CHI_SQUARE_FALL and abs(late) > max(SMALL_DELAY, 4 * error):
             yield MeasurementFault("late", group.name, self._signals(group), late, error, fall)
 
     def _factor_faults(self, group: SignalGroup, weights: np.ndarray) -> Iterator[MeasurementFault]:
@@ -245,7 +245,7 @@ class Agreement:
             return
         fall, error = float(power) * (ratio - 1) ** 2, float(2 * power) ** -0.5
         factor = 1 / ratio if group.forces else ratio
-        if fall > CERTAIN and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
+        if fall > CHI_SQUARE_FALL and abs(ratio - 1) > max(SMALL_FACTOR, 4 * error):
             yield MeasurementFault(
                 "factor", group.name, self._signals(group), factor, error * abs(factor / ratio), fall
             )
@@ -261,7 +261,7 @@ class Agreement:
             rest = self.between - self._expected_times_forces
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
             fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
-            large = fault.fall > CERTAIN and abs(size) > max(SMALL_LEVER, 4 * fault.error)
+            large = fault.fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
             if large and self._is_worth_correcting(self.without(fault), weights):
                 yield fault
 
@@ -288,7 +288,7 @@ class Agreement:
             if fault is not None:
                 other = self.without(fault)
                 fall = before - float((weights * other.left).sum())
-                if fall > CERTAIN and other.left.sum() < self.left.sum():
+                if fall > CHI_SQUARE_FALL and other.left.sum() < self.left.sum():
                     yield replace(fault, size=self.rms, error=other.rms, fall=fall)
 
     def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
@@ -318,7 +318,7 @@ class Agreement:
     def _certain_improvement(self, other: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
         fall = float((weights * (self.left - other.left)).sum())
-        return fall if fall > CERTAIN and self._is_worth_correcting(other, weights) else 0.0
+        return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(other, weights) else 0.0
 
     def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
         """The agreement with two channels exchanged, both of the forces or both of the readings."""
@@ -340,7 +340,7 @@ class Agreement:
     def seen(self) -> dict[str, tuple[float, float]]:
         """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
-        rest, smallest = WORTH * self._unexplained_power(weights), {}
+        rest, smallest = EXPLAINED_SHARE * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
             for group in (group for group in self.groups() if len(group.members) == 1):
                 power = weights * self.share(group)[1]
@@ -363,7 +363,11 @@ class Agreement:
 
     def _is_worth_correcting(self, other: "Agreement", weights: np.ndarray) -> bool:
         """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
-        return bool(np.any(((self.left - other.left) * weights).sum(axis=0) > WORTH * self._unexplained_power(weights)))
+        return bool(
+            np.any(
+                ((self.left - other.left) * weights).sum(axis=0) > EXPLAINED_SHARE * self._unexplained_power(weights)
+            )
+        )
 
     def _signals(self, group: SignalGroup) -> tuple[Signal, ...]:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.members)
@@ -373,7 +377,7 @@ def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) ->
     """Smallest size that is certain and worth its name, where (k,) power times its square falls on (k,) readings."""
     if not power.sum() > 0:
         return float("inf")
-    return max(small, float((CERTAIN / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
+    return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
 
 
 def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -4,11 +4,11 @@ import numpy as np
 
 from models.core.finding import Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.gaps import BRIDGED, runs
+from models.measured.gaps import BRIDGED, true_runs
 from models.measured.signal import UNITS, Signal
 
 NAME = "clipped"
-LEAST = 6
+FEWEST_EXTREME_SAMPLES = 6
 """Samples at the extreme value below which nothing is said."""
 PILE = 5
 """Times as many as at the next value below it: the tail of a rounded channel has more of them farther in, not less."""
@@ -36,7 +36,7 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
     measured = len(good) and np.ptp(good) > ROUNDED * _largest_of_quantity(evidence, signal)
-    findings = [_clipped(signal, values, good, end, period) for end in ends(values)] if measured else []
+    findings = [_clipped(signal, values, good, end, period) for end in clipping_extremes(values)] if measured else []
     return findings or _stuck(signal, values, period)
 
 
@@ -46,7 +46,7 @@ def _largest_of_quantity(evidence: Evidence, signal: Signal) -> float:
     return max(float(np.nanmax(np.abs(evidence.recording.samples(other)), initial=0.0)) for other in alike)
 
 
-def ends(values: np.ndarray) -> list[float]:
+def clipping_extremes(values: np.ndarray) -> list[float]:
     """Extremes of a channel (n,), NaN where nothing was measured, at which it is clipped: where values pile up."""
     good = values[np.isfinite(values)]
     if not len(good) or good.min() == good.max():
@@ -57,14 +57,14 @@ def ends(values: np.ndarray) -> list[float]:
 def _piled(values: np.ndarray, good: np.ndarray, end: float) -> bool:
     at, others = int(np.count_nonzero(good == end)), good[good != end]
     next_to = others[np.argmin(np.abs(others - end))]
-    if at < LEAST or at < PILE * np.count_nonzero(good == next_to):
+    if at < FEWEST_EXTREME_SAMPLES or at < PILE * np.count_nonzero(good == next_to):
         return False
-    runs_at_limit = runs(values == end)
+    runs_at_limit = true_runs(values == end)
     return bool(np.max(runs_at_limit[:, 1] - runs_at_limit[:, 0]) >= 2)
 
 
 def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding:
-    at, clipped_runs = int(np.count_nonzero(good == end)), runs(values == end)
+    at, clipped_runs = int(np.count_nonzero(good == end)), true_runs(values == end)
     share, first = 100 * at / len(good), float(period * clipped_runs[0, 0])
     text = (
         f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(clipped_runs)} runs, "
@@ -78,7 +78,7 @@ def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, p
 
 def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
     """The longest time at one value, of a channel that otherwise changes."""
-    same = runs(np.diff(values) == 0)
+    same = true_runs(np.diff(values) == 0)
     if not len(same):
         return []
     longest = int(np.argmax(same[:, 1] - same[:, 0]))

@@ -10,13 +10,13 @@ from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT, spectra
 
 NAME = "drift"
-WINDOW, MOST = SEGMENT, 30
+WINDOW, MOST_WINDOWS = SEGMENT, 30
 """s over which a delay is taken, in halves that overlap; windows at the most, spread evenly."""
-LEAST = 3
+FEWEST_WINDOWS = 3
 """Windows that a slope needs."""
-CERTAIN = 5.0
+SLOPE_STANDARD_ERRORS = 5.0
 """Standard errors of the slope that must be passed."""
-SMALL = 1e-3
+LEAST_CLOCK_DRIFT = 1e-3
 """s by which the clocks must part over the recording."""
 
 
@@ -29,9 +29,9 @@ def check(evidence: Evidence) -> list[Finding]:
     windows = _windows(evidence) if evidence.searched and len(clocks) == 1 else []
     needed = (
         "was not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
-        f"{LEAST} stretches of {WINDOW:g} s without a gap."
+        f"{FEWEST_WINDOWS} stretches of {WINDOW:g} s without a gap."
     )
-    if len(windows) < LEAST:
+    if len(windows) < FEWEST_WINDOWS:
         what = "runs as fast as that of the hub forces"
         return [Finding(NAME, "note", name, f"Whether the clock of {name} {what} {needed}") for name in others]
     return [_finding(evidence, windows, name, min(clocks)) for name in others]
@@ -42,7 +42,7 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
     assert evidence.searched is not None
     now, recording = evidence.searched[0], evidence.recording
     length = round(WINDOW / recording.period)
-    firsts = np.linspace(0, recording.count - length, max(min(recording.count // length, MOST), 1)).astype(int)
+    firsts = np.linspace(0, recording.count - length, max(min(recording.count // length, MOST_WINDOWS), 1)).astype(int)
     windows, c = [], len(now.inputs)
     for first in firsts if recording.count >= length else ():
         part = spectra(recording, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
@@ -67,7 +67,7 @@ def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: s
     late = np.array([part.delay_of(SignalGroup(name, False, of_file), part.weights)[:2] for _, part in windows])
     slope, error = _slope(np.array([at for at, _ in windows]), *late.T)
     apart = slope * evidence.recording.duration
-    if abs(slope) > CERTAIN * error and abs(apart) > SMALL:
+    if abs(slope) > SLOPE_STANDARD_ERRORS * error and abs(apart) > LEAST_CLOCK_DRIFT:
         word = "fast" if slope > 0 else "slow"
         text = (
             f"The clock of {name} is {1e6 * abs(slope):.3g} ppm {word} (+-{2e6 * error:.2g} ppm at 95 %) against "

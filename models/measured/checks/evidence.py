@@ -8,7 +8,7 @@ import numpy as np
 
 from models.measured.checks.agreement import Agreement, MeasurementFault
 from models.measured.checks.response import AXES, SensorResponse, number
-from models.measured.checks.spectra import Spectra, mean, noise, spectra
+from models.measured.checks.spectra import Spectra, noise, spectra, windowed_means
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
@@ -17,7 +17,7 @@ from models.vehicles.pitch_plane import Parameters
 
 BAND = 1.0, 25.0
 """Hz: above the drift of a free vehicle, below the bending of its body."""
-FELT = 5e-4
+LEAST_MEAN_SHARE = 5e-4
 """Of a static load or of gravity: a mean that is smaller says nothing of unit and sign."""
 INERTIAL = ("acceleration", "angular rate", "angle")
 
@@ -94,12 +94,12 @@ class Evidence:
         return {
             s: ratio
             for s, ratio in ratios.items()
-            if probable_mistake(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT
+            if probable_mistake(ratio, s)[0] in ("sign", "unit") and abs(ratio) > LEAST_MEAN_SHARE
         }
 
     def mean(self, signal: Signal) -> float:
         """Mean of all samples, under a window."""
-        return float(mean([partial(self.recording.samples, signal)])[0][0])
+        return float(windowed_means([partial(self.recording.samples, signal)])[0][0])
 
     def empty(self, signal: Signal) -> bool:
         """Whether a force varies by more than its mean, which then says nothing of sign and unit."""

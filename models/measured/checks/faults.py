@@ -10,7 +10,7 @@ from models.measured.checks.evidence import Evidence
 from models.measured.checks.spikes import spikes
 from models.measured.ratios import sentence
 
-TOLD = 0.02, 0.1
+FACTOR_ERRORS = 0.02, 0.1
 """Errors of a factor of which it is said in how many channels they would be seen."""
 SHIFT = 3e-3
 """s: a channel in which less would not be seen is named as not checked."""
@@ -25,7 +25,7 @@ def factors(evidence: Evidence) -> list[Finding]:
         return [Finding("factor", "note", "", f"{what}: this needs {evidence.lacking}.")]
     findings = [_factor(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
     least = [wrong for _, wrong in evidence.seen.values()]
-    parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in TOLD)
+    parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in FACTOR_ERRORS)
     text = f"A factor that is wrong {parts} of {len(least)} channels would be seen by the motion."
     return [*findings, Finding("gain", "note", "", text)]
 

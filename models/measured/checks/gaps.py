@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from models.core.finding import FEW, Finding, Weight
+from models.core.finding import LISTED_FINDINGS, Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.gaps import BRIDGED, runs
+from models.measured.gaps import BRIDGED, true_runs
 from models.measured.signal import Signal
 
 NAME = "gaps"
@@ -15,7 +15,7 @@ def check(evidence: Evidence) -> list[Finding]:
     recording = evidence.recording
     sets: dict[tuple[tuple[int, int], ...], list[Signal]] = {}
     for signal in recording.signals:
-        lost = tuple(map(tuple, runs(~np.isfinite(recording.samples(signal))).tolist()))
+        lost = tuple(map(tuple, true_runs(~np.isfinite(recording.samples(signal))).tolist()))
         if lost:
             sets.setdefault(lost, []).append(signal)
     if not sets:
@@ -34,7 +34,7 @@ def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) 
         if stops
         else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles"
     )
-    short = ", ".join(names) if len(names) <= FEW else f"{len(names)} channels, {names[0]} to {names[-1]}"
+    short = ", ".join(names) if len(names) <= LISTED_FINDINGS else f"{len(names)} channels, {names[0]} to {names[-1]}"
     text = f"{short}: {lasts:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
     if len(lost) > 1:
         text += f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"

@@ -8,7 +8,7 @@ from models.measured.checks.spectra import noise
 from models.measured.signal import UNITS, Quantity
 
 NAME = "noise"
-OFF = 1.5
+NOISE_RATIO = 1.5
 """Times by which what is stated may be wrong."""
 
 
@@ -22,7 +22,7 @@ def check(evidence: Evidence) -> list[Finding]:
             UNITS[signal.quantity],
         )
         sizes.setdefault(signal.quantity, []).append(size)
-        if stated is not None and np.isfinite(size) and not 1 / OFF < size / max(stated, 1e-300) < OFF:
+        if stated is not None and np.isfinite(size) and not 1 / NOISE_RATIO < size / max(stated, 1e-300) < NOISE_RATIO:
             text = (
                 f"The noise of {signal.name} is {size:.3g} {unit} on every sample, where the scene states {stated:.3g} "
                 f"{unit}: correct [noise], or predictions and filter are off."

@@ -11,7 +11,7 @@ from models.measured.checks.spectra import noise
 from models.measured.signal import Signal, TransducerPlace
 
 NAME = "rigid"
-MOST = 6000
+MOST_SAMPLES = 6000
 """Samples that are looked at, spread evenly: nothing is integrated."""
 Axes = Sequence[Signal]
 
@@ -43,7 +43,7 @@ def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlac
     except InputError as error:
         return Finding(NAME, "note", body, f"Not looked at whether {body} is rigid: {error}.")
     recording, axes = evidence.recording, [axes for _, axes in sensors.values()]
-    signals, every = [s for triple in axes for s in triple], -(-recording.count // MOST)
+    signals, every = [s for triple in axes for s in triple], -(-recording.count // MOST_SAMPLES)
     columns = [[recording.samples(s)[::every] for s in triple] for triple in axes]
     readings = np.moveaxis(np.array(columns), 2, 0)
     sizes = [noise(recording, s) for s in signals]

@@ -13,19 +13,19 @@ from models.measured.signal import Signal
 
 SEGMENT = 4.0
 """s: resolves the modes of a car; shorter where the recording is."""
-LEAST = 3
+FEWEST_SEGMENTS = 3
 """Segments in a recording at the least, half overlapping."""
-FEWEST = 2
+FEWEST_FREQUENCIES = 2
 """Frequencies in the band at the least."""
-MOST = 300
+MOST_SEGMENTS = 300
 """Segments looked at, spread evenly: ten minutes."""
 OVERLAPPING = 0.75
 """Independent averages that a half overlapping segment under a Hann window counts for, about."""
-TOP = 0.7, 0.95
+TOP_BAND = 0.7, 0.95
 """Part of the highest frequency: above what vehicles do, below what filters and converters do at the end."""
 LENGTH, PIECES = 1024, 40
 """Samples of a piece whose noise is looked at, and pieces at the most, spread evenly."""
-BESIDE = range(2, 5)
+SIDE_LINES = range(2, 5)
 """Spectral lines beside the main lobe of the window, whose power stands for that at 0."""
 
 
@@ -52,19 +52,19 @@ def spectra(
     stretch : first sample and number of samples that are looked at; else all.
     """
     begin, count = stretch or (0, recording.count)
-    length = min(round(SEGMENT / recording.period), 2 * count // (LEAST + 1))
+    length = min(round(SEGMENT / recording.period), 2 * count // (FEWEST_SEGMENTS + 1))
     firsts = np.arange(begin, begin + count - length + 1, max(length // 2, 1))
     frequencies = np.fft.rfftfreq(length, recording.period)
     in_band = (frequencies >= band[0]) & (frequencies <= band[1])
     window, names = np.hanning(length + 1)[:length, None], tuple(s.name for s in signals)
     cross, segments = np.zeros((in_band.sum(), len(signals), len(signals)), complex), 0
-    for first in firsts[:: -(-len(firsts) // MOST)] if length > 1 else ():
+    for first in firsts[:: -(-len(firsts) // MOST_SEGMENTS)] if length > 1 else ():
         samples = recording.columns.block(names, int(first), length)
         if np.isfinite(samples).all():
             lines = np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)[in_band]
             cross += lines[:, :, None] * lines[:, None, :].conj()
             segments += 1
-    if segments < LEAST or np.count_nonzero(in_band) < FEWEST:
+    if segments < FEWEST_SEGMENTS or np.count_nonzero(in_band) < FEWEST_FREQUENCIES:
         return None
     return Spectra(frequencies[in_band], cross / segments, max(1.0, OVERLAPPING * segments), float(np.sum(window**2)))
 
@@ -83,11 +83,11 @@ def noise(recording: Recording, signal: Signal) -> float:
     if not len(whole):
         return float("nan")
     lines = np.fft.rfft(window * (whole - whole.mean(axis=1, keepdims=True)))
-    low, high = (int(part * lines.shape[1]) for part in TOP)
+    low, high = (int(part * lines.shape[1]) for part in TOP_BAND)
     return float(np.sqrt(np.median(np.abs(lines[:, low:high]) ** 2) / np.log(2) / np.sum(window**2)))
 
 
-def mean(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def windowed_means(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     """Means (k,) under a Hann window of what each of these reads, (n,), and the covariance (k, k) of their errors.
 
     Samples that are NaN in any are left out; one column at a time is in memory. The window takes away what a plain mean
@@ -101,7 +101,7 @@ def mean(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.nd
     n = len(good)
     window = np.where(good, np.hanning(n + 2)[1:-1], 0.0)
     window = window / window.sum() if good.any() else np.full(n, np.nan)
-    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in BESIDE]
+    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in SIDE_LINES]
     centre, lines = np.empty(len(columns)), np.empty((len(waves), len(columns)), complex)
     for i, read in enumerate(columns):
         values = np.where(good, read(), 0.0)

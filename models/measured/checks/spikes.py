@@ -9,10 +9,10 @@ from models.measured.signal import UNITS, Signal
 NAME = "spikes"
 WIDTHS = 1, 2
 """Samples of a spike: one of a transducer or a converter, two where a jittering clock was put right."""
-STEEP, HIGH = 6.0, 3.0
+STEEP_RATIO, HIGH_RATIO = 6.0, 3.0
 """Times the step from sample to sample that 99 % do not exceed, and times the channel's standard deviation: both sides
 of a spike are higher. Gaussian noise comes to a third of the first; what is lower than the second adds no damage."""
-USUAL = 0.99
+USUAL_SHARE = 0.99
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -30,7 +30,7 @@ def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     known = np.abs(steps[np.isfinite(steps)])
     if not len(known):
         return np.empty(0, np.int64), np.empty(0)
-    least = max(STEEP * float(np.quantile(known, USUAL)), HIGH * float(np.nanstd(values)))
+    least = max(STEEP_RATIO * float(np.quantile(known, USUAL_SHARE)), HIGH_RATIO * float(np.nanstd(values)))
     heights = np.zeros(len(values))
     for width in WIDTHS:
         up, down = steps[: len(steps) - width], -steps[width:]

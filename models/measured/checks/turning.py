@@ -13,9 +13,9 @@ BAND = 0.5, 12.0
 """Hz."""
 COHERENT = 0.8
 """Squared coherence of lines that are used; below it noise speaks."""
-ALIKE = 0.25
+IN_PHASE_SHARE = 0.25
 """Part of a rate in phase with the angle's derivative from which on a factor between them means anything."""
-LATE, LINES = 1e-3, 8
+LEAST_SHIFT, FEWEST_LINES = 1e-3, 8
 """s, and coherent lines: smaller shifts, or shifts by fewer, are not named; nor any where hub forces tell better."""
 
 
@@ -55,7 +55,7 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     ratio = float((weight @ transfer).real / weight.sum())
     late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
-    if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < ALIKE:
+    if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < IN_PHASE_SHARE:
         text = (
             f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "
             "another axis or body; check their names."
@@ -63,7 +63,11 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
         return Finding(NAME, "doubt", names, text, ratio, "1", both)
     if wrong in ("sign", "unit"):
         return Finding(wrong, "error", names, f"{text} Or {angle.name} is the one that is wrong.", ratio, "1", both)
-    if evidence.agreement is None and np.count_nonzero(used) >= LINES and abs(late) > max(LATE, 5 * error):
+    if (
+        evidence.agreement is None
+        and np.count_nonzero(used) >= FEWEST_LINES
+        and abs(late) > max(LEAST_SHIFT, 5 * error)
+    ):
         way = "late" if late > 0 else "early"
         text = (
             f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the "

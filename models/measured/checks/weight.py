@@ -12,22 +12,22 @@ from models.measured import axle_forces
 from models.measured.axle_balance import axles
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import number
-from models.measured.checks.spectra import mean
+from models.measured.checks.spectra import windowed_means
 from models.measured.ratios import EMPTY, counted_from_load, sentence
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
 
 NAME = "weight"
-KNOWN = 1e-3
+LOAD_ERROR = 1e-3
 """Part of each hub's load by which a vehicle that is not wrong may differ from its file: tilt alone takes 0.1 %."""
-SMALL = 0.005
+NEGLIGIBLE_SHARE = 0.005
 """Part of a load below which nothing is said."""
-RIGHT = 0.35
+MOTION_SHARE = 0.35
 """Part of an excess of the mean by which a factor may differ from 1 by the motion, for the excess to be an offset."""
-SURE = 4.0
+MOMENT_STANDARD_DEVIATIONS = 4.0
 """Standard deviations by which a mean moment must differ from what the motion asks for."""
-CERTAIN = 25.0
+CHI_SQUARE_FALL = 25.0
 """Fall of chi square that a wrong channel must bring."""
 
 
@@ -59,12 +59,12 @@ def check(evidence: Evidence) -> list[Finding]:
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
     signals = tuple(of_hub[hub] for hub in vehicle.hubs)
-    numbers, means = _component_numbers(evidence, vehicle), mean(_columns(evidence, vehicle))
+    numbers, means = _component_numbers(evidence, vehicle), windowed_means(_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_wrong_sign_or_unit(evidence, *each) for each in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
-    return [_fine(evidence, _balance(vehicle, numbers, *means), signals, at)]
+    return [_single_channel_error(evidence, _balance(vehicle, numbers, *means), signals, at)]
 
 
 def moments(evidence: Evidence) -> np.ndarray:
@@ -73,9 +73,9 @@ def moments(evidence: Evidence) -> np.ndarray:
     vehicle, none = evidence.vehicle, np.zeros(2)
     if vehicle is None or evidence.frame == "inertial" or not _angular_acceleration_readers(evidence, vehicle):
         return none
-    balanced = _balance(vehicle, _component_numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
+    balanced = _balance(vehicle, _component_numbers(evidence, vehicle), *windowed_means(_columns(evidence, vehicle)))
     left, sure = balanced.left[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
-    return left if (np.abs(left) > SURE * sure).any() else none
+    return left if (np.abs(left) > MOMENT_STANDARD_DEVIATIONS * sure).any() else none
 
 
 def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
@@ -127,11 +127,13 @@ def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread
         rows = np.hstack([rows, turned])
     rest = np.concatenate([[whole.mass * GRAVITY, 0.0, 0.0], elastic @ vehicle.loads])
     columns = np.vstack([lift, elastic]) * vehicle.loads
-    covariance = np.diag(np.diag(rows @ spread @ rows.T)) + KNOWN**2 * columns @ columns.T
+    covariance = np.diag(np.diag(rows @ spread @ rows.T)) + LOAD_ERROR**2 * columns @ columns.T
     return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
-def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> Finding:
+def _single_channel_error(
+    evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray
+) -> Finding:
     """Offset or calibration of single channels, or another weight than the file's."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
@@ -140,7 +142,11 @@ def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loa
     sure = [float(uncertainty[0, 0]) ** 0.5 for _, uncertainty, _ in single]
     share, uncertainty = float(single[worst][0][0]), sure[worst]
     excess, known = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
-    if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * uncertainty) and single[worst][2] > fall - CERTAIN:
+    if (
+        single[worst][2] > CHI_SQUARE_FALL
+        and abs(share) > max(NEGLIGIBLE_SHARE, 4 * uncertainty)
+        and single[worst][2] > fall - CHI_SQUARE_FALL
+    ):
         signal, size = signals[worst], share * loads[worst]
         if _moves_rightly(evidence, signal, share):
             return _offset(signal, size, uncertainty * loads[worst])
@@ -150,7 +156,9 @@ def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loa
             f"offset of {size:+.3g} N would do the same."
         )
         return Finding("gain", "doubt", signal.name, text, 100 * share, "%", (signal.name,))
-    if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * known):
+    if fall > CHI_SQUARE_FALL and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(
+        NEGLIGIBLE_SHARE, 4 * known
+    ):
         text = (
             f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * known:.2%} at 95 %) more than "
             f"the vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: "
@@ -159,7 +167,7 @@ def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loa
         return Finding(NAME, "doubt", "", text, 100 * excess, "%", names)
     text = (
         f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * known:.2%} "
-        f"at 95 %); a channel that is wrong by {max(100 * SMALL, 500 * max(sure)):.2g} % would be seen."
+        f"at 95 %); a channel that is wrong by {max(100 * NEGLIGIBLE_SHARE, 500 * max(sure)):.2g} % would be seen."
     )
     return Finding(NAME, "note", "", text, 100 * excess, "%", names)
 
@@ -169,7 +177,7 @@ def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
     if evidence.searched is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
         return False
     ratio, error = evidence.searched[0].factor(signal)
-    return 4 * error < abs(share) and abs(ratio - 1) < RIGHT * abs(share)
+    return 4 * error < abs(share) and abs(ratio - 1) < MOTION_SHARE * abs(share)
 
 
 def _offset(signal: Signal, size: float, sure: float) -> Finding:

@@ -8,7 +8,7 @@ from pathlib import Path
 from models.core.errors import InputError, similar_file
 from models.core.finding import Finding
 from models.measured.channel import Source
-from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
+from models.measured.file_kinds import KNOWN_FORMATS, by_extension, format_of, usual_of
 from models.measured.formats.csv import open_csv
 from models.measured.formats.mdf4 import open_mdf
 from models.measured.formats.opened import Opened, notice
@@ -87,7 +87,7 @@ def _head(path: Path) -> bytes:
     if not path.exists():
         raise InputError(path, "", None, f"the file does not exist{similar_file(path)}")
     if not path.is_file():
-        raise InputError(path, "", None, f"this is not a file; {KNOWN}")
+        raise InputError(path, "", None, f"this is not a file; {KNOWN_FORMATS}")
     try:
         with path.open("rb") as file:
             head = file.read(256)

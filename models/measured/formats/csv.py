@@ -30,10 +30,10 @@ from models.measured.formats.csv_layout import (
     find_headings_of,
     find_layout,
     find_units,
-    read_top,
+    read_first_lines,
 )
-from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, narrow, numbers
-from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
+from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, numbers, one_byte_text
+from models.measured.formats.opened import Opened, Span, distinct_names, notice, readable, zoned
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class CsvFile(Opened):
 def open_csv(path: Path) -> CsvFile:
     """Read the header, count the rows and find out how they are written; raises InputError."""
     with readable(path):
-        top = read_top(path)
+        top = read_first_lines(path)
         head, clock, remarks, findings = find_headings_of(path, top)
         units, more = find_units(path, top, head, clock)
         layout, notes = find_layout(path, top, head, clock, units)
@@ -91,7 +91,7 @@ def open_csv(path: Path) -> CsvFile:
             )
         groups = head.groups()
         families = [groups[i] if groups else "" for i in columns]
-        names, repeated = told_apart(path, [heading(head.names[i])[0] for i in columns], families)
+        names, repeated = distinct_names(path, [heading(head.names[i])[0] for i in columns], families)
         channels = tuple(
             Channel(
                 name,
@@ -138,7 +138,7 @@ def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, l
     if left:
         with path.open("rb") as file:
             file.seek(-left, io.SEEK_END)
-            whole = narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
+            whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
         ends = "may be" if whole else "is"
         text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
         said.append(notice(path, "note" if whole else "doubt", text))

@@ -20,7 +20,7 @@ from models.core.csv_header import (
     heading,
     is_number,
     separator_line,
-    split,
+    split_cells,
 )
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
@@ -28,9 +28,9 @@ from models.measured.formats.csv_rows import Layout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import notice
 
-LONGEST = 1 << 20
+FIRST_ROWS_BYTES = 1 << 20
 """Bytes among which the first rows of numbers must be."""
-MOST = 2000
+FIRST_ROWS_LINES = 2000
 """Lines among which they must be."""
 CLOCKS = ("time", "zeit", "t")
 OTHER_CLOCKS = (
@@ -77,7 +77,7 @@ TIME_UNITS = {
 _RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _BEGUN = re.compile(r"[+-]?[.,]?\d")
-MARKED = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
+BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
 """Marks that text begins with, and how it is then written."""
 NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
@@ -131,11 +131,13 @@ def _text(path: Path, line: int, quoted: str) -> str:
         raise InputError(path, f"line {line}", quoted, "a channel's name in quotes is needed") from None
 
 
-def read_top(path: Path) -> Top:
+def read_first_lines(path: Path) -> Top:
     """First lines of a file; InputError where it has none that are text."""
     with path.open("rb") as file:
-        data = file.read(LONGEST)
-    codec, mark = next(((codec, mark) for mark, codec in MARKED.items() if data.startswith(mark)), ("utf-8", b""))
+        data = file.read(FIRST_ROWS_BYTES)
+    codec, mark = next(
+        ((codec, mark) for mark, codec in BYTE_ORDER_MARKS.items() if data.startswith(mark)), ("utf-8", b"")
+    )
     top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
     for line in _lines(data, len(mark), codec, top):
         shown = line.text.strip()
@@ -158,7 +160,7 @@ def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
     """Whole lines of text, until one that holds a zero character or has no end."""
     size = top.unit.itemsize
     ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
-    for number, end in enumerate(ends[:MOST].tolist(), start=1):
+    for number, end in enumerate(ends[:FIRST_ROWS_LINES].tolist(), start=1):
         try:
             text, foreign = data[begin:end].decode(codec), False
         except UnicodeDecodeError:
@@ -171,7 +173,7 @@ def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
             top.foreign.append(line)
         yield line
         begin = end
-    top.stopped = len(ends) + 1 if len(ends) < MOST else 0
+    top.stopped = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
 
 
 def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Finding]]:
@@ -238,7 +240,7 @@ def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
         )
     elif not any(sign in first.text for sign in signs):
         needed = f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED}"
-    elif any(all(map(is_number, cells)) for sign in signs if len(cells := split(text, sign)) > 1):
+    elif any(all(map(is_number, cells)) for sign in signs if len(cells := split_cells(text, sign)) > 1):
         needed = "the file begins with numbers: write a header line time [s], name [unit], ... above them"
     else:
         needed = "one column time [s] is needed, found 0: call it so in the header line"
@@ -269,7 +271,7 @@ def is_other_clock(text: str) -> bool:
 def first_rows(top: Top, head: Head) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; a row of another width is told when it is read."""
     lines = [line for line in top.lines if line.number > head.line]
-    rows = [cells for line in lines if len(cells := split(line.text, head.separator)) == head.width]
+    rows = [cells for line in lines if len(cells := split_cells(line.text, head.separator)) == head.width]
     return [[row[i] for row in rows] for i in range(len(head.names))]
 
 

@@ -66,7 +66,7 @@ class Layout:
         return [i for i in range(len(self.names)) if i not in self.texts]
 
 
-def narrow(data: bytes, unit: np.dtype) -> bytes:
+def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
     """Recode text to one byte per character; a wide character becomes a byte that no number can contain."""
     if unit.itemsize == 1:
         return data
@@ -99,7 +99,7 @@ def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
     begin = max(layout.begin, last - TAIL * size)
     with path.open("rb") as file:
         file.seek(begin)
-        tail = narrow(file.read(last - begin), layout.unit)
+        tail = one_byte_text(file.read(last - begin), layout.unit)
     used = len(tail.rstrip(b' \r\n"' + layout.separator.encode()))
     first = tail.find(b"\n", used) + 1 if used else 0
     ends = [i for i, byte in enumerate(tail) if byte == ord("\n") and i >= first]
@@ -110,11 +110,13 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
     """Table (rows, columns of numbers) of some rows, the first of which is row ``first``; seconds (rows,) since the
     first stamp where times are those of the clock."""
     line = layout.line + 1 + first
-    text = _unquoted(path, layout, narrow(data, layout.unit).replace(b"\r\n", b"\n"), line)
+    text = _unquoted(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
     times = None
     if layout.stamps is not None:
-        stamps = [cell.replace(_WRONG, layout.separator) for cell in _read(layout, text, [layout.clock], str)[:, 0]]
+        stamps = [
+            cell.replace(_WRONG, layout.separator) for cell in _read_columns(layout, text, [layout.clock], str)[:, 0]
+        ]
         times = layout.stamps.seconds(path, stamps, line, layout.names[layout.clock])
     table, used = _table(path, layout, text, line), len(layout.numbers)
     beyond = np.isfinite(table[:, used:]).any(axis=1)
@@ -131,15 +133,15 @@ def _table(path: Path, layout: Layout, text: bytes, line: int) -> np.ndarray:
         wrong = _culprit(path, layout, text, line)
     if wrong is None:
         with suppress(ValueError, OverflowError):
-            return _read(layout, text, columns, np.float64)
-        cells = np.unique(_read(layout, text, columns, str).astype(str))
+            return _read_columns(layout, text, columns, np.float64)
+        cells = np.unique(_read_columns(layout, text, columns, str).astype(str))
         with suppress(ValueError, OverflowError):
-            return _read(layout, text, columns, np.float64, [cell for cell in cells if MARKS.fullmatch(cell)])
+            return _read_columns(layout, text, columns, np.float64, [cell for cell in cells if MARKS.fullmatch(cell)])
         wrong = _culprit(path, layout, text, line)
     raise wrong or InputError(path, f"line {line} and after", None, "rows of numbers are needed")
 
 
-def _read(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
+def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
     """Some columns of rows without quotes, as numbers or as text; ValueError for what is no number and no mark."""
     import pandas
 

@@ -26,7 +26,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
 from models.measured.formats.mdf4_blocks import VLSD, check_blocks
-from models.measured.formats.opened import LeftOut, Opened, Span, notice, readable, told_apart, without_numbers
+from models.measured.formats.opened import LeftOut, Opened, Span, distinct_names, notice, readable, without_numbers
 
 SECONDS = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
@@ -155,7 +155,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
     if not places:
         raise without_numbers(path, findings)
     groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
-    names, repeated = told_apart(path, [channel.name for channel in channels], *zip(*groups, strict=True))
+    names, repeated = distinct_names(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
         Channel(
             name,
@@ -169,7 +169,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
         )
         for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
     )
-    start, notes = _start(path, mdf.header, version)
+    start, notes = _start_time(path, mdf.header, version)
     return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(findings + repeated + notes), tuple(places))
 
 
@@ -246,7 +246,7 @@ def _plain(comment: str) -> str:
     return (root.findtext(".//TX") or "").strip()
 
 
-def _start(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
+def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
     """When time was 0; None, and a word about it, where the file does not say in which zone."""
     if not getattr(header, "abs_time", 0):
         return None, [notice(path, "note", "the file does not say when it was measured")]

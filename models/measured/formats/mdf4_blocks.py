@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.formats.opened import notice
 
-HEAD, FIRST = 24, 64
+HEAD_BYTES, FIRST_BLOCK_OFFSET = 24, 64
 """Bytes of a block's head; where the first block, HD, begins."""
 CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##LD", b"##EV", b"##AT", b"##CH", b"##FH", b"##SR", b"##CC", b"##HL")
 """Blocks whose first link leads on to the next of their kind, or into their list."""
@@ -37,15 +37,15 @@ class MdfBlock:
 def check_blocks(path: Path) -> list[Finding]:
     """Raise InputError at the byte where an MDF 4 file cannot be what it says; more records than announced are said."""
     size = path.stat().st_size
-    if size < FIRST + HEAD:
+    if size < FIRST_BLOCK_OFFSET + HEAD_BYTES:
         raise InputError(path, f"byte {size}", None, "the file ends in its header")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
             text = "the recorder did not finish this file: let its software finalise it, or asammdf save it anew"
             raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), text)
         blocks = dict(_linked_blocks(path, data, size))
-        if blocks[FIRST].kind != b"##HD":
-            raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
+        if blocks[FIRST_BLOCK_OFFSET].kind != b"##HD":
+            raise InputError(path, f"byte {FIRST_BLOCK_OFFSET}", None, "the header block ##HD is needed")
     _chains(path, blocks)
     groups = [(place, block) for place, block in blocks.items() if block.kind == b"##DG"]
     return [finding for place, block in groups for finding in _records(path, place, block, blocks)]
@@ -53,17 +53,21 @@ def check_blocks(path: Path) -> list[Finding]:
 
 def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, MdfBlock]]:
     """Every block that a link leads to, with its place."""
-    seen, ahead, cut = {FIRST}, [FIRST], f"; the file has {size} bytes: it is cut off or damaged"
+    seen, ahead, cut = (
+        {FIRST_BLOCK_OFFSET},
+        [FIRST_BLOCK_OFFSET],
+        f"; the file has {size} bytes: it is cut off or damaged",
+    )
     while ahead:
         place = ahead.pop()
-        if not FIRST <= place <= size - HEAD or data[place : place + 2] != b"##":
+        if not FIRST_BLOCK_OFFSET <= place <= size - HEAD_BYTES or data[place : place + 2] != b"##":
             raise InputError(path, f"byte {place}", None, f"a block must begin here{cut}")
         length, count = struct.unpack_from("<QQ", data, place + 8)
-        if place + length > size or HEAD + 8 * count > length:
+        if place + length > size or HEAD_BYTES + 8 * count > length:
             text = f"a block of {length} bytes with {count} links begins here{cut}"
             raise InputError(path, f"byte {place}", None, text)
-        links = struct.unpack_from(f"<{count}Q", data, place + HEAD)
-        rest = place + HEAD + 8 * count
+        links = struct.unpack_from(f"<{count}Q", data, place + HEAD_BYTES)
+        rest = place + HEAD_BYTES + 8 * count
         yield place, MdfBlock(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
         new = {link for link in links if link} - seen
         seen |= new
@@ -122,8 +126,8 @@ def _length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
     """Bytes of records in a data block, unpacked."""
     block = blocks[place]
     if block.kind != b"##DZ":
-        return block.length - HEAD - 8 * len(block.links)
+        return block.length - HEAD_BYTES - 8 * len(block.links)
     plain, packed = struct.unpack_from("<QQ", block.data, 8)
-    if plain > PACKING * packed + HEAD:
+    if plain > PACKING * packed + HEAD_BYTES:
         raise InputError(path, f"byte {place}", plain, f"{packed} packed bytes cannot hold as many")
     return int(plain)

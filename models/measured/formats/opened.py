@@ -18,7 +18,7 @@ from models.measured.channel import BLOCK, Block, Channel
 
 Span = tuple[int, int]
 """First sample and number of samples."""
-SHOWN = 5
+SHOWN_NAMES = 5
 """Names of what is left out that are told."""
 DATED = "2026-11-21T08:00:00+00:00"
 """How a start is to be written."""
@@ -108,8 +108,12 @@ class LeftOut:
 
     def findings(self, path: Path) -> list[Finding]:
         """One sentence per reason."""
-        more = {why: f" and {len(names) - SHOWN} more" for why, names in self.names.items() if len(names) > SHOWN}
-        texts = {why: f"{', '.join(names[:SHOWN])}{more.get(why, '')}" for why, names in self.names.items()}
+        more = {
+            why: f" and {len(names) - SHOWN_NAMES} more"
+            for why, names in self.names.items()
+            if len(names) > SHOWN_NAMES
+        }
+        texts = {why: f"{', '.join(names[:SHOWN_NAMES])}{more.get(why, '')}" for why, names in self.names.items()}
         return [notice(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 
@@ -119,7 +123,7 @@ def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
     return InputError(path, "channels", None, "; ".join(reasons))
 
 
-def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
+def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
     """Names of which each occurs once, and what is to be said of repeated ones.
 
     A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that

@@ -17,13 +17,13 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
+from models.measured.formats.opened import Opened, Span, distinct_names, notice, readable, zoned
 
 BLOCK, KEY, RECORD = 512, 32, 128
 MOST_BLOCKS = 1024
 """Header blocks: four times what the format allows, as there are files that need them."""
 TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
-LITTLE = ("BINARY", "BINARY_IEEE_LITTLE_END")
+LITTLE_ENDIAN = ("BINARY", "BINARY_IEEE_LITTLE_END")
 BEGINS = ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]
 HISTORIES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
 
@@ -73,7 +73,7 @@ def open_rpc(path: Path) -> RpcFile:
         said += _numbers_of_names(path, parameters, layout.width)
         numbers = range(1, layout.width + 1)
         names = [parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}" for i in numbers]
-        names, repeated = told_apart(path, names)
+        names, repeated = distinct_names(path, names)
         steps = np.abs(layout.scales) if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
         channels = tuple(
             Channel(
@@ -103,10 +103,10 @@ def read_parameters(path: Path) -> dict[str, str]:
         if list(first) != BEGINS:
             text = f"RPC III begins with {', '.join(BEGINS[:2])} and {BEGINS[2]}"
             raise InputError(path, "header", list(first), text)
-        if first["FORMAT"] not in LITTLE:
-            raise InputError(path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE)} can be read")
-        blocks = whole(path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
-        count = whole(path, first, "NUM_PARAMS", 4 * blocks)
+        if first["FORMAT"] not in LITTLE_ENDIAN:
+            raise InputError(path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE_ENDIAN)} can be read")
+        blocks = whole_number(path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
+        count = whole_number(path, first, "NUM_PARAMS", 4 * blocks)
         head += file.read(BLOCK * (blocks - 1))
     if len(head) < BLOCK * blocks:
         raise InputError(path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
@@ -123,7 +123,7 @@ def _record(head: bytes, i: int) -> tuple[str, str]:
         return key.decode("latin-1").strip(), value.decode("latin-1")
 
 
-def whole(path: Path, parameters: dict[str, str], name: str, most: int) -> int:
+def whole_number(path: Path, parameters: dict[str, str], name: str, most: int) -> int:
     """A whole number from 1 to ``most``."""
     text = parameters.get(name, "").strip()
     if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= most:
@@ -152,9 +152,9 @@ def _layout(path: Path, parameters: dict[str, str]) -> Layout:
                 path, f"header, {name}", type_of_file, "only time histories of one of these can be read", allowed
             )
     dtype = TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
-    width = whole(path, parameters, "CHANNELS", 10**4)
-    points = whole(path, parameters, "PTS_PER_GROUP", 10**7)
-    if points % whole(path, parameters, "PTS_PER_FRAME", points):
+    width = whole_number(path, parameters, "CHANNELS", 10**4)
+    points = whole_number(path, parameters, "PTS_PER_GROUP", 10**7)
+    if points % whole_number(path, parameters, "PTS_PER_FRAME", points):
         raise InputError(path, "header, PTS_PER_GROUP", points, "a group must hold whole frames")
     period = _real(path, parameters, "DELTA_T", True)
     scales = np.ones(width)
@@ -165,14 +165,14 @@ def _layout(path: Path, parameters: dict[str, str]) -> Layout:
 
 def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
     """Samples that can be used, and what is missing or too many."""
-    frame = whole(path, parameters, "PTS_PER_FRAME", layout.points)
-    announced = frame * whole(path, parameters, "FRAMES", 10**12)
+    frame = whole_number(path, parameters, "PTS_PER_FRAME", layout.points)
+    announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
     size = layout.points * layout.width * layout.dtype.itemsize
     data = path.stat().st_size - layout.begin
     there = layout.points * (data // size)
     texts = list[str]()
     if "SAMPLES" in parameters:
-        announced = whole(path, parameters, "SAMPLES", announced)
+        announced = whole_number(path, parameters, "SAMPLES", announced)
     else:
         texts.append(
             f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "

@@ -19,7 +19,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.opened import LeftOut, Opened, Span, notice, readable, told_apart, without_numbers
+from models.measured.formats.opened import LeftOut, Opened, Span, distinct_names, notice, readable, without_numbers
 
 UNITS = ("unit_string", "NI_UnitDescription")
 CLOCKS = ("time", "zeit", "t")
@@ -142,7 +142,7 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     if cut:
         counts = [min(n for n, other in zip(counts, clocks, strict=True) if other == clock) for clock in clocks]
     keys = list(zip(clocks, counts, strict=True))
-    names, repeated = told_apart(
+    names, repeated = distinct_names(
         path, [place.name for _, place in with_clock], [place.group for _, place in with_clock]
     )
     channels = tuple(

@@ -25,16 +25,16 @@ import numpy as np
 
 from models.core.csv_header import heading
 from models.core.errors import InputError
-from models.core.whole_files import FULL
+from models.core.whole_files import DISK_FULL_ERRORS
 from models.measured.formats.csv_layout import is_clock
 from models.measured.formats.mdf4 import unheard
 from models.measured.formats.rpc3 import BLOCK, KEY, RECORD
 
 POINTS = 2048
 """Samples of a group of RPC III, which is also a frame."""
-LONGEST = RECORD - KEY - 1
+LONGEST_VALUE = RECORD - KEY - 1
 """Bytes of a value of RPC III before the zero that ends it."""
-MOST = 1024
+MOST_PARAMETERS = 1024
 """Parameters of a header of RPC III."""
 
 
@@ -115,7 +115,7 @@ def new_file(path: Path) -> Iterator[Path]:
     except FileExistsError:
         raise exists from None
     except OSError as error:
-        if error.errno in FULL:
+        if error.errno in DISK_FULL_ERRORS:
             raise
         raise InputError(path, "", None, f"the file cannot be written: {error.strerror or error}") from None
     finally:
@@ -286,8 +286,11 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
         parameters |= {f"{key}.CHAN_{i}": value for key, value in (told | {"MAP": str(i)}).items()}
         parameters |= _spread_long_text(f"COMMENT.CHAN_{i}", text)
     count = len(parameters) + 3
-    if count > MOST:
-        text = f"the header has {MOST} parameters, {count} are needed: write fewer channels or comments, or MDF 4"
+    if count > MOST_PARAMETERS:
+        text = (
+            f"the header has {MOST_PARAMETERS} parameters, {count} are needed: "
+            "write fewer channels or comments, or MDF 4"
+        )
         raise InputError(path, "channels", len(group.names), text)
     blocks = -(-count // (BLOCK // RECORD))
     parameters = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **parameters}
@@ -301,15 +304,17 @@ def _record(path: Path, key: str, value: str) -> bytes:
     except UnicodeEncodeError as error:
         letter = value[error.start]
         raise InputError(path, key, value, f"RPC III has no {letter!r}: write it otherwise, or MDF 4") from None
-    if len(text) > LONGEST or "\0" in value:
-        raise InputError(path, key, value, f"RPC III has room for {LONGEST} characters, and this has {len(text)}")
+    if len(text) > LONGEST_VALUE or "\0" in value:
+        raise InputError(path, key, value, f"RPC III has room for {LONGEST_VALUE} characters, and this has {len(text)}")
     return key.encode("ascii").ljust(KEY, b"\0") + text.ljust(RECORD - KEY, b"\0")
 
 
 def _spread_long_text(name: str, text: str) -> dict[str, object]:
     """Spread a text over several parameters, with line ends written as ``\\n``."""
     plain = text.replace("\\", "\\\\").replace("\n", "\\n")
-    return {f"{name}_{i // LONGEST + 1}": plain[i : i + LONGEST] for i in range(0, len(plain), LONGEST)}
+    return {
+        f"{name}_{i // LONGEST_VALUE + 1}": plain[i : i + LONGEST_VALUE] for i in range(0, len(plain), LONGEST_VALUE)
+    }
 
 
 WRITERS: dict[str, Callable[[Path, Path, Sequence[ChannelGroup], datetime | None, str], None]] = {

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-SLOW = 0.1
+FADING_SPEED = 0.1
 """Speed (m/s) of the tread below which slip is relative to it, and forces of both directions are mixed."""
 MARGIN = 1.0 + 2e-15
 """A bound is a little more than itself where a traction on it is projected."""
-STILL = 1e-60
+NEGLIGIBLE_SLIP = 1e-60
 """Square of a rigid slip that turns no traction."""
-LONGEST = 50.0
+LARGEST_EXPONENT = 50.0
 
 
 class Net(NamedTuple):
@@ -65,12 +65,12 @@ def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
     slides (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
     """
     tread = slides[:, 3]
-    ahead = _rolling(patch, slides[:, :3], np.maximum(np.abs(tread), SLOW), cells)
-    if (tread >= SLOW).all():
+    ahead = _rolling(patch, slides[:, :3], np.maximum(np.abs(tread), FADING_SPEED), cells)
+    if (tread >= FADING_SPEED).all():
         return ahead
     mirrored = slides[:, :3] * np.array([-1.0, 1.0, -1.0])
-    behind = _rolling(patch, mirrored, np.maximum(np.abs(tread), SLOW), cells) * np.array([-1.0, 1.0, -1.0])
-    part = np.clip(0.5 + 0.5 * tread / SLOW, 0.0, 1.0)[:, None]
+    behind = _rolling(patch, mirrored, np.maximum(np.abs(tread), FADING_SPEED), cells) * np.array([-1.0, 1.0, -1.0])
+    part = np.clip(0.5 + 0.5 * tread / FADING_SPEED, 0.0, 1.0)[:, None]
     mixed: np.ndarray = part * ahead + (1.0 - part) * behind
     return mixed
 
@@ -132,9 +132,9 @@ def _advance(
     z = (np.abs(w.real) + np.abs(w.imag)) / (8.0 * between)
     w = w + turn * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
     size = np.abs(w)
-    turns = slides & beyond & (size * size > STILL)
+    turns = slides & beyond & (size * size > NEGLIGIBLE_SLIP)
     size = np.where(turns, size, 1.0)
-    h = np.minimum(size / (8.0 * between), LONGEST)
+    h = np.minimum(size / (8.0 * between), LARGEST_EXPONENT)
     grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
     angle = before * np.conj(-w)
     half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag

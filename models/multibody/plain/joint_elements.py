@@ -7,11 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, PlainMotion
+from models.multibody.plain.constraints import Axes, rotation
+from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, PlainMotion
 from models.vehicles.spatial import SpatialVehicle, Vector
 
 Line = tuple[tuple[tuple[str | None, Vector], ...], float, float, float]
 """Two points of bodies (None: the ground) in the design position; N/m, N s/m and m of a spring along their line."""
+Turn = tuple[tuple[str | None, str], Axes, float, float]
+"""Two bodies (None: the ground), their axes that are parallel at rest, N m/rad and N m s/rad about all axes."""
 Friction = tuple[int, float, float]
 """A coordinate's number, its dry friction (N, N m), and the speed (m/s, rad/s) from which it has that force."""
 Load = tuple[str, Vector, np.ndarray]
@@ -43,12 +46,14 @@ class PlainTree:
         loads: Sequence[Load] = (),
         lines: Sequence[Line] = (),
         frictions: Sequence[Friction] = (),
+        turns: Sequence[Turn] = (),
     ) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])
         self._lines, self._ends = lines, self.bodies.points([end for ends, *_ in lines for end in ends])
+        self._turns = turns
         self._rows = joint_rows(self.bodies, vehicle)
         self._stiffness, self._damping, self._held, self._inertia = joint_numbers(vehicle)
         self._rubbing = [coordinate for coordinate, _, _ in frictions]
@@ -64,6 +69,8 @@ class PlainTree:
             force += np.einsum("pnk,pk->n", motion.at(self._points)[:, FIRST:], self._loads)
         if self._lines:
             force += self._line_spring_forces(motion)
+        for turn in self._turns:
+            force -= self._turning_resistance(turn, motion, v)
         force[self._rubbing] -= self._friction * np.clip(v[self._rubbing] / self._slides, -1.0, 1.0)
         return mass + self._rows.T * self._inertia @ self._rows, force
 
@@ -77,6 +84,15 @@ class PlainTree:
             rate = float(apart[RATE] @ apart[PLACE]) / distance
             total -= (stiffness * (distance - length) + damping * rate) * gradient
         return total
+
+    def _turning_resistance(self, turn: Turn, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) that a spring and damper between two bodies' turning overcome."""
+        bodies, axes, stiffness, damping = turn
+        rows = [self.bodies.row[name] if name else GROUND for name in bodies]
+        first, second = (motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
+        size, gains = rotation(first, second)
+        resistance: np.ndarray = gains.T @ (stiffness * size + damping * (gains @ v))
+        return resistance
 
     def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Forces (n,) without those of inertia: their power with the rates is the rate of the kinetic energy."""

@@ -60,7 +60,9 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     if not error:
         return labelled
     return (
-        not_estimated(labelled, "its steps are kept to a tolerance") if engine == REFERENCE else _told(labelled, scene)
+        not_estimated(labelled, "its steps are kept to a tolerance")
+        if engine == REFERENCE
+        else _with_step_error(labelled, scene)
     )
 
 
@@ -108,7 +110,7 @@ def ideal(scene: BicycleScene) -> Ride:
     return bicycle.run(bicycle.upright(run.speed, run.lean_rate), run.duration, rows)
 
 
-def _told(run: Result, scene: BicycleScene) -> Result:
+def _with_step_error(run: Result, scene: BicycleScene) -> Result:
     """The result with the error of its steps."""
     ride, engine = run.detail, run.data.attrs["engine"]
 

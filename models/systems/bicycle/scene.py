@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from models.bicycle.rolling_tyres import USUAL, BicycleTyre, RollingBicycle
+from models.bicycle.rolling_tyres import UNCHANGED_TYRE, BicycleTyre, RollingBicycle
 from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
 from models.core.errors import InputError
 from models.core.scene_effects import extended, with_own
@@ -48,7 +48,7 @@ class BicycleScene(SceneFile):
     system: Literal["bicycle"] = "bicycle"
     study: str = Field(default="bicycle", description="the study that runs the scene")
     bicycle: BicycleTable = BicycleTable()
-    tyres: BicycleTyre = USUAL
+    tyres: BicycleTyre = UNCHANGED_TYRE
     control: Control = Control()
     speeds: SpeedsTable = SpeedsTable()
     run: RunTable = RunTable()

@@ -26,7 +26,7 @@ from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, BrakingPath
 from models.systems.braking.of_scene import braked, sides, vehicle_of
-from models.systems.braking.plan import behind
+from models.systems.braking.plan import controller_text
 from models.systems.braking.procedures import looped, step_steer
 from models.systems.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.systems.braking.stop_report import Stop
@@ -88,7 +88,7 @@ def trailer_loads(vehicle: Braked, z: float) -> np.ndarray:
     return loads[4:].reshape(-1, 2).sum(axis=1)
 
 
-def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
+def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
     """The scene's vehicle with its trailer, if no change takes that away, on one surface everywhere."""
     road = RoadTable(stretches=[Stretch(left=surface)])
     return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
@@ -96,13 +96,13 @@ def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
 
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
-    vehicle, lengths = on_one(scene, surface, trailer=None), axles(scene)
+    vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axles(scene)
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
     front, rear = adhesion_front(_rate(scene, vehicle, 0), lengths), adhesion_rear(_rate(scene, vehicle, 1), lengths)
     if scene.trailer is None:
         return Adhesion(front, rear)
-    train = on_one(scene, surface)
+    train = vehicle_on_one_surface(scene, surface)
     rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
     trailer = (adhesion_trailer(z, weight, float(trailer_loads(train, z)[i])) for i, z in enumerate(rates))
     return Adhesion(front, rear, tuple(trailer))
@@ -153,7 +153,7 @@ def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, na
     """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
     its name."""
     lengths, k = axles(scene), k or adhesion(scene, surface)
-    train = on_one(scene, surface)
+    train = vehicle_on_one_surface(scene, surface)
     z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
     loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
     each = np.array([adhesion_of_vehicle(z, k.front, k.rear, lengths), *k.trailer])
@@ -174,7 +174,7 @@ class Split:
         return split_rate(self.k_low, self.k_high)
 
 
-def split(scene: BrakingScene, name: str) -> Split:
+def split_adhesion(scene: BrakingScene, name: str) -> Split:
     """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
     procedure, alone = scene.procedures[name], scene.model_copy(update={"trailer": None})
     both = [adhesion(alone, surface) for surface in sides(procedure, scene.road.stretches[0])]
@@ -202,10 +202,10 @@ def merits(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
             "without brakes: steady yaw rate [deg/s]": np.degrees(steady),
         }
     once = port is not None and (port.port is not None or port.replay is not None)
-    if behind(scene) == "none" or scene.measured is not None or once:
+    if controller_text(scene) == "none" or scene.measured is not None or once:
         return {}
     if procedure.kind == "split":
-        both = split(scene, name)
+        both = split_adhesion(scene, name)
         return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
     used = utilisation(scene, scene.road.stretches[0].left)
     return {

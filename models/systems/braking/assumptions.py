@@ -66,7 +66,7 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "loads at rest",
             "braking and cornering move little load between the wheels",
             "name the effect load_transfer",
-            partial(_moved, scene),
+            partial(_transferred_load, scene),
             "of the load at rest",
             most=MOVED,
         )
@@ -90,7 +90,7 @@ def _loads(run: Result) -> np.ndarray:
     return loads
 
 
-def _moved(scene: BrakingScene, run: Result) -> Watched:
+def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
     """Shares of load that accelerations of the truck would move, as its height has them, along and across."""
     states, times = run.detail.states, run.detail.times
     rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(times), 1e-9)[:, None]
@@ -212,7 +212,7 @@ def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
             "slip angles of the friction",
             "friction is known at the slip angles of the tyres",
             "give tyres.files with tables up to larger slip angles",
-            lambda run: _of_wheels(_fast(run, np.abs(run["slip_angle"]))),
+            lambda run: _of_wheels(_while_moving(run, np.abs(run["slip_angle"]))),
             "rad",
             most=widest,
         )
@@ -341,7 +341,7 @@ def _of_wheels(values: np.ndarray) -> Watched:
     return dict(zip(wheel_names(values.shape[1]), values.T, strict=True))
 
 
-def _fast(run: Result, values: np.ndarray) -> np.ndarray:
+def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
     """Values (n, W) of a vehicle that moves, others no numbers."""
     return np.where(Stop(run.detail).speed[:, None] > SLOWEST, values, np.nan)
 

@@ -70,15 +70,15 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
     if not repeatable(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
     try:
-        paths = _others(path, steps, repeats.rerun)
+        paths = _finer_runs(path, steps, repeats.rerun)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
     if steps == 1:
         return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
-    if loop and not alike(path, paths[0]):
+    if loop and not same_commands(path, paths[0]):
         return not_estimated(run, LONGER)
-    if loop and near(path, paths[0], repeats):
+    if loop and other_command_nearby(path, paths[0], repeats):
         return not_estimated(run, SHORTER)
     told = _by_fewer(path, steps, paths, step)
     if rocks(scene):
@@ -104,18 +104,18 @@ def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
     return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
-def alike(path: BrakingPath, other: BrakingPath) -> bool:
+def same_commands(path: BrakingPath, other: BrakingPath) -> bool:
     """Whether the controller has acted alike in two runs."""
-    pressures = _at(path.times, other, other.pressures)
+    pressures = _columns_at(path.times, other, other.pressures)
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
-def near(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
+def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
     """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps:
     of valves another state of any, of pressures what is not alike."""
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
-    shifted = 2.0 * turning - _at(times, longer, longer.turning)
+    shifted = 2.0 * turning - _columns_at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
     said, beside = (repeats.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
     if said.dtype.kind == "i":
@@ -132,24 +132,28 @@ def channels(path: BrakingPath, times: np.ndarray) -> Channels:
     return {name: np.interp(times, path.times, values) for name, values in motion.items()}
 
 
-def whole(path: BrakingPath, times: np.ndarray) -> Channels:
+def motion_and_distance(path: BrakingPath, times: np.ndarray) -> Channels:
     """Motion, and the stopping distance (1,) of a run that stands."""
     return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
 
 
-def _others(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
+def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
     """Runs with half of the steps, and over a part with a quarter of them; of a single one, with two over a part."""
     last = float(path.times[-1])
     if steps == 1:
         return [rerun(2, FINE_WINDOW * last)]
     first = rerun(steps // 2, LATER * last if path.stands else last)
-    return [first, rerun(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
+    return [first, rerun(steps // 4, WINDOW * last)] if steps >= 4 and same_commands(path, first) else [first]
 
 
 def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:
     """Error estimates by runs in half and a quarter of the steps; the stopping distance errs by no less than the motion
     along the road."""
-    fine, coarse, counts = whole(path, path.times), whole(finer_runs[0], path.times), [steps, steps // 2, steps // 4]
+    fine, coarse, counts = (
+        motion_and_distance(path, path.times),
+        motion_and_distance(finer_runs[0], path.times),
+        [steps, steps // 2, steps // 4],
+    )
     part = path.times[path.times <= finer_runs[-1].times[-1]]
     seen = [channels(run, part) for run in (path, *finer_runs)]
     told = dict[str, Estimate]()
@@ -188,7 +192,7 @@ def _by_twice(path: BrakingPath, other: BrakingPath, step: float) -> dict[str, E
     return told
 
 
-def _at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:
+def _columns_at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:
     """Columns (n, W) of a run at times (m,) in s."""
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 

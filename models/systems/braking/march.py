@@ -12,11 +12,11 @@ from models.brake.brake import Brakes
 from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
 from models.brake.plane_records import PlaneMotion, Report
 from models.brake.plane_vehicle import Plane
-from models.brake.port.ask import STATES, WITH_SLOW, ask
+from models.brake.port.ask import STATES, STATES_WITH_SLOW_APPLY, ask
 from models.brake.port.sensors import Sensed
-from models.brake.pressure import Chambers, still
+from models.brake.pressure import Chambers, resting_chambers
 from models.brake.samples import Braking, Commands, Record, Row, by_steps, parts, row
-from models.brake.surfaces import EVEN, OnRoad, Road, check_way
+from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, check_way
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 
@@ -110,7 +110,7 @@ class Braked:
         steady = self.steering is None and is_steady(controller)
         most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
         record = Record(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
-        states = WITH_SLOW if self.chambers.slow.size else STATES
+        states = STATES_WITH_SLOW_APPLY if self.chambers.slow.size else STATES
         beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
         motion = now.motion(np.zeros(2 + self.plane.masses.size))
         rows, status = [now.whole[None].copy()], FINE
@@ -144,7 +144,7 @@ class Braked:
         self, commands: Commands, record: Record, now: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
         """The vehicle as it is ``now`` and in ``motion``, moved on sample by sample; see ``samples``."""
-        air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
+        air = resting_chambers(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
         go, given = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
@@ -160,7 +160,7 @@ class Braked:
 
 
 def on_tyres(
-    plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = EVEN, **more: Any
+    plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = UNIFORM_ROAD, **more: Any
 ) -> Braked:
     """A vehicle whose wheels point straight ahead, all with the same kind of tyre where no other is named.
 

@@ -86,7 +86,7 @@ def plane_of(scene: BrakingScene) -> Plane:
         raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
 
-def given_of(scene: BrakingScene) -> Any:
+def spatial_vehicle_of(scene: BrakingScene) -> Any:
     """The vehicle of the scene's file with what it tows, a ``SpatialVehicle``; None where the scene names no file."""
     from models.own_model.scene_vehicle import scene_vehicle
 
@@ -98,7 +98,7 @@ def sprung_of(scene: BrakingScene) -> Any:
     """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
     from models.brake.sprung import sprung
 
-    return sprung(given_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
+    return sprung(spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
 
 
 def on_springs(engine: str, vehicle: Any) -> Any:

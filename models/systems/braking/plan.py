@@ -109,7 +109,7 @@ def describe(scene: BrakingScene) -> str:
         f"axles at {vehicle.front.x:g} and {vehicle.rear.x:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
         "wheels turn",
         "brakes": f"supply {scene.brakes.supply:g} bar",
-        "controller": f"{behind(scene)}, every {1e3 * run.sample:g} ms",
+        "controller": f"{controller_text(scene)}, every {1e3 * run.sample:g} ms",
     }
     lines = [_line(*part) for part in told.items()]
     for name, procedure in scene.procedures.items():
@@ -118,12 +118,12 @@ def describe(scene: BrakingScene) -> str:
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
     if file is not None:
-        lines += [_line(*line) for line in (*_towed(scene), *_shares(scene))]
+        lines += [_line(*line) for line in (*_towed(scene), *_native_and_other_forces(scene))]
     assumed = {assumption.says: assumption for name in scene.procedures for assumption in _assumed(scene, name)}
     return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
 
 
-def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
+def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
     """Which forces of a suspended vehicle engines compute by native elements, which all engines share, and which are
     independent."""
     from models.engines.free_vehicle import ENGINES, native_share
@@ -159,7 +159,7 @@ def user_code(scene: BrakingScene) -> str:
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
 
 
-def behind(scene: BrakingScene) -> str:
+def controller_text(scene: BrakingScene) -> str:
     """Text that names the controller at the port, or the source of the measured pressures."""
     if scene.measured is not None:
         return f"measured pressures {scene.measured.file}"

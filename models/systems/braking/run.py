@@ -30,7 +30,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
     vehicle, start = ready(scene, name)
-    vehicle = carried(vehicle, engine)
+    vehicle = marched_by(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
         path = looped(scene, name, vehicle, start, engine)
@@ -44,7 +44,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
 
 
-def carried(vehicle: Braked, engine: str) -> Braked:
+def marched_by(vehicle: Braked, engine: str) -> Braked:
     """The vehicle marched by an engine; by its own steps in the plane, which are the reference's."""
     if vehicle.sprung is not None:
         return replace(vehicle, engine=on_springs(engine, vehicle.sprung))

@@ -39,7 +39,7 @@ def of_pressing(scene: ContactScene, body: Contact) -> list[Assumption]:
     return listed + (_on_profiles(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
 
 
-def of_rows(file: Path) -> list[Assumption]:
+def table_assumptions(file: Path) -> list[Assumption]:
     """Assumptions of the contacts in a table of cases, judged by the rows that a result keeps: its first block."""
     rows = next(iter(blocks(file, (BY_AXES, BY_CURVATURES))), None)
     values = {} if rows is None else {name: np.asarray(column, float) for name, column in rows.values.items()}

@@ -64,7 +64,7 @@ Build = Callable[[Array, Array], Any]
 """Makes ``Built`` of the friction and the load (N) of some rows."""
 
 
-def answer(
+def answer_table(
     path: Path,
     out: Path,
     built: Build,

@@ -68,11 +68,11 @@ def describe(scene: ContactScene) -> str:
 
 def _assumed(scene: ContactScene) -> list[Assumption]:
     """Assumptions of the scene's contact; none where the contact cannot be pressed."""
-    from models.systems.contact.assumptions import assumptions, of_rows
+    from models.systems.contact.assumptions import assumptions, table_assumptions
 
     with suppress(InputError, RunFailed):
         if scene.cases is not None:
-            return of_rows(scene.cases_file())
+            return table_assumptions(scene.cases_file())
         from models.systems.contact.run import contact
 
         return assumptions(scene, contact(scene))

@@ -39,8 +39,8 @@ from models.core.tables import BLOCK as TABLE_BLOCK
 from models.ensemble.store import Store, named_files
 from models.ensemble.workers import Crew, places_of
 from models.systems.contact.assumptions import assumptions
-from models.systems.contact.assumptions import of_rows as assumptions_of_rows
-from models.systems.contact.cases_table import answer, compile_first, kept_rows, sizes
+from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
+from models.systems.contact.cases_table import answer_table, compile_first, kept_rows, sizes
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
@@ -184,7 +184,7 @@ def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
 
 def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: bool) -> Result:
     """The first rows of the answers, which the file has in full."""
-    built = partial(of_rows, scene)
+    built = partial(table_contacts, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
     counts = _answered(scene, answers, built, progress, error)
@@ -201,11 +201,11 @@ def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress
     rows, several = _rows_of(file), file.stat().st_size > LARGE
     count = partial(_count, progress, rows)
     if not several:
-        return answer(file, answers, built, scene.method, count, errors=error)
+        return answer_table(file, answers, built, scene.method, count, errors=error)
     store = Store(answers.parent / BLOCKS)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
     with store.claimed(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
-        return answer(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
+        return answer_table(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
 
 
 def _rows_of(file: Path) -> int:
@@ -218,12 +218,12 @@ def _count(progress: Progress, most: int, rows: int) -> None:
     progress(f"{rows:,} of {most:,} rows", min(rows / max(most, 1), 1.0))
 
 
-def of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
+def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
     """The contacts in the rows of a table of cases."""
     return extended(Built(scene.pair, friction, load), scene)
 
 
-def built_of(scene: ContactScene) -> Built:
+def scene_contact(scene: ContactScene) -> Built:
     """The contact of a scene, with the scene's effects."""
     table = scene.contact
     assert table is not None
@@ -236,7 +236,7 @@ def built_of(scene: ContactScene) -> Built:
 
 def contact(scene: ContactScene) -> Contact:
     """The contact of a scene, pressed, by the theory that the scene names."""
-    method, built = scene.method, built_of(scene)
+    method, built = scene.method, scene_contact(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
         raise InputError(
@@ -299,7 +299,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
 
 def hertz_of(scene: ContactScene) -> Hertz:
     """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
-    built = built_of(scene)
+    built = scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:
         return by_axes(scene.ellipse.a, scene.ellipse.b, pair, load=load, approach=approach)

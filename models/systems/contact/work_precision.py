@@ -25,7 +25,7 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
 from models.systems.contact.assumptions import of_pressing
-from models.systems.contact.run import Progress, built_of, hertz_of, interpenetrating
+from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.stated_error import MOST_CELLS, rms
 
@@ -250,7 +250,7 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
 
     levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
-    hertz, built = hertz_of(scene), built_of(scene)
+    hertz, built = hertz_of(scene), scene_contact(scene)
     cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
     known, points = list[ContactCase](), list[TheoryPoint]()
     for i, case in enumerate(cases):

@@ -7,7 +7,7 @@ import numpy as np
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.multibody.numbers import GRAVITY, Handling
-from models.tyre.bristles import SLOW
+from models.tyre.bristles import FADING_SPEED
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import hitch_of
 
@@ -61,13 +61,13 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "end the manoeuvre before the car stops: shorten its duration",
             lambda run: _by_tyre(_contact_speed(run), handling),
             "m/s",
-            least=SLOW,
+            least=FADING_SPEED,
         ),
         Assumption(
             "slow steering",
             "tyres build up their forces at once",
             f"steer more slowly, or drive faster: the lag of {LENGTH:g} m of way is not modelled",
-            lambda run: _by_tyre(_lag(run), handling),
+            lambda run: _by_tyre(_carcass_lag(run), handling),
             "rad",
             -LAG,
             LAG,
@@ -82,11 +82,11 @@ def assumptions(handling: Handling) -> list[Assumption]:
             LARGEST_STEER,
         ),
         *_travels(handling),
-        *_stops(handling),
+        *_unbuilt_stops(handling),
     ]
 
 
-def _stops(handling: Handling) -> list[Assumption]:
+def _unbuilt_stops(handling: Handling) -> list[Assumption]:
     """Assumptions on coordinates whose stops are not built."""
     places = handling.vehicle.coordinates()
     return [
@@ -164,6 +164,6 @@ def _contact_speed(run: Result) -> np.ndarray:
     return np.hypot(run["tread"] + run["slip_x"], run["slip_y"])
 
 
-def _lag(run: Result) -> np.ndarray:
+def _carcass_lag(run: Result) -> np.ndarray:
     """Steering (rad) within the way that a carcass takes to follow."""
-    return np.gradient(run["steer"], run.times, axis=0) * LENGTH / np.maximum(_contact_speed(run), SLOW)
+    return np.gradient(run["steer"], run.times, axis=0) * LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)

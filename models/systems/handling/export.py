@@ -1,6 +1,6 @@
 """The vehicle of a scene of handling as a file of its engine: bodies and joints."""
 
-from models.engines.export import Exported, Subject, of_free, parts_left_out
+from models.engines.export import Exported, Subject, export_free_vehicle, parts_left_out
 from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_by
 from models.systems.handling.scene import HandlingScene
@@ -17,4 +17,4 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
 def of_handling(engine: str, handling: Handling, subject: Subject, more: list[str]) -> Exported:
     """A vehicle on a carrier; ``more`` says what else it leaves out."""
     left_out = [*parts_left_out(handling.vehicle), *more]
-    return of_free(engine, driven_by(handling), subject, left_out)
+    return export_free_vehicle(engine, driven_by(handling), subject, left_out)

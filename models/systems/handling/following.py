@@ -13,7 +13,7 @@ from models.core.errors import RunFailed
 from models.core.smoothing import smoothed
 from models.measured.drive import MeasuredDrive
 from models.multibody.numbers import Control, Controls, Handling
-from models.systems.handling.run import driven
+from models.systems.handling.run import drive_run
 
 ENGINE = "mujoco"
 CLOSE = 0.002
@@ -36,7 +36,7 @@ def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: 
     force, resistance = mass * np.gradient(speed, period), 0.0
     for march in range(MARCHES):
         controls = _with_torque(handling.controls, drive, radius * force)
-        run = driven(ENGINE, handling.changed(controls=controls), float(speed[0]), period * (len(speed) - 1), step)
+        run = drive_run(ENGINE, handling.changed(controls=controls), float(speed[0]), period * (len(speed) - 1), step)
         reached = run.velocity()[::every, 0]
         missing = speed - reached
         if np.sqrt(np.mean(missing**2)) <= CLOSE * speed.mean():

@@ -8,7 +8,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
-from models.tyre.bristles import SLOW
+from models.tyre.bristles import FADING_SPEED
 from models.vehicles.free_vehicle import SWAY, spinning
 from models.vehicles.spatial import Freedom, hitch_of
 
@@ -53,7 +53,7 @@ def check_step(drive: "Drive", engine: str) -> None:
         if n[at.ROTOR] >= 0.0:
             lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
         holds = force[:, i] < 0.95 * n[at.GRIP] * load
-        damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
+        damped = holds * stiffness * lightness / np.maximum(np.abs(tread), FADING_SPEED)
         if step * damped.max() > LIMIT:
             row = int(np.argmax(step * damped > LIMIT))
             raise RunFailed(

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, Series, by_cells, by_steps, not_estimated, size_of, stated, summed
+from models.core.discretisation import (
+    Estimate,
+    Series,
+    by_cells,
+    by_steps,
+    not_estimated,
+    size_of,
+    stated,
+    summed_error,
+)
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
@@ -136,7 +145,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     if adaptive is not None:
         run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, asked.speed, adaptive))
         return not_estimated(run, NO_ESTIMATE) if error else run
-    drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
+    drive = drive_run(engine, handling, asked.speed, asked.duration, scene.run.step)
     labelled = judged_drive(scene, engine, name, drive)
     return _with_error(labelled, drive, asked.speed) if error else labelled
 
@@ -173,7 +182,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     }
     by_step, how = by_steps(Series(fine.times, moving), rerun, ORDER, rerun.step)
     by_net = rerun.by_cells(list(moving))
-    told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
+    told = {name: replace(summed_error(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
     return stated(run, told, f"{how}, and other nets of the patch")
 
 
@@ -199,7 +208,7 @@ class ManoeuvreRerun:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
         step = factor * self.step
-        return principal(driven(self.engine, changed, self.speed, steps * step, step))
+        return principal(drive_run(self.engine, changed, self.speed, steps * step, step))
 
     def __call__(self, factor: float, share: float) -> Series:
         """Run the manoeuvre again in twice the step, or its second half in half the step (see
@@ -213,7 +222,7 @@ class ManoeuvreRerun:
         later = _later(handling, run.times[first])
         model = build(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])
-        return principal(read(later, path, self.engine), run.times[first])
+        return principal(read_run(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
         """Errors of the net, by a run in the same steps with a third of its cells.
@@ -295,17 +304,17 @@ def driven_by(handling: Handling) -> Driven:
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
 
-def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
+def drive_run(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
     """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
     model = build(engine, handling, Settings("RK4", step, duration))
     begun = time.process_time()
     with _turning_over(handling, engine):
         path = model.run(*handling.straight(speed))
-    return read(handling, path, engine, time.process_time() - begun)
+    return read_run(handling, path, engine, time.process_time() - begun)
 
 
 def driven_adaptively(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
-    """``driven`` by an integrator of "exudyn" or "reference" that picks its own steps."""
+    """``drive_run`` by an integrator of "exudyn" or "reference" that picks its own steps."""
     from models.engines.free_vehicle_adaptive import march_adaptively
 
     model, begun = build(engine, handling), time.process_time()
@@ -326,7 +335,7 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
         raise
 
 
-def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
     """``reported``, of a run in fixed steps; RunFailed where they cannot follow."""
     drive = reported(handling, run, engine, seconds)
     check_step(drive, engine)

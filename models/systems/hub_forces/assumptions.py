@@ -147,14 +147,18 @@ def _balanced(vehicle: CutVehicle) -> Assumption:
         "balance",
         "over the run the vertical forces carry the weight",
         "correct the loads of the vehicle file, or the columns of forces.file",
-        lambda run: {"all hubs": carried(sum(_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1])},
+        lambda run: {
+            "all hubs": carried_weight_share(
+                sum(_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1]
+            )
+        },
         "of the weight",
         1.0 - BALANCE,
         1.0 + BALANCE,
     )
 
 
-def carried(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
+def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
     """(1,): mean of the vertical forces (n,), N, by the weight, less what may have changed the vertical speed."""
     excess = forces.mean() / vehicle.loads.sum() - 1.0
     return np.array([1.0 + np.sign(excess) * max(abs(excess) - RISING / (GRAVITY * duration), 0.0)])

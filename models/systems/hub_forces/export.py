@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.engines.export import Exported, Subject, of_free
+from models.engines.export import Exported, Subject, export_free_vehicle
 from models.engines.free_vehicle import Driven
 from models.engines.native_parts import divide
 from models.systems.hub_forces.scene import HubScene
@@ -28,4 +28,4 @@ def of_cut(engine: str, vehicle: CutVehicle, subject: Subject, more: list[str]) 
         *(f"force and moment at the hub {hub!r}" for hub in vehicle.hubs),
         *more,
     ]
-    return of_free(engine, driven, subject, left_out)
+    return export_free_vehicle(engine, driven, subject, left_out)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed
+from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
@@ -173,7 +173,7 @@ def errors_of_steps(
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
     order = LIFTING_ORDER if vehicle.uncut.lifts else ORDER
-    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), rerun, order, step)
+    told, how = by_steps(fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step)
     return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
 
 
@@ -183,7 +183,7 @@ def principal(vehicle: CutVehicle, run: HubRun, since: float = 0.0) -> Series:
     return Series(since + run.times, channels | {"roll": run.states[:, ROLL], "pitch": run.states[:, PITCH]})
 
 
-def _moving(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
+def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Channels whose values are more than a small share of the largest channel's in the same unit."""
     change = {name: float(np.std(values)) for name, values in channels.items()}
     most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
@@ -226,7 +226,7 @@ def run(
     if (
         before := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much
-        told = {name: summed(told[name], before[name]) for name in told if name in before and name not in ANGLES}
+        told = {name: summed_error(told[name], before[name]) for name in told if name in before and name not in ANGLES}
     return stated(result, told, how)
 
 

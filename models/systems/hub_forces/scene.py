@@ -14,7 +14,7 @@ from models.core.signals import Interpolation
 from models.core.steps import divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
-from models.core.time_series import CHASSIS, other_unit, read_time_series
+from models.core.time_series import CHASSIS_SAMPLE_TIME, other_unit, read_time_series
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED, Route
 from models.engines.error_control import Adaptive, check_engines
@@ -142,9 +142,10 @@ class HubScene(SceneFile):
         columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COMPONENTS.items()}
         path = self.path(self.forces.file, "forces.file")
         forces, period = read_time_series(path, columns)
-        if period > CHASSIS:
+        if period > CHASSIS_SAMPLE_TIME:
             allowed = (
-                f"its samples lie {period:g} s apart, and a vehicle moves within {CHASSIS:g} s: if its times are "
+                f"its samples lie {period:g} s apart, and a vehicle moves within {CHASSIS_SAMPLE_TIME:g} s: if its "
+                "times are "
                 "in milliseconds, not in seconds, correct the unit that heads them"
             )
             raise InputError(self.file, "forces.file", self.forces.file, allowed)

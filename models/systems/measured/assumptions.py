@@ -6,8 +6,8 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.engines.cut_vehicle import UPRIGHT
-from models.measured.checks.clipped import ends
-from models.systems.hub_forces.assumptions import BALANCE, SMALL, TURNED, carried, inside
+from models.measured.checks.clipped import clipping_extremes
+from models.systems.hub_forces.assumptions import BALANCE, SMALL, TURNED, carried_weight_share, inside
 from models.systems.measured.scene import MeasuredScene
 from models.vehicles.cut_vehicle import CutVehicle
 
@@ -35,7 +35,7 @@ def _in_range(exam: "Examination | None") -> Assumption:
         """Share of samples at an extreme where they pile up, of every channel that is put in."""
         assert exam is not None
         values = {s.name: exam.recording.samples(s) for s in exam.recording.signals if exam.put_in(s)}
-        return {name: np.array([np.isin(each, ends(each)).mean()]) for name, each in values.items()}
+        return {name: np.array([np.isin(each, clipping_extremes(each)).mean()]) for name, each in values.items()}
 
     return Assumption(
         "transducers in range",
@@ -62,7 +62,9 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | No
 
     def balance() -> Watched:
         assert exam is not None
-        return {"all hubs": carried(sum(vertical().values(), np.zeros(1)), vehicle, exam.recording.duration)}
+        return {
+            "all hubs": carried_weight_share(sum(vertical().values(), np.zeros(1)), vehicle, exam.recording.duration)
+        }
 
     filtered = scene.stabilise.method == "kalman"
     remedy = (

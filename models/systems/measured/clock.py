@@ -23,9 +23,9 @@ from models.measured.channel import BLOCK, Source
 from models.measured.columns import Columns
 from models.measured.gaps import without_absurd
 from models.measured.recording import Progress, Recording, no_progress
-from models.measured.resampling import SAME, onto
+from models.measured.resampling import EQUAL_RATES, resample_to
 from models.measured.signal import Signal
-from models.measured.timing import EVEN, Timing, timing
+from models.measured.timing import EVEN_CLOCK_SHARE, Timing, timing
 from models.systems.measured.scene import MeasuredScene
 
 COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
@@ -133,7 +133,7 @@ def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Fi
     """A finding on how all channels were brought onto one clock."""
     ways: dict[str, list[str]] = {}
     for group in groups:
-        faster = group.timing.period < grid.period * (1 - SAME)
+        faster = group.timing.period < grid.period * (1 - EQUAL_RATES)
         way = (
             "as it is" if _is_on_clock(group, grid) else "filtered without phase" if faster else "interpolated linearly"
         )
@@ -196,7 +196,7 @@ def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
     settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
-    if period < fastest.period * (1 - SAME):
+    if period < fastest.period * (1 - EQUAL_RATES):
         slower = f"is faster than the wheel forces, {fastest.rate:g} Hz, which adds nothing"
         raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
@@ -204,9 +204,11 @@ def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
         spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
-    start = float(times[min(np.searchsorted(times, first + settings.start - EVEN * period), len(times) - 1)])
+    start = float(
+        times[min(np.searchsorted(times, first + settings.start - EVEN_CLOCK_SHARE * period), len(times) - 1)]
+    )
     end = last if settings.duration is None else min(last, start + settings.duration)
-    count = int(np.floor((end - start) / period + EVEN)) + 1
+    count = int(np.floor((end - start) / period + EVEN_CLOCK_SHARE)) + 1
     if settings.duration is not None and start + settings.duration > last + period:
         raise InputError(file, "clock.duration", settings.duration, f"the wheel forces last {last - start:.6g} s")
     if count < LEAST:
@@ -253,7 +255,9 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     inside = (at >= 0) & (at < grid.count)
     off = np.abs(clock.times[inside] - grid.start - grid.period * at[inside])
     return (
-        clock.order is None and abs(clock.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
+        clock.order is None
+        and abs(clock.period / grid.period - 1) <= EVEN_CLOCK_SHARE
+        and bool((off <= EVEN_CLOCK_SHARE * grid.period).all())
     )
 
 
@@ -297,6 +301,6 @@ def _resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Pat
         values = raw.read(signal.channel)[slice(None) if clock.order is None else clock.order]
         values, finding = without_absurd(signal, values, clock.times - grid.start)
         absurd += [finding] if finding else []
-        columns.put((signal.name,), 0, onto(clock.times, values, clock.period, grid.times)[:, None])
+        columns.put((signal.name,), 0, resample_to(clock.times, values, clock.period, grid.times)[:, None])
     raw.remove()
     return absurd

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.finding import FEW, Finding
+from models.core.finding import LISTED_FINDINGS, Finding
 from models.drift.score import Verdict, rms
 from models.fatigue.damage import SLOPE, damage_ratio
 from models.measured.checks.spikes import spikes
@@ -109,14 +109,14 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
 
 
 def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
-    """A text each; where more than FEW are of one check only the worst, which says of how many."""
+    """A text each; where more than LISTED_FINDINGS are of one check only the worst, which says of how many."""
     kinds: dict[str, list[Consequence]] = {}
     for consequence in consequences:
         kinds.setdefault(consequence.finding.check, []).append(consequence)
     out = list[str]()
     for alike in kinds.values():
         worst = max(alike, key=lambda each: (each.grade, np.nan_to_num(abs(each.force))))
-        out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > FEW else map(str, alike)
+        out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > LISTED_FINDINGS else map(str, alike)
     return out
 
 
@@ -203,7 +203,7 @@ def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, pe
     return {first: samples[second], second: samples[first]}
 
 
-def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     """Samples without spikes of one or two samples."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
@@ -234,7 +234,7 @@ CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Sam
     "offset": _offset,
     "lever": _referred,
     "exchanged": _exchanged,
-    "spikes": _smooth,
+    "spikes": _without_spikes,
     "gaps": _bridged,
     "no value": _bridged,
 }

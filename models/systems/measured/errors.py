@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed
+from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed_error
 from models.systems.hub_forces.run import LEAST, ORDER
 from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import Outcome, SectionRun
@@ -44,7 +44,7 @@ def errors_of_steps(
         )
         told[name] = rescaled(scaled, size_of(outcome.samples(name)), grid.step)
         if element in before:
-            told[name] = summed(told[name], before[element])
+            told[name] = summed_error(told[name], before[element])
     shutil.rmtree(folder, ignore_errors=True)
     return told
 

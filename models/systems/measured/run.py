@@ -221,13 +221,13 @@ def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, 
             write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
         scene = load(folder / "scene.toml")
         seconds["virtual measurement"] = time.perf_counter() - begun
-    recording = read(scene, folder / WORK, lambda text, part: progress(text, 0.2 * part))
+    recording = read_files(scene, folder / WORK, lambda text, part: progress(text, 0.2 * part))
     exam = Examination(scene, rig, engine, recording, virtual, holds_of(scene, recording), seconds=seconds)
     _lap(exam, "reading", begun)
     return exam
 
 
-def read(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
+def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
     """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
     sources, rig = opened(scene), scene.rig()
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)

@@ -86,7 +86,7 @@ class Sections:
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
         sliding, kept = _sliding(self.vehicle, self.frame), list[tuple[int, Answer]]()
-        for column, answer in enumerate(_answers(self.vehicle, self.frame, self.points)):
+        for column, answer in enumerate(_kernel_columns(self.vehicle, self.frame, self.points)):
             asked = self.wanted is None or answer.section in ("", *self.wanted)
             if asked and answer.name not in sliding:
                 kept.append((column, answer))
@@ -120,7 +120,7 @@ def guided(vehicle: CutVehicle) -> tuple[str, ...]:
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 
-def _answers(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]) -> Iterator[Answer]:
+def _kernel_columns(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]) -> Iterator[Answer]:
     """Every column of the kernel's row."""
     chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:

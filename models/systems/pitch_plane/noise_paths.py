@@ -21,7 +21,7 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import module_of
 from models.core.steps import divides
-from models.core.systems import DEFAULT
+from models.core.systems import DEFAULT_SYSTEM
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
@@ -60,7 +60,7 @@ class NoisePaths:
         assembly = self.base
         for name, p in self.rest:
             with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
-            assembly = module_of(DEFAULT, name).extend(assembly, with_path)
+            assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
@@ -140,21 +140,21 @@ def noise_paths(
         truth = build("reference", assemble(quiet), settings_of(quiet, "reference")).run().states[:, 3]
     if truth.shape != (settings.steps + 1,):
         raise InputError(scene.file, "truth", list(truth.shape), f"must have one pitch per step: {settings.steps + 1}")
-    return NoisePaths(base, rest, engine, settings, _rows(scene, settings, times), truth, threshold)
+    return NoisePaths(base, rest, engine, settings, _step_rows(scene, settings, times), truth, threshold)
 
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
-        module = module_of(DEFAULT, name)
+        module = module_of(DEFAULT_SYSTEM, name)
         if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
             unshared.append(name)
     shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in unshared}})
     return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in unshared)
 
 
-def _rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
+def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
     """Steps at the asked times."""
     for time in times:
         if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not divides(settings.step, time)):

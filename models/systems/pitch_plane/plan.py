@@ -5,7 +5,7 @@ from models.core.errors import Refused
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.core.scene_effects import module_of
-from models.core.systems import DEFAULT
+from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
@@ -84,7 +84,7 @@ def _channels(assembly: Assembly) -> list[str]:
     names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
     names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
     names += ["inertia_term", "enforced_moment"] if assembly.guided else []
-    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT, name).CHANNELS]
+    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT_SYSTEM, name).CHANNELS]
 
 
 def trust_line(assembly: Assembly) -> list[str]:

@@ -53,7 +53,7 @@ def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
     return np.floor(times * rate + SLACK).astype(np.int64)
 
 
-def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
+def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
     """Sampled values at the sensor's last instant at or before each row, shape (n,).
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
@@ -69,7 +69,7 @@ def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Sce
     """The reading with white noise on each sample: ``sampling_rate``, ``deviation``, ``seed`` and ``path`` of p."""
     number = instant_numbers(times, p.sampling_rate)
     noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
-    return read(times, values, p.sampling_rate, scene, place) + noise[number]
+    return read_samples(times, values, p.sampling_rate, scene, place) + noise[number]
 
 
 def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:

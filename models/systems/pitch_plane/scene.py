@@ -13,7 +13,7 @@ from models.core.scene_effects import legal, module_of, read_tables
 from models.core.scene_file import SceneFile, checked, existing, parse
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity, read
-from models.core.systems import DEFAULT
+from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
 from models.vehicles import pitch_plane
@@ -126,7 +126,7 @@ def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(Scene, table, file, folder)
-    effects = read_tables(scene.effects, DEFAULT, file)
+    effects = read_tables(scene.effects, DEFAULT_SYSTEM, file)
     for name in scene.engines:
         _check_engine(name, scene)
     _check_times(scene)
@@ -206,7 +206,7 @@ def assemble(scene: Scene) -> Assembly:
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
     for name in effects_in_order(scene):
-        assembly = module_of(DEFAULT, name).extend(assembly, scene.effects[name])
+        assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
     return assembly
 
 
@@ -222,7 +222,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
 
 def effects_in_order(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
-    modules = {name: module_of(DEFAULT, name) for name in scene.effects}
+    modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
     legal(modules, scene)
     done: list[str] = []
     waiting = list(modules)

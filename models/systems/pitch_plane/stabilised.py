@@ -21,8 +21,8 @@ from models.core.time_series import write_time_series
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.drift.score import (
     CHANNELS,
-    COARSEST,
-    LEAST,
+    COARSEST_SPACING,
+    FEWEST_ROWS,
     TUMBLED,
     Limits,
     blind_verdict,
@@ -83,9 +83,9 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     check_steps(scene, engines)
-    if scene.run.step > COARSEST or scene.run.duration < LEAST * scene.run.step:
+    if scene.run.step > COARSEST_SPACING or scene.run.duration < FEWEST_ROWS * scene.run.step:
         length = f"{scene.run.duration:g} s by {scene.run.step:g} s"
-        allowed = f"the score takes {LEAST} steps or more, of {COARSEST:g} s or less"
+        allowed = f"the score takes {FEWEST_ROWS} steps or more, of {COARSEST_SPACING:g} s or less"
         raise InputError(scene.file, "run", length, allowed)
     for name, factor in options.factors.items():
         if name not in Parameters.model_fields:

@@ -23,7 +23,7 @@ from numba.extending import register_jitable
 from models.core.signals import Sampled, Smooth
 from models.engines.assembly import Assembly
 from models.engines.reference import compiled
-from models.machine.compiled import named
+from models.machine.compiled import named_closure
 from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
 
@@ -113,7 +113,7 @@ def _step_of(rhs, body, flat):
             for j in range(columns):
                 x[j, q] += step / 6 * (kx[0, j, q] + 2 * kx[1, j, q] + 2 * kx[2, j, q] + kx[3, j, q])
 
-    return register_jitable(named(step_of, rhs.__name__, body, flat))
+    return register_jitable(named_closure(step_of, rhs.__name__, body, flat))
 
 
 def compile_carry(one_step, key):

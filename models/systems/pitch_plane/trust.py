@@ -188,19 +188,19 @@ def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
         times[named] = noise(assembly, added.deviation).passes(angle)
-    times |= _steady(assembly, angle)
+    times |= _steady_drift_time(assembly, angle)
     times["rounding"] = rounding(assembly).passes(angle)
     return Trust(times, growth(assembly).rate, angle, _unchecked(assembly))
 
 
-def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
+def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
     """When the steady accelerations of doubtful forces have moved the vehicle: turned it by the angle, or made it fall
     or rise by as much as that angle moves one axle against the other."""
     if not assembly.doubts:
         return {}
-    from models.measured.axle_forces import steady
+    from models.measured.axle_forces import equilibrium_residual
 
-    p, motion = assembly.parameters, steady(_axles(assembly))
+    p, motion = assembly.parameters, equilibrium_residual(_axles(assembly))
     ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
     return {
         name: math.sqrt(2 * way / abs(acceleration))

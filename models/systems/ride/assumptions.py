@@ -14,7 +14,7 @@ from models.core.assumptions import Assumption, Gaussian, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import AXES, GRAVITY, WatchedMotion, static_loads
-from models.vehicles.spatial import NONE, Curve, SpatialVehicle, SpringDamper
+from models.vehicles.spatial import NO_LIMITS, Curve, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Kinematics, linearise
 
 SMALL = 0.3
@@ -189,7 +189,7 @@ def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
 
 def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
     """Highest frequency (Hz) of motions that deform above all tyres, and the lowest one of all that swing; else 0."""
-    still = replace(vehicle, side_forces=(), drags=(), limits=NONE, gravity=0.0)
+    still = replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS, gravity=0.0)
     linear, motion = linearise(still), Kinematics(still)
     squares, shapes = eigh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
     rows = np.array([motion.shift(tyre.body, tyre.point)[2] for tyre in vehicle.tyres])

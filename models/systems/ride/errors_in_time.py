@@ -9,7 +9,7 @@ from models.core.result import Result
 from models.ride.nonlinear_copies import Copies, coarser_variances
 from models.ride.speed_profile import SpeedProfile
 from models.ride.statistical_linearisation import StatisticallyLinear
-from models.ride.varying_speed import REACH, VaryingSpeed, varying_speed
+from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, VaryingSpeed, varying_speed
 from models.road.excitation import Excitation
 from models.systems.ride.errors import rms
 from models.systems.ride.scene import RideScene
@@ -46,7 +46,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
         wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
         cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
-            linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * REACH
+            linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * LARGEST_RATE_TIMES_STEP
         )
         rows = np.abs(coarse.time[:, None] - wanted).argmin(axis=0)
         return series(coarse.time[rows], coarse.deviation[rows], alone(every)[::every][: len(wanted)])

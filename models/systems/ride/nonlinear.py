@@ -215,7 +215,7 @@ def in_engine(
     begun, every, skipped = time.process_time(), max(1, round(2.0 * STEP / path.step)), sampling.skipped
     if table is None:
         table = path.table(int(np.ceil(sampling.driven / path.step)), sampling.seed)
-    ride = driven(engine, vehicle, path, table, skipped=skipped, every=every)
+    ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=every)
     labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
@@ -260,7 +260,7 @@ def _with_error_of_steps(
         count = int(REPEATED * share * steps / times)
         read = table[:: round(times)] if times >= 1.0 else _road_at_half_spacing(table)
         begin = first * path.step
-        ride = driven(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
+        ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
         return series(ride, begin)
 
     outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
@@ -326,10 +326,10 @@ def ridden(
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     table = road.table(int(np.ceil(duration / road.step)), seed)
-    return driven(engine, vehicle, road, table, skipped=skipped, every=every)
+    return ride_over(engine, vehicle, road, table, skipped=skipped, every=every)
 
 
-def driven(
+def ride_over(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, every: int = 1
 ) -> Ride:
     """Drive over a road that is known by its ``table``, else as ``ridden``."""

@@ -159,7 +159,7 @@ def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, 
 
 
 @contextmanager
-def told_by(scene: RideScene) -> Iterator[None]:
+def scene_errors(scene: RideScene) -> Iterator[None]:
     """Turn a computation's error, which names no file, into an error of the scene's key that caused it."""
     try:
         yield

@@ -12,7 +12,7 @@ from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wh
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import Wheel
 from models.vehicles.plausible import plausible
-from models.vehicles.spatial import NONE, SpatialVehicle
+from models.vehicles.spatial import NO_LIMITS, SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 
 
@@ -101,7 +101,7 @@ def undamped(vehicle: SpatialVehicle) -> list[float]:
     import numpy as np
     from scipy.linalg import eigvalsh
 
-    linear = linearise(replace(vehicle, side_forces=(), drags=(), limits=NONE))
+    linear = linearise(replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS))
     squares = eigvalsh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
     return [float(f) for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)]
 

@@ -15,7 +15,7 @@ from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_sweep
-from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, told_by, vehicle_of
+from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import FEW, Along, Spectral, few_speeds, own_deviations
 from models.vehicles.spatial import SpatialVehicle
@@ -63,9 +63,9 @@ def run(
     The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
     """
     engine = engine or "reference"
-    with told_by(scene):
+    with scene_errors(scene):
         if scene.drive is not None:
-            return _driven(scene, engine, vehicle or vehicle_of(scene), error)
+            return _drive_deviations(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or goes_in_time(scene)):
             return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
@@ -110,7 +110,7 @@ def _deviations_by_speed(
     return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, digit)
 
 
-def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
+def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
     """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
     from models.ride.varying_speed import quasi_stationary, varying_speed
     from models.systems.ride.errors_in_time import with_error_of_drive

@@ -112,7 +112,7 @@ def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, fir
 
 @compiled
 def reports(car: Car, front: Axle, rear: Axle, given: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """(n, 7): lateral acceleration (m/s^2), then load, side force (N) and slip angle (rad) in front, and behind."""
+    """(n, 7): lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad), front first."""
     table = np.empty((len(given), 7))
     for i in range(len(given)):
         answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (given[i, 0], given[i, 1], given[i, 2]))

@@ -33,14 +33,17 @@ the bend, so that a car that is driven at the limit does not spin for a small er
 
 PARAMETERS = (
     "vehicle.yaw_inertia=300:3000",
+    "vehicle.front_brake=0:1",
     "front.stiffness=5:50",
     "front.friction=0.5:3",
     "front.sharpness=1:12",
     "front.side=-0.3:0.3",
+    "front.lift=-2:2",
     "rear.stiffness=5:50",
     "rear.friction=0.5:3",
     "rear.sharpness=1:12",
     "rear.side=-0.3:0.3",
+    "rear.lift=-2:2",
     "sensors.steer_offset=-0.02:0.02",
     "sensors.side_slip_offset=-0.02:0.02",
     "sensors.acceleration_offset=-1:1",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.wheel_on_rail import DEEP
+from models.contact.wheel_on_rail import SURROUNDINGS_DISTANCE
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_cells, not_estimated, stated
 from models.core.errors import InputError, RunFailed
@@ -88,7 +88,8 @@ def run(
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
             contacts.failed[1e3 * shift] = (
-                f"a load of {held.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
+                f"a load of {held.load:g} N presses wheel and rail more than {1e3 * SURROUNDINGS_DISTANCE:g} mm into "
+                "each other"
                 if deep
                 else str(failure)
             )

@@ -10,7 +10,7 @@ from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail import wheel_forces as wf
 from models.rail.equations import ROLL, YAW, Equations, WheelsetPath, Y
-from models.rail.flange_climbing import nadal, shares
+from models.rail.flange_climbing import bound_shares, nadal
 from models.rail.wheelset import Wheelset
 
 LEAST_LOAD = 0.05
@@ -167,7 +167,7 @@ def _no_slip(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
         contacts = path.contacts
         creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
-        used = shares(creep, wheelset.friction * limit)
+        used = bound_shares(creep, wheelset.friction * limit)
         return {"patches": used.max(axis=1)}
 
     return Assumption(
@@ -197,7 +197,7 @@ def _travel(wheelset: Wheelset) -> Assumption:
 
 def _climbs(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
-        part = shares(path.contacts["flange_force"], path.contacts["load"])
+        part = bound_shares(path.contacts["flange_force"], path.contacts["load"])
         return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
 
     return Assumption(

@@ -121,7 +121,7 @@ def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
         raise InputError(table or scene.file, "conicity.amplitudes", amplitude, why)
 
 
-def answer(run_of_scene: Result) -> dict[str, Any]:
+def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
     """Both conicities as plain numbers at each amplitude (m), the wave's centre (m); None where there is no wave."""
     rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
     return {

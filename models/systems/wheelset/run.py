@@ -15,11 +15,11 @@ from models.core.discretisation import Estimate, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, join_results, result
 from models.core.told import gathered
-from models.ensemble.runner import each_of
+from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, places_of
 from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
-from models.rail.limit_cycle import Orbit, Unknown, attained, bifurcation, guess_from_orbit, refined, solved
+from models.rail.limit_cycle import Orbit, Unknown, attained, bifurcation, guess_from_orbit, refined, solved_orbit
 from models.rail.linear import NoCriticalSpeed, critical_or_why
 from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
 from models.systems.wheelset.of_scene import (
@@ -161,7 +161,7 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
                 progress(len(orbits))
         except NoCriticalSpeed as none:
             why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
-            reached = each_of(partial(_reached, scene), speeds.tolist() if none.unstable else [], pool)
+            reached = block_results(partial(_reached, scene), speeds.tolist() if none.unstable else [], pool)
             orbits = [orbit for orbit in reached if orbit is not None]
         except RunFailed as failure:
             why = [f"the branch is followed no further: {failure.reason}"]
@@ -184,7 +184,7 @@ def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> 
         return None
     coarse = replace(orbit, steps=orbit.steps // 2)
     try:
-        return solved(
+        return solved_orbit(
             guess_from_orbit(coarse, replace(orbit.equations, cells=coarser_cells(scene.contact.cells))),
             unknown,
             precise=False,
@@ -224,7 +224,7 @@ def cycles(
     for engine in engines:
         try:
             guess = guess_from_orbit(first, equations_of(scene, engine, speed))
-            orbit = refined(solved(guess, AMPLITUDE, precise=False), AMPLITUDE)
+            orbit = refined(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
             results[engine] = _one_period(scene, engine, orbit, error)
         except RunFailed as failure:
             failed[engine] = str(failure)

@@ -8,9 +8,9 @@ from validation.measured.measured_files.odd import (
     COUNT,
     FX,
     FZ,
-    MANY,
+    MANY_CHANNELS,
+    REPEATED_NAME,
     TIMES,
-    TWICE,
     Files,
     Make,
     altered,
@@ -24,19 +24,19 @@ from validation.measured.measured_files.odd import (
 HEADER = "time [s],Fz [N],Fx [N]"
 
 
-def rows(separator: str = ",", end: str = "\n") -> list[str]:
+def csv_rows(separator: str = ",", end: str = "\n") -> list[str]:
     """Rows of the usual file."""
     return [separator.join(map(repr, row)) + end for row in zip(TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)]
 
 
 def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "utf-8") -> Make:
     """Make a file of a header and rows."""
-    return raw((header + "\n" + "".join(rows() if body is None else body)).encode(encoding))
+    return raw((header + "\n" + "".join(csv_rows() if body is None else body)).encode(encoding))
 
 
-def changed(index: int, row: str) -> list[str]:
+def changed_rows(index: int, row: str) -> list[str]:
     """The rows with one of them changed."""
-    return [*rows()[:index], row + "\n", *rows()[index + 1 :]]
+    return [*csv_rows()[:index], row + "\n", *csv_rows()[index + 1 :]]
 
 
 def folder_of_that_name(folder: Path) -> Path:
@@ -54,16 +54,16 @@ def holes() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 def whole() -> str:
     """Return the usual file as text."""
-    return HEADER + "\n" + "".join(rows())
+    return HEADER + "\n" + "".join(csv_rows())
 
 
 BACK = np.where(np.arange(COUNT) < 20, TIMES, TIMES - 0.1)
 GAP = [
     row if not 10 <= i < 20 else ",".join((row.split(",")[0], ("", "nan")[i % 2], row.split(",")[2]))
-    for i, row in enumerate(rows())
+    for i, row in enumerate(csv_rows())
 ]
 BACKWARDS = [f"{t!r},{z!r},{x!r}\n" for t, z, x in zip(BACK.tolist(), FZ.tolist(), FX.tolist(), strict=True)]
-GERMAN = [row.replace(".", ",") for row in rows(";")]
+GERMAN = [row.replace(".", ",") for row in csv_rows(";")]
 UMLAUTS = {"Kraft Räder": (TIMES, FZ), "Größe": (TIMES, FX)}
 
 REFUSED: Files = {
@@ -93,33 +93,33 @@ REFUSED: Files = {
     ),
     "CSV with commas for both": (
         "0,01,1000,25 is five columns or two",
-        text(HEADER, [row.replace(".", ",") for row in rows()]),
+        text(HEADER, [row.replace(".", ",") for row in csv_rows()]),
         "3 values are needed",
     ),
     "CSV whose decimal sign changes": (
         "what held for the first rows does not hold",
-        text(HEADER.replace(",", ";"), GERMAN * 100 + rows(";")),
+        text(HEADER.replace(",", ";"), GERMAN * 100 + csv_rows(";")),
         "decimal sign",
     ),
-    "CSV with a short row": ("a reader fills it up with NaN", text(body=changed(30, "0.3,1000.5")), "line 32"),
+    "CSV with a short row": ("a reader fills it up with NaN", text(body=changed_rows(30, "0.3,1000.5")), "line 32"),
     "CSV with a long row": (
         "a reader shifts the columns",
-        text(body=changed(30, "0.3,1.0,2.0,3.0")),
+        text(body=changed_rows(30, "0.3,1.0,2.0,3.0")),
         "3 values are needed, found 4",
     ),
     "CSV with inf": (
         "it passes every comparison with a bound",
-        text(body=changed(30, "0.3,inf,1.0")),
+        text(body=changed_rows(30, "0.3,inf,1.0")),
         "channel 'Fz', sample 30",
     ),
     "CSV with a word in a cell": (
         "a reader makes a column of texts",
-        text(body=changed(30, "0.3,overload,1.0")),
+        text(body=changed_rows(30, "0.3,overload,1.0")),
         "line 32",
     ),
     "CSV with a letter of a number in a cell": (
         "e and n are letters of numbers",
-        text(body=changed(30, "0.3,1e,1.0")),
+        text(body=changed_rows(30, "0.3,1e,1.0")),
         "line 32, column 'Fz [N]'",
     ),
     "CSV without a clock": ("rows have no times", text("a [s],Fz [N],Fx [N]"), "time [s]"),
@@ -138,7 +138,7 @@ NAMED: Files = {
     "CSV cut within a number": ("a number that lost digits is still a number", raw(whole()[:-5].encode()), "cut off"),
     "CSV cut at a line end": (
         "nothing in the rows shows it",
-        altered(plain(".csv"), lambda data: data[: -len(rows()[-1])]),
+        altered(plain(".csv"), lambda data: data[: -len(csv_rows()[-1])]),
         "cut off",
     ),
     "CSV that ends in zero bytes": ("the recorder lost power", raw(whole().encode() + bytes(5000)), "cut off"),
@@ -157,7 +157,7 @@ NAMED: Files = {
         "the first or the last is taken",
         text("time [s],Fz [N],Fz [N]"),
         "2 channels are called 'Fz'",
-        TWICE,
+        REPEATED_NAME,
     ),
     "CSV with a start without zone": (
         "eight o'clock where",
@@ -172,7 +172,7 @@ RIGHT: Files = {
     "CSV with line ends of Windows": ("the last column keeps a character", raw(whole().replace("\n", "\r\n").encode())),
     "CSV with umlauts": ("names beyond ASCII", text("time [s],Kraft Räder [N],Größe [N]"), UMLAUTS),
     "CSV in UTF-16": ("every second byte is zero", raw(whole().encode("utf-16"))),
-    "CSV of 300 channels": ("long lines", wide(".csv"), MANY),
+    "CSV of 300 channels": ("long lines", wide(".csv"), MANY_CHANNELS),
     "CSV with empty cells and nan": ("nothing was measured for ten samples", text(body=GAP), holes()),
     "CSV whose clock goes back": ("sorting would hide it", text(body=BACKWARDS), {"Fz": (BACK, FZ), "Fx": (BACK, FX)}),
     "CSV with milliseconds": (

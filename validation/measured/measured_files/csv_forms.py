@@ -6,12 +6,12 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from validation.measured.measured_files.csv import holes
-from validation.measured.measured_files.odd import FX, FZ, TIMES, TWICE, Files, Truth, every, raw, usual
+from validation.measured.measured_files.odd import FX, FZ, REPEATED_NAME, TIMES, Files, Truth, every, raw, usual
 
 BEGAN = datetime(2026, 3, 2, 9, 30, 0)
 DAY_END = datetime(2026, 3, 2, 23, 59, 59, 900_000)
 HEADINGS = ("time [s]", "Fz [N]", "Fx [N]")
-BARE = ("Time", "Fz", "Fx")
+BARE_HEADINGS = ("Time", "Fz", "Fx")
 UNITS = ("s", "N", "N")
 HOLE = range(10, 20)
 """Rows in which some forms have no force."""
@@ -119,13 +119,23 @@ READ: tuple[tuple[str, str, Form, Truth], ...] = (
     ),
     ("spaces around the numbers", "columns are padded", Form(separator=" , "), usual()),
     ("200 titles", "headers of data sets are long", Form(above=tuple(f"channel {i}: Fz" for i in range(200))), usual()),
-    ("units beneath the headings", "a row of words among the numbers", Form(BARE, between=(",".join(UNITS),)), usual()),
-    ("units in brackets beneath", "brackets of their own", Form(BARE, between=("[s],[N],[N]",)), usual()),
-    ("units beneath and an empty line", "numbers begin three lines below", Form(BARE, between=("s,N,N", "")), usual()),
+    (
+        "units beneath the headings",
+        "a row of words among the numbers",
+        Form(BARE_HEADINGS, between=(",".join(UNITS),)),
+        usual(),
+    ),
+    ("units in brackets beneath", "brackets of their own", Form(BARE_HEADINGS, between=("[s],[N],[N]",)), usual()),
+    (
+        "units beneath and an empty line",
+        "numbers begin three lines below",
+        Form(BARE_HEADINGS, between=("s,N,N", "")),
+        usual(),
+    ),
     (
         "milliseconds by the row of units",
         "taken for seconds, every rate is 1000 times too slow",
-        Form(BARE, between=("ms,N,N",), times=MILLI),
+        Form(BARE_HEADINGS, between=("ms,N,N",), times=MILLI),
         usual(),
     ),
     (
@@ -137,7 +147,7 @@ READ: tuple[tuple[str, str, Form, Truth], ...] = (
     (
         "two rows beneath the headings",
         "types stand above the units",
-        Form(BARE, between=("double,double,double", "s,N,N")),
+        Form(BARE_HEADINGS, between=("double,double,double", "s,N,N")),
         usual(),
     ),
     ("every cell in quotes", "numbers look like texts", Form(quoted=True), usual()),
@@ -248,8 +258,13 @@ TWO_MEANINGS: tuple[tuple[str, str, Form, str], ...] = (
     ),
     ("no header", "the first row is one of numbers", Form(("0.0", "1.0", "2.0")), "begins with numbers"),
     ("units that differ", "N above, kN beneath", Form(between=("s,kN,N",)), "name one unit"),
-    ("a time without unit, above units of the forces", "s or ms", Form(BARE, between=(",N,N",)), "write Time [s]"),
-    ("a time without unit", "s or ms", Form(BARE), "write Time [s]"),
+    (
+        "a time without unit, above units of the forces",
+        "s or ms",
+        Form(BARE_HEADINGS, between=(",N,N",)),
+        "write Time [s]",
+    ),
+    ("a time without unit", "s or ms", Form(BARE_HEADINGS), "write Time [s]"),
     ("sep= of bars", "a separator that few use", Form(above=("sep=|",), separator="|"), "can part the columns"),
     ("a number with its unit", "1000 N in a cell", Form(gap="1000 N"), "line 12, column 'Fz [N]'"),
     ("overload in a cell", "it was measured, and too large", Form(gap="overload"), "a number is needed"),
@@ -281,7 +296,7 @@ NAMED: Files = {
         "Fz of which wheel",
         Form(("time [s]", "Fz [N]", "Fz [N]")).make,
         "2 channels are called 'Fz'",
-        TWICE,
+        REPEATED_NAME,
     ),
     "CSV: units of Windows-1252": ("the bytes are no UTF-8", UNKNOWN.make, "Windows-1252"),
 }

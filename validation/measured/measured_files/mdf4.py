@@ -13,9 +13,9 @@ from validation.measured.measured_files.odd import (
     COUNT,
     FX,
     FZ,
-    MANY,
+    MANY_CHANNELS,
+    REPEATED_NAME,
     TIMES,
-    TWICE,
     TWO_RATES,
     Files,
     Make,
@@ -69,8 +69,8 @@ def signals(
     return make
 
 
-USUAL = {"Fz": FZ, "Fx": FX}
-MDF4, MDF3 = plain(".mf4"), signals(USUAL, version="3.30")
+USUAL_CHANNELS = {"Fz": FZ, "Fx": FX}
+MDF4, MDF3 = plain(".mf4"), signals(USUAL_CHANNELS, version="3.30")
 
 
 def block(data: bytes, kind: bytes) -> int:
@@ -119,9 +119,9 @@ def only(name: str, values: np.ndarray, times: np.ndarray = TIMES) -> Truth:
     return {name: (times, values)}
 
 
-WHOLE = np.arange(COUNT, dtype="i2")
+WHOLE_NUMBERS = np.arange(COUNT, dtype="i2")
 INVALID = np.arange(COUNT) % 11 == 3
-LOST = np.where(FX < -50.0, np.nan, FZ)
+LOST_SAMPLES = np.where(FX < -50.0, np.nan, FZ)
 
 STOPPED = np.where(np.arange(COUNT) == 9, np.nan, TIMES)
 
@@ -174,7 +174,7 @@ REFUSED: Files = {
     "MDF 4 over the angle of a shaft": ("the clock counts radians", clocked(1, b"\2"), "does not count seconds"),
     "MDF 4 that claims to be a terabyte when unpacked": (
         "a reader makes room for it",
-        changed(b"##DZ", 8, struct.pack("<Q", 2**40), signals(USUAL, compression=2)),
+        changed(b"##DZ", 8, struct.pack("<Q", 2**40), signals(USUAL_CHANNELS, compression=2)),
         "packed bytes",
     ),
     "MDF 4 with inf": (
@@ -200,11 +200,11 @@ NAMED: Files = {
         "one in each group",
         signals({"Fz": FZ}, {"Fz": FX}),
         "2 channels are called 'Fz'",
-        TWICE,
+        REPEATED_NAME,
     ),
     "MDF 4 with a start without zone": (
         "eight o'clock where",
-        signals(USUAL, start=datetime(2026, 11, 21, 8)),
+        signals(USUAL_CHANNELS, start=datetime(2026, 11, 21, 8)),
         "is not used",
     ),
     "MDF 4 called odd.tdms": ("the extension says otherwise", called(".mf4", "odd.tdms"), "extension"),
@@ -212,9 +212,9 @@ NAMED: Files = {
 RIGHT: Files = {
     "MDF 3": (
         "another layout, the same samples",
-        signals(USUAL, version="3.30", start=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
+        signals(USUAL_CHANNELS, version="3.30", start=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
     ),
-    "MDF 4 packed": ("samples are deflated", signals(USUAL, compression=2)),
+    "MDF 4 packed": ("samples are deflated", signals(USUAL_CHANNELS, compression=2)),
     "MDF 4 of two rates": ("a common clock does not exist", two_rates(".mf4"), TWO_RATES),
     "MDF 4 with invalid samples": (
         "their values look like any other",
@@ -223,12 +223,16 @@ RIGHT: Files = {
     ),
     "MDF 4 of whole numbers": (
         "digits, a factor and an offset",
-        signals({"Fz": {"samples": WHOLE, "conversion": {"a": 0.5, "b": -3.0}}}),
-        only("Fz", 0.5 * WHOLE - 3.0),
+        signals({"Fz": {"samples": WHOLE_NUMBERS, "conversion": {"a": 0.5, "b": -3.0}}}),
+        only("Fz", 0.5 * WHOLE_NUMBERS - 3.0),
     ),
     "MDF 4 with umlauts": ("names beyond ASCII", signals({"Kraft Räder/Ω": FZ}), only("Kraft Räder/Ω", FZ)),
-    "MDF 4 of 300 channels": ("long records", wide(".mf4"), MANY),
-    "MDF 4 with NaN": ("nothing was measured for a while", signals({"Fz": LOST, "Fx": FX}), usual(Fz=LOST)),
+    "MDF 4 of 300 channels": ("long records", wide(".mf4"), MANY_CHANNELS),
+    "MDF 4 with NaN": (
+        "nothing was measured for a while",
+        signals({"Fz": LOST_SAMPLES, "Fx": FX}),
+        usual(Fz=LOST_SAMPLES),
+    ),
     "MDF 4 whose clock goes back": ("sorting would hide it", signals({"Fz": FZ}, times=BACK), only("Fz", FZ, BACK)),
 }
 GREEDY = (

@@ -28,12 +28,12 @@ COUNT, PERIOD = 40, 0.01
 TIMES = PERIOD * np.arange(COUNT)
 FZ, FX = 1000.0 + 2.0**-6 * np.arange(COUNT), -2.5 * np.arange(COUNT)
 """Values with a few bits, which every format keeps exactly."""
-SLOW = 0.05
+SLOW_PERIOD = 0.05
 """s between samples of a channel of another rate."""
-TWO_RATES = {"Fz": (TIMES, FZ), "Fx": (SLOW * np.arange(COUNT), FX)}
-MANY = {f"c{i}": (TIMES, FZ + i) for i in range(300)}
+TWO_RATES = {"Fz": (TIMES, FZ), "Fx": (SLOW_PERIOD * np.arange(COUNT), FX)}
+MANY_CHANNELS = {f"c{i}": (TIMES, FZ + i) for i in range(300)}
 """Truth of files of two rates, and of 300 channels."""
-TWICE = {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)}
+REPEATED_NAME = {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)}
 """Truth of a file that has the same name twice."""
 TOLERANCE = 1e-12
 """Of times and values alike: CSV writes times with 15 digits, the values are kept to the last bit."""
@@ -174,8 +174,8 @@ def plain(extension: str) -> Make:
 
 def wide(extension: str) -> Make:
     """Make a file of 300 channels."""
-    table = np.column_stack([values for _, values in MANY.values()])
-    return lambda folder: written(folder / f"odd{extension}", tuple(MANY), table)
+    table = np.column_stack([values for _, values in MANY_CHANNELS.values()])
+    return lambda folder: written(folder / f"odd{extension}", tuple(MANY_CHANNELS), table)
 
 
 def altered(make: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
@@ -196,7 +196,7 @@ def patched(data: bytes, place: int, new: bytes) -> bytes:
 
 def two_rates(extension: str) -> Make:
     """Make a file of two groups of different rates."""
-    clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW, FX))
+    clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
 
     def make(folder: Path) -> Path:
         groups = [

@@ -9,8 +9,8 @@ from validation.measured.measured_files.odd import (
     FX,
     FZ,
     PERIOD,
+    REPEATED_NAME,
     TIMES,
-    TWICE,
     Files,
     Make,
     altered,
@@ -68,7 +68,7 @@ def padded(count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return {name: (times, np.pad(values, more, mode="edge")) for name, (_, values) in usual().items()}
 
 
-WHOLE = {"Fz": (TIMES, 2.0**-6 * np.arange(COUNT)), "Fx": (TIMES, FX)}
+WHOLE_NUMBERS = {"Fz": (TIMES, 2.0**-6 * np.arange(COUNT)), "Fx": (TIMES, FX)}
 REFUSED: Files = {
     "RPC III cut in its header": (
         "the parameters are incomplete",
@@ -149,7 +149,7 @@ NAMED: Files = {
         "the last one hides the first",
         with_parameters(DESC_CHAN_2="Fz"),
         "2 channels are called 'Fz'",
-        TWICE,
+        REPEATED_NAME,
     ),
     "RPC III with a channel without a name": (
         "nothing to map",
@@ -172,7 +172,7 @@ RIGHT: Files = {
     "RPC III of 16 bits": (
         "digits times a scale of either sign",
         altered(SCALED, lambda data: data[: -2 * POINTS * 4] + DIGITS.tobytes()),
-        WHOLE,
+        WHOLE_NUMBERS,
     ),
     "RPC III with umlauts": (
         "bytes beyond ASCII",

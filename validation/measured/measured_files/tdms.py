@@ -11,9 +11,9 @@ from validation.measured.measured_files.odd import (
     COUNT,
     FX,
     FZ,
-    MANY,
+    MANY_CHANNELS,
     PERIOD,
-    SLOW,
+    SLOW_PERIOD,
     TIMES,
     TWO_RATES,
     Files,
@@ -195,7 +195,7 @@ RIGHT: Files = {
     "TDMS of two rates": ("a common clock does not exist", two_rates(".tdms"), TWO_RATES),
     "TDMS of two rates in one group": (
         "the clock belongs to the channel",
-        channels(one("Fz", FZ), one("Fx", FX, wf_increment=SLOW)),
+        channels(one("Fz", FZ), one("Fx", FX, wf_increment=SLOW_PERIOD)),
         TWO_RATES,
     ),
     "TDMS of two starts": (
@@ -223,7 +223,7 @@ RIGHT: Files = {
         channels(("Größe 'a'", "Kraft 'Räder'/Ω", FZ, CLOCK)),
         prefix(**{"Kraft 'Räder'/Ω": FZ}),
     ),
-    "TDMS of 300 channels": ("a long description", wide(".tdms"), MANY),
+    "TDMS of 300 channels": ("a long description", wide(".tdms"), MANY_CHANNELS),
     "TDMS with NaN": (
         "nothing was measured for a while",
         channels(one("Fz", np.where(FX < -50, np.nan, FZ)), one("Fx", FX)),

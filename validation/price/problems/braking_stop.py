@@ -18,21 +18,21 @@ from models.advice.price.problem import Setting
 from models.brake.brake import PAPER_FRONT, of_wheels
 from models.brake.controller import SAMPLE, Command, Controller, Sample
 from models.brake.controllers import CONTROLLERS
-from models.brake.pressure import Chambers, by_valves, still
+from models.brake.pressure import Chambers, by_valves, resting_chambers
 from models.brake.quarter import braked
 from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
-from validation.braking.quarter_stops import FRONT, Change, Curve, marched
+from validation.braking.quarter_stops import FRONT, Change, Curve, marched_quarter
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
 """Surfaces, where the second begins (m), speed at the start (m/s)."""
-FINE = 64
+REPLAY_SUBSTEPS = 64
 """Substeps of the run whose valves are replayed."""
-MORE = 40
+EXTRA_SAMPLES = 40
 """Samples for which the last valves are kept: time for schemes that stop late."""
 OURS, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
 WALKS = {OURS: 2, EULER: 1, RK4: 4, LITERAL: 1}
@@ -41,10 +41,10 @@ DEFAULTS = {(OURS, Braked.substeps): "twinrig", (LITERAL, 1): "paper"}
 """Whose default a method with so many steps in a sample is."""
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
-FULL = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
+FULL_STEPS = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
 QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
-"""The named share of FULL that the quick report takes, from half the speed; the paper's own single step is far from
-where its order shows."""
+"""The named share of FULL_STEPS that the quick report takes, from half the speed; the paper's own single step is far
+from where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
 """Reference solvers with their relative tolerances, by ``quick``: a Runge-Kutta method and a multistep one."""
 
@@ -120,8 +120,8 @@ class BrakingStop:
         self.uncertainty = {"stopping distance": abs(self.true - other)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL, or its named share QUICK."""
-        chosen = QUICK if quick else FULL
+        """FULL_STEPS, or its named share QUICK."""
+        chosen = QUICK if quick else FULL_STEPS
         return tuple(self.setting("reference", method, SAMPLE / n) for method, some in chosen.items() for n in some)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
@@ -144,9 +144,11 @@ class BrakingStop:
     def _taped(self) -> np.ndarray:
         """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
         tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
-        vehicle = on_tyres(FRONT.plane, self._tables, self._brakes, self._chambers, self._road, substeps=FINE)
+        vehicle = on_tyres(
+            FRONT.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
+        )
         vehicle.run(tape, self.speed)
-        return np.array(tape.valves + [tape.valves[-1]] * MORE)
+        return np.array(tape.valves + [tape.valves[-1]] * EXTRA_SAMPLES)
 
     def _distance_by_scipy(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
@@ -158,7 +160,7 @@ class BrakingStop:
 
     def _torques(self, substeps: int) -> np.ndarray:
         """Torque (N m) at the ends of all steps."""
-        air, part = still(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
+        air, part = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:
             by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, part)
@@ -175,7 +177,7 @@ class BrakingStop:
         number = (EULER, RK4, LITERAL).index(method)
         torques, step = self._torques(substeps), SAMPLE / substeps
         friction = Change(Curve(self.slips, self.mu[0]), Curve(self.slips, self.mu[1]), self.change)
-        way, steps, _ = marched(number, FRONT, torques, friction, self.speed, step)
+        way, steps, _ = marched_quarter(number, FRONT, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return StopResult(way, {"steps": steps, "force calls": WALKS[method] * steps})

@@ -14,9 +14,9 @@ import numpy as np
 from models.advice.price.problem import Setting
 from models.contact.theories import beyond_friction
 from models.systems.contact.work_precision import WAYS, TheorySettings, force_of
-from validation.contact.contact_set import read
+from validation.contact.contact_set import read_contacts
 
-EVERY = 23
+CONTACT_SPACING = 23
 """Every so many contacts of the set stand for all: they go through its ratios of axes, kinds and sizes of creepage."""
 CURVES = {
     "linear theory": ("linear", "theory"),
@@ -32,7 +32,7 @@ CURVES = {
 _STRIPS, _NET = (5, 7, 11, 15, 21, 41, 81, 161), (7, 11, 15, 21, 31, 45)
 CELLS = {"linear theory": (1,), "theory of 1983": _NET, "exact theory": (6, 7, 8, 10, 14, 20)}
 """Cells along each axis of a contact, those of FASTSIM left out."""
-USUAL = ("FASTSIM", 21)
+DEFAULT_ANSWER = ("FASTSIM", 21)
 """What a scene of a contact is answered by if it does not say."""
 
 
@@ -65,7 +65,7 @@ class ContactAlone:
     bound = 100.0
 
     def __init__(self) -> None:
-        self._cases = read()[::EVERY]
+        self._cases = read_contacts()[::CONTACT_SPACING]
         self._ways = {CURVES[way.name]: way for way in WAYS}
         self._forces = np.array([case.force for case in self._cases])
         self.title = f"Creep forces of {len(self._cases)} contacts by every theory of rolling contact"
@@ -84,7 +84,7 @@ class ContactAlone:
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and 1 by its cells."""
         cells = round(1.0 / value)
-        usual = (self._ways[engine, method].name, cells) == USUAL
+        usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 
     def build(self, setting: Setting) -> ContactSolver:

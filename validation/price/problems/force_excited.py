@@ -28,10 +28,10 @@ from validation.price.problems.road_excited import MUJOCO, SPEED, judge, scene, 
 DURATION, RATE = 2.0, 100.0
 """Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
 PERIOD = 1 / RATE
-FINE = PERIOD / 1280
+FINE_STEP = PERIOD / 1280
 """Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
 STEPS = ms(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
-FULL: Curves = {
+FULL_STEPS: Curves = {
     ("reference", "RK4"): STEPS,
     ("exudyn", "RK44"): STEPS[:-1],
     **curves("exudyn", STEPS, "ExplicitMidpoint", "ExplicitEuler"),
@@ -47,7 +47,7 @@ QUICK: Curves = {
     ("exudyn", "ExplicitEuler"): ms(1, 0.5, 0.25),
     ("mujoco", "Euler"): ms(2, 1, 0.5),
 }
-"""The named share of FULL that the quick report takes."""
+"""The named share of FULL_STEPS that the quick report takes."""
 GUIDED: Curves = {
     ("reference", "RK4"): STEPS,
     **curves("exudyn", (*ms(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
@@ -72,7 +72,7 @@ class ForceExcited:
     """The problem with its reference; see ``validation.price.problems.Problem``. ``first`` : of a kind of problem, the
     quantity that tolerances are set on, before the states."""
 
-    key, duration, full, quick = "forces", DURATION, FULL, QUICK
+    key, duration, full, quick = "forces", DURATION, FULL_STEPS, QUICK
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     what = "driven by its wheel forces"
@@ -86,11 +86,11 @@ class ForceExcited:
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.assembly = self.driven()
-        other = Settings("RK4", 2 * FINE, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
-        self.reference = f"RK4 at {1e6 * FINE:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
+        other = Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
+        self.reference = f"RK4 at {1e6 * FINE_STEP:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
         self._true, check = (
             self._sampled(build("reference", self.assembly, settings).run())
-            for settings in (Settings("RK4", FINE, DURATION), other)
+            for settings in (Settings("RK4", FINE_STEP, DURATION), other)
         )
         self.uncertainty = apart(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())

@@ -27,25 +27,25 @@ from validation.price.problems.road_excited import setting, settings_of
 
 DURATION, SPEED = 0.5, 20.0
 """s, m/s"""
-SINES, LONGEST, HEIGHT = 12, 24.0, 0.012
+SINES, LONGEST_SINE, HEIGHT = 12, 24.0, 0.012
 """Of each track; length (m) of the first sine, whose k-th has a k-th of it; its amplitude (m), falling as 1 / k."""
 GOLDEN = 0.6180339887498949
 """Phases of the sines are its multiples: a formula that nobody has to draw."""
-RISE, SOFT = 3.0, 0.5
+RISE_PLACE, RISE_LENGTH = 3.0, 0.5
 """Where the road has half its height (m from the origin), and over what length it rises."""
 GRID = 20e-3
 """Spacing (s) of the instants that are compared, which every step meets."""
 GRAVITY = 9.81
-_LONG = ms(20, 10, 20 / 3, 5, 4, 2)
-_MIDDLE = ms(10, 5, 4, 2.5, 2, 1)
-_SHORT = ms(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
+_LONG_STEPS = ms(20, 10, 20 / 3, 5, 4, 2)
+_MIDDLE_STEPS = ms(10, 5, 4, 2.5, 2, 1)
+_SHORT_STEPS = ms(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
 _NATIVE = ms(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
-FULL: Curves = {
-    ("exudyn", "RK44"): _LONG,
+FULL_STEPS: Curves = {
+    ("exudyn", "RK44"): _LONG_STEPS,
     ("exudyn", "ExplicitMidpoint"): ms(10, 20 / 3, 5, 4, 2.5, 2),
-    ("exudyn", "ExplicitEuler"): _SHORT,
-    ("exudyn", "VelocityVerlet"): _MIDDLE,
-    **curves("exudyn", _LONG, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
+    ("exudyn", "ExplicitEuler"): _SHORT_STEPS,
+    ("exudyn", "VelocityVerlet"): _MIDDLE_STEPS,
+    **curves("exudyn", _LONG_STEPS, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
     **curves("exudyn", (1e-6,), "DOPRI5", "ODE23"),
     ("mujoco", "RK4"): _NATIVE,
     **curves("mujoco", _NATIVE[1:], "Euler", "implicit", "implicitfast", "discrete"),
@@ -61,11 +61,11 @@ REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's
 def heights(place: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
     """Height (m) and slope of a track, 0 the left one and 1 the right one, at places (...) in m along the road."""
     x, k = np.asarray(place, dtype=float), np.arange(1, SINES + 1)
-    angle = 2 * np.pi * (x[..., None] * k / LONGEST + GOLDEN * k * (k + SINES * track))
+    angle = 2 * np.pi * (x[..., None] * k / LONGEST_SINE + GOLDEN * k * (k + SINES * track))
     shape = (HEIGHT / k * np.sin(angle)).sum(axis=-1)
-    slope = 2 * np.pi * HEIGHT / LONGEST * np.cos(angle).sum(axis=-1)
-    rise = 1 / (1 + np.exp(-(x - RISE) / SOFT))
-    return rise * shape, rise * slope + rise * (1 - rise) / SOFT * shape
+    slope = 2 * np.pi * HEIGHT / LONGEST_SINE * np.cos(angle).sum(axis=-1)
+    rise = 1 / (1 + np.exp(-(x - RISE_PLACE) / RISE_LENGTH))
+    return rise * shape, rise * slope + rise * (1 - rise) / RISE_LENGTH * shape
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,8 @@ class FreeVehicle:
         }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL: there is no quick share, of which the reference alone would take seconds."""
-        return each(FULL, self.setting)
+        """FULL_STEPS: there is no quick share, of which the reference alone would take seconds."""
+        return each(FULL_STEPS, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that meets every instant, or a tolerance."""

@@ -28,15 +28,15 @@ TURN = 0.02
 """Steady part of the yaw rate, rad/s: two turns in ten minutes."""
 RULES: dict[str, tuple[Rule, int]] = {"held rates": ("held", 1), "mean rates": ("mean", 2), "cubic rates": ("cubic", 4)}
 """What ``models.sensors.rotations`` offers, and the order."""
-FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
+FIRST_ORDER_METHODS = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 """Methods of first order; all others are of second, because rates are linear between samples."""
 ADAPTIVE = ("DOPRI5", "ODE23")
 """Methods that are there to be refused."""
-_RATES, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
+_RATES, _FEW_RATES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
-FULL: Curves = {
+FULL_RATES: Curves = {
     **curves("reference", _RATES, *RULES),
-    **curves("exudyn", _FEW, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
+    **curves("exudyn", _FEW_RATES, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
     **curves("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
     ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),
     **curves("exudyn", (100.0,), *ADAPTIVE),
@@ -45,8 +45,8 @@ FULL: Curves = {
 }
 """Samples per second of every method; the last two of Exudyn are there to be refused."""
 QUICK: Curves = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
-"""The named share of FULL that the quick report takes."""
-FINE = 5e-3
+"""The named share of FULL_RATES that the quick report takes."""
+FINE_STEP = 5e-3
 """Step (s) of the sixth-order method that the closed form is compared with."""
 
 
@@ -130,18 +130,18 @@ class InertialUnit:
             f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its rates a second"
         )
         self.units = {"attitude": "rad"}
-        self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE:g} ms"
+        self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE_STEP:g} ms"
         self.true = attitude(GRID * np.arange(round(DURATION / GRID) + 1))
-        self.uncertainty = {"attitude": apart(magnus(FINE)[:: round(GRID / FINE)], self.true)}
+        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(GRID / FINE_STEP)], self.true)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL, or its named share QUICK."""
-        return each(QUICK if quick else FULL, lambda engine, method, rate: self.setting(engine, method, 1 / rate))
+        """FULL_RATES, or its named share QUICK."""
+        return each(QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate))
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that meets every instant."""
         step = GRID / np.ceil(GRID / value * (1 - 1e-9))
-        order = RULES[method][1] if engine == "reference" else 1 if method in FIRST else 2
+        order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
         return Setting(
             engine,

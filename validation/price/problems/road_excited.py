@@ -51,18 +51,18 @@ DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Eule
 
 MUJOCO = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
 _STEPS = ms(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
-_TIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-FULL: Curves = {
+_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+FULL_STEPS: Curves = {
     ("reference", "RK4"): _STEPS,
-    ("reference", "DOP853"): (1e-2, *_TIGHT[:-1]),
-    ("reference", "Radau"): (1e-1, 1e-2, *_TIGHT[:-2]),
-    ("reference", "LSODA"): _TIGHT,
+    ("reference", "DOP853"): (1e-2, *_TOLERANCES[:-1]),
+    ("reference", "Radau"): (1e-1, 1e-2, *_TOLERANCES[:-2]),
+    ("reference", "LSODA"): _TOLERANCES,
     ("exudyn", "RK44"): _STEPS,
     ("exudyn", "RK67"): ms(5, 4, 2.5, 2, 1.25, 1, 0.625),
     ("exudyn", "RK33"): ms(5, 4, 2.5, 2, 1.25, 1, 0.5, 0.25),
     **curves("exudyn", _STEPS, "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
     **curves("exudyn", (*ms(10), *_STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
-    ("exudyn", "DOPRI5"): (1e-2, *_TIGHT),
+    ("exudyn", "DOPRI5"): (1e-2, *_TOLERANCES),
     ("exudyn", "DVERK6"): (1e-6,),
     ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
     **curves("mujoco", _STEPS, *MUJOCO),
@@ -79,7 +79,7 @@ QUICK: Curves = {
     ("mujoco", "Euler"): ms(5, 2, 1, 0.5, 0.25),
     **curves("mujoco", ms(2, 1, 0.5), "implicit", "implicitfast"),
 }
-"""The named share of FULL that the quick report takes: each engine's default and fourth-order method, one
+"""The named share of FULL_STEPS that the quick report takes: each engine's default and fourth-order method, one
 adaptive solver, one that is unstable, one that is refused."""
 
 SOLVERS = {True: (("DOP853", 1e-11), ("LSODA", 1e-12)), False: (("DOP853", 1e-13), ("LSODA", 1e-13))}
@@ -121,8 +121,8 @@ def setting(engine: str, method: str, value: float) -> Setting:
 
 
 def settings(quick: bool) -> tuple[Setting, ...]:
-    """FULL, or its named share QUICK."""
-    return each(QUICK if quick else FULL, setting)
+    """FULL_STEPS, or its named share QUICK."""
+    return each(QUICK if quick else FULL_STEPS, setting)
 
 
 def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:

@@ -38,14 +38,14 @@ DURATION = 0.1
 CELLS = 11
 LEVEL = np.array([1.0, 1.0, 0.0, 1.0])
 """The wheel begins at rest on its rail."""
-SMOOTH = 20.0
+SMOOTH_SPEED = 20.0
 """Speed (m/s) from which methods of order two are asked for their order."""
-PLACES = 16
+SLOPE_EVALUATIONS = 16
 """Evaluations behind one set of slopes."""
 MS = 1e-3
 SOLVERS = (("DOP853", 1e-12), ("LSODA", 1e-12))
 """Reference solvers with their relative tolerances."""
-FINER = (0.5, 1, 1.5, 2, 3, 5, 8)
+STEP_RATIOS = (0.5, 1, 1.5, 2, 3, 5, 8)
 """Steps of a run of an explicit method by the fewest with which it is stable; the first is there to be refused."""
 WITH_SLOPES = "with slopes"
 """Exudyn's implicit methods by the slopes of the linear theory; otherwise by its own differences of the forces."""
@@ -54,23 +54,23 @@ EXPLICIT = {
     "exudyn": ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast", "discrete"),
 }
-_LONG = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS, 0.02 * MS)
-_TIGHT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+_LONG_STEPS = (10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS, 0.02 * MS)
+_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 OTHERS: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "DOP853"): _TIGHT[:6],
-    ("reference", "Radau"): (1e-1, 3e-2, *_TIGHT[:4]),
-    ("reference", "LSODA"): _TIGHT,
-    ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
-    ("exudyn", f"GeneralizedAlpha {WITH_SLOPES}"): _LONG,
-    ("exudyn", "TrapezoidalIndex2"): _LONG,
-    ("exudyn", f"TrapezoidalIndex2 {WITH_SLOPES}"): _LONG,
-    ("exudyn", "DOPRI5"): _TIGHT,
-    ("exudyn", "ODE23"): _TIGHT,
+    ("reference", "DOP853"): _TOLERANCES[:6],
+    ("reference", "Radau"): (1e-1, 3e-2, *_TOLERANCES[:4]),
+    ("reference", "LSODA"): _TOLERANCES,
+    ("exudyn", "GeneralizedAlpha 0.9"): _LONG_STEPS,
+    ("exudyn", f"GeneralizedAlpha {WITH_SLOPES}"): _LONG_STEPS,
+    ("exudyn", "TrapezoidalIndex2"): _LONG_STEPS,
+    ("exudyn", f"TrapezoidalIndex2 {WITH_SLOPES}"): _LONG_STEPS,
+    ("exudyn", "DOPRI5"): _TOLERANCES,
+    ("exudyn", "ODE23"): _TOLERANCES,
     ("exudyn", "DVERK6"): (1e-6,),
     ("mujoco", "Euler"): (2 * MS,),
 }
 """Steps and tolerances that do not go by stability; MuJoCo's is its default."""
-LARGEST = 5 * MS
+LARGEST_STEP = 5 * MS
 """Largest step of Exudyn's adaptive solvers, s."""
 QUICK: dict[tuple[str, str], tuple[float, ...]] = {
     ("reference", "RK4"): (0.25 * MS, 0.125 * MS),
@@ -127,7 +127,8 @@ class RollingWheels:
 
     duration = DURATION
     note = (
-        f"Errors at the end. Every set of slopes that is given to an implicit method counts as {PLACES} force "
+        f"Errors at the end. Every set of slopes that is given to an implicit method counts as {SLOPE_EVALUATIONS} "
+        "force "
         "calls; Exudyn's own differences count by themselves."
     )
     tolerances: tuple[float, ...] = (10.0, 1.0, 0.1, 0.01)
@@ -155,13 +156,13 @@ class RollingWheels:
         for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
             like = "Euler" if method == "discrete" else method
             fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
-            curves.append(((engine, method), tuple(DURATION / round(more * fewest) for more in FINER)))
+            curves.append(((engine, method), tuple(DURATION / round(more * fewest) for more in STEP_RATIOS)))
         return curves
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and its step (s) or tolerance."""
         made = setting(engine, method, value)
-        kept = made.order <= (2 if self.wheels.speed >= SMOOTH else 1)
+        kept = made.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made if kept else replace(made, order=0, nominal=made.order)
 
     def build(self, setting: Setting) -> Solver:
@@ -220,9 +221,9 @@ class RollingWheels:
 
     def _exudyn(self, setting: Setting, method: str) -> Solver:
         calls, law = [0], Forces(self.wheels)
-        slopes = counting(law.slopes, calls, PLACES) if setting.method.endswith(WITH_SLOPES) else None
+        slopes = counting(law.slopes, calls, SLOPE_EVALUATIONS) if setting.method.endswith(WITH_SLOPES) else None
         rolling = Rolling(self.wheels, counting(law.of, calls), slopes=slopes)
-        steps = round(DURATION / (LARGEST if setting.adaptive else setting.value))
+        steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 
         def run() -> WheelsetResult:

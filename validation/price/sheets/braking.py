@@ -8,7 +8,7 @@ from models.brake.brake import PAPER_FRONT
 from models.brake.controller import SAMPLE
 from models.brake.plane_vehicle import GRAVITY
 from validation.braking.quarter_stops import FRONT
-from validation.braking.sampled_quarter import EMPTY, FILL, SLOWEST, SUPPLY
+from validation.braking.sampled_quarter import EMPTY, FILL, LAST_SPEED, SUPPLY
 from validation.price.problems import braking_stop
 from validation.price.problems.braking_stop import CHANGE, SPEED, SURFACES
 from validation.price.sheets.page import Value, columns
@@ -32,7 +32,7 @@ Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * 
 with T before that at the start of the sample. Parameters (SI): m = {FRONT.mass:.17g}, r = {FRONT.radius:.17g},
 J = {FRONT.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u / r.
 
-Asked for: the stopping distance. After the first sample that ends at u <= {SLOWEST:g} m/s the wheel stands, and the
+Asked for: the stopping distance. After the first sample that ends at u <= {LAST_SPEED:g} m/s the wheel stands, and the
 rest of the way is u^2 / (2 g mu(1))."""
 
 

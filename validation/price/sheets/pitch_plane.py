@@ -8,7 +8,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.road.study import WINDOW, study_road
 from validation.price.problems import force_excited, road_excited
-from validation.price.problems.force_excited import DURATION, FINE, PERIOD, ForceExcited
+from validation.price.problems.force_excited import DURATION, FINE_STEP, PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
@@ -85,7 +85,7 @@ def ends(problem: ForceExcited) -> list[Value]:
     """Every state at the end, with the largest difference of the two reference solvers over the run."""
     runs = [
         build("reference", problem.assembly, settings).run()
-        for settings in (Settings("RK4", FINE, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
+        for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
     ]
     true, other = (run.states[:: (len(run.states) - 1) // round(DURATION / PERIOD)] for run in runs)
     return _values(problem.key, DURATION, true[-1], np.abs(true - other).max(axis=0))

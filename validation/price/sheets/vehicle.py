@@ -14,10 +14,10 @@ from validation.price.problems.free_vehicle import (
     GOLDEN,
     GRAVITY,
     HEIGHT,
-    LONGEST,
-    RISE,
+    LONGEST_SINE,
+    RISE_LENGTH,
+    RISE_PLACE,
     SINES,
-    SOFT,
     SPEED,
     FreeVehicle,
 )
@@ -49,8 +49,8 @@ coordinate of the body. **Drag** along x at its centre: F = -c v x', x' the rate
 **Road**: at time t a tyre at (x, y) meets the height (m) at s = v t + x, v = {SPEED:g} m/s, of its track, n = 0 on the
 left (y > 0) and 1 on the right:
 
-    z = sum_k {HEIGHT:g} / k sin(2 pi (k s / {LONGEST:g} + {GOLDEN:.16g} k (k + {SINES} n)))
-        / (1 + exp(-(s - {RISE:g}) / {SOFT:g}))
+    z = sum_k {HEIGHT:g} / k sin(2 pi (k s / {LONGEST_SINE:g} + {GOLDEN:.16g} k (k + {SINES} n)))
+        / (1 + exp(-(s - {RISE_PLACE:g}) / {RISE_LENGTH:g}))
 
 with k = 1 .. {SINES}. Start: all coordinates and rates are 0.
 """

@@ -11,7 +11,7 @@ import numpy as np
 from models.core.discretisation import errors_of
 from models.core.errors import RunFailed
 from models.systems.braking import ENGINES
-from models.systems.braking.errors import whole
+from models.systems.braking.errors import motion_and_distance
 from models.systems.braking.march import Braked, BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
@@ -110,7 +110,7 @@ def _sample(scene: BrakingScene, engine: str) -> Sample:
     if errors:
         most = scene.run.model_copy(update={"substeps": FINER * scene.run.substeps})
         truth = run(scene.model_copy(update={"run": most}), "mujoco" if scene.vehicle.file else "reference").detail
-        fine, exact = whole(told.detail, told.times), whole(truth, told.times)
+        fine, exact = motion_and_distance(told.detail, told.times), motion_and_distance(truth, told.times)
         true = {name: float(np.sqrt(np.mean((fine[name] - exact[name]) ** 2))) for name in errors}
     return Sample(scene.title, engine, errors, true, calls[0], sum(calls[1:]))
 

@@ -14,7 +14,7 @@ from models.core.result import Result
 from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import ENGINES, FreeModel
 from models.multibody.forces import CELLS
-from models.systems.handling.run import Drive, driven, principal, run
+from models.systems.handling.run import Drive, drive_run, principal, run
 from models.systems.handling.scene import HandlingScene, build
 from validation.stated_errors.sample import Sample, drawn
 
@@ -73,7 +73,7 @@ def _true_errors(scene: HandlingScene, drive: Drive, engine: str, told: Result) 
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
     truth = principal(
-        driven(engine, fine.handling("drawn"), manoeuvre.speed, manoeuvre.duration, scene.run.step / STEP)
+        drive_run(engine, fine.handling("drawn"), manoeuvre.speed, manoeuvre.duration, scene.run.step / STEP)
     )
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][::STEP]) ** 2)))

@@ -16,9 +16,9 @@ from models.ride.covariance import hits
 from models.ride.excited import excited
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
-from models.ride.varying_speed import REACH, varying_speed
+from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.nonlinear import ORDER, Sampling, driven, in_engine, linearised
+from models.systems.ride.nonlinear import ORDER, Sampling, in_engine, linearised, ride_over
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.run import ANY, run
 from models.systems.ride.scene import RideScene, build
@@ -134,7 +134,9 @@ def _driven(rng: np.random.Generator, number: int) -> Sample:
     engine = str(rng.choice(["reference", *ENGINES]))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
-    fine = varying_speed(linear_vehicle(vehicle)(ANY), road, profile, instants=result.times, reach=REACH / 8.0)
+    fine = varying_speed(
+        linear_vehicle(vehicle)(ANY), road, profile, instants=result.times, reach=LARGEST_RATE_TIMES_STEP / 8.0
+    )
     rows = np.abs(fine.time[:, None] - result.times).argmin(axis=0)
     gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
@@ -183,7 +185,7 @@ def _in_time(rng: np.random.Generator, number: int) -> Sample:
         result = failure.partial
     rows = result.detail.rows * FINER
     every, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
-    fine = driven("mujoco", vehicle, finer, table, skipped=begin, every=every)
+    fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, every=every)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
     calls = ORDER * steps + len(rows)

@@ -8,7 +8,7 @@ from typing import Any
 from models.advice.choice.answer import Answer, Quantity
 from models.core.errors import InputError
 from models.systems.measured.clock import LEAST
-from models.systems.measured.run import Examination, read, run
+from models.systems.measured.run import Examination, read_files, run
 from models.systems.measured.scene import MeasuredScene
 
 ENGINE, WINDOWED = "mujoco", True
@@ -50,7 +50,7 @@ def _clock(scene: MeasuredScene) -> tuple[float, float]:
         whole = scene.virtual.duration - scene.clock.start
         return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(whole, scene.clock.duration or whole)
     with tempfile.TemporaryDirectory() as name:
-        recording = read(scene, Path(name))
+        recording = read_files(scene, Path(name))
         return recording.period, recording.duration
 
 

@@ -9,7 +9,7 @@ from models.advice.choice.answer import Answer, Quantity
 from models.advice.ride_choice.in_time import UNIT, InTime, in_time
 from models.core.errors import InputError
 from models.engines.spatial_protocol import curves
-from models.systems.ride.of_scene import told_by
+from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
@@ -20,7 +20,7 @@ def opened(scene: RideScene | InTime) -> InTime:
     """The scene as it is run in time, which knows its effects and how it is shortened and taken in longer steps."""
     if isinstance(scene, InTime):
         return scene
-    with told_by(scene):
+    with scene_errors(scene):
         return in_time(ReducedScene.complete(scene))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer, Ladder
-from models.advice.price.meshed import chosen, part_of
+from models.advice.price.meshed import chosen, run_and_quantity
 from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.march import BrakingPath
@@ -111,7 +111,7 @@ def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, 
             None,
             "cannot be priced: what stands behind it answers one run; leave it out, with a controller in its place",
         )
-    name, asked = part_of(quantity, USUAL, scene.procedures, "procedure")
+    name, asked = run_and_quantity(quantity, USUAL, scene.procedures, "procedure")
     chosen(asked, QUANTITIES)
     others = [procedure for procedure in scene.procedures if procedure != name]
     note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")

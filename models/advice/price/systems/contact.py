@@ -14,7 +14,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.tables import Block, blocks
 from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, COLUMNS, solved_rows
-from models.systems.contact.run import of_rows, run
+from models.systems.contact.run import run, table_contacts
 from models.systems.contact.scene import ContactScene, Method
 
 ROWS = 1000
@@ -104,7 +104,7 @@ class PricedContact:
             contact = run(self.scene.model_copy(update={"method": method}), error=False)
             values = np.column_stack([contact[name] for name in self.channels])
         else:
-            answered = solved_rows(self.rows, partial(of_rows, self.scene), method, False)["forces"]
+            answered = solved_rows(self.rows, partial(table_contacts, self.scene), method, False)["forces"]
             values = answered[:, [COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
@@ -140,7 +140,7 @@ def _sound_rows(scene: ContactScene) -> Block:
     file = scene.cases_file()
     for block in islice(blocks(file, (BY_AXES, BY_CURVATURES), ROWS), 1):
         coarse = scene.method.model_copy(update={"cells": CELLS[0]})
-        wrong = solved_rows(block, partial(of_rows, scene), coarse, False)["wrong"]
+        wrong = solved_rows(block, partial(table_contacts, scene), coarse, False)["wrong"]
         sound = np.setdiff1d(np.arange(len(block.lines)), wrong)
         if len(sound):
             columns = {name: column[sound] for name, column in block.values.items()}

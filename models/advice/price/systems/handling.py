@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import TIGHT, MeshedScene, chosen, first_part, part_of
+from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, chosen, first_part, run_and_quantity
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, build, driven, judged_drive, read
+from models.systems.handling.run import Drive, build, drive_run, judged_drive, read_run
 from models.systems.handling.scene import HandlingScene
 
 FIRST = 1.0
@@ -45,7 +45,7 @@ class PricedHandling(MeshedScene):
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
         """The manoeuvre in an engine."""
-        return driven(engine, _with_cells(self.handling, cells), self.speed, duration, step)
+        return drive_run(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
         """The drive by DOP853 with the engine's accelerations, an accurate reference."""
@@ -58,12 +58,12 @@ class PricedHandling(MeshedScene):
             start,
             "DOP853",
             np.minimum(times, duration),
-            rtol=TIGHT,
-            atol=TIGHT,
+            rtol=OTHER_TOLERANCE,
+            atol=OTHER_TOLERANCE,
         )
         if not done.success:
             raise RunFailed(self.reference_engine, done.message)
-        return read(handling, Trajectory(times, done.y.T), self.reference_engine)
+        return read_run(handling, Trajectory(times, done.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over time; the drive is judged."""
@@ -84,7 +84,7 @@ class PricedHandling(MeshedScene):
 
 def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedHandling:
     """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
-    name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
+    name, asked = run_and_quantity(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)
     manoeuvre, step, others = (
         scene.manoeuvres[name],

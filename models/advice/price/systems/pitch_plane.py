@@ -193,8 +193,8 @@ def _lengths(assembly: Assembly) -> tuple[float, float]:
 
 def _unit(scene: PricedPitchPlane) -> str:
     """The one unit of the quantity's channels; InputError for what is no channel, or several units."""
-    step = float(scene.assembly.scene.settings("reference").step or 0.0)
-    settings = Settings("RK4", min(step, scene.base), scene.base)
+    longest = float(scene.assembly.scene.settings("reference").step or scene.base)
+    settings = Settings("RK4", scene.base / math.ceil(scene.base / longest * (1 - 1e-9)), scene.base)
     channels = scene.run("reference", settings).data.data_vars
     for name in scene.channels:
         if name not in channels:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import TIGHT, MeshedScene, chosen, first_part
+from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, chosen, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
-from models.rail.equations import STIFF, Equations, WheelsetPath
+from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds, wheelset_of
 from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
@@ -70,8 +70,8 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
         start,
         "DOP853",
         np.minimum(times, duration),
-        rtol=TIGHT,
-        atol=TIGHT * 1e-1 * scale,
+        rtol=OTHER_TOLERANCE,
+        atol=OTHER_TOLERANCE * 1e-1 * scale,
     )
     if not done.success:
         raise RunFailed("reference", done.message)
@@ -86,7 +86,7 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     fastest = max(
         float(np.abs(np.linalg.eigvals(Equations(wheelset, speed, contact.law).state_matrix)).max()) for speed in speeds
     )
-    longest, cells = 0.95 * STIFF / fastest, contact.cells if contact.law == "fastsim" else 0
+    longest, cells = 0.95 * ALLOWED_STEP_RATE / fastest, contact.cells if contact.law == "fastsim" else 0
     note = f"all paths together, at {' and '.join(f'{speed:g}' for speed in speeds)} m/s"
     return PricedWheelset(
         scene.title,

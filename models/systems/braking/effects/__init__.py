@@ -123,9 +123,9 @@ def _with_trailer(table: Table, scene: Any) -> None:
 
 def _tows(scene: Any) -> bool:
     """Whether the vehicle of a file has bodies with a hitch."""
-    from models.systems.braking.of_scene import given_of
+    from models.systems.braking.of_scene import spatial_vehicle_of
 
-    given = given_of(scene)
+    given = spatial_vehicle_of(scene)
     return given is not None and bool(given.towed)
 
 

@@ -16,7 +16,7 @@ from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Channels
 from models.engines.model import Model
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, instant_numbers, read, within_range
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, instant_numbers, read_samples, within_range
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
@@ -80,7 +80,7 @@ class Accelerometers:
     def __call__(self, assembly: Assembly, run: Trajectory, model: Model) -> Channels:
         """Three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
         p, number = self.parameters, instant_numbers(run.times, self.parameters.sampling_rate)
-        row = read(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
+        row = read_samples(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
         values = self._readings(assembly, run, model, np.unique(row))[number]
         return {
             channel: ("m/s^2", f"accelerometer {sensor}, specific force along the chassis' {axis}", values[:, i, j])

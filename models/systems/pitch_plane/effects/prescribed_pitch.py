@@ -52,7 +52,7 @@ def prescribe(
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
-    from models.core.time_series import CHASSIS, read_time_series, sparse
+    from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, sparse
 
     scene = assembly.scene
     _check_scene(scene, columns)
@@ -64,7 +64,7 @@ def prescribe(
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
     guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
-    doubt = sparse(len(values), period, scene.run.duration, CHASSIS)
+    doubt = sparse(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
     return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 
 

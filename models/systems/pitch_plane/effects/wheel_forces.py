@@ -93,9 +93,9 @@ def _doubts_about_forces(
 
 def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
     """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
-    from models.measured.axle_balance import steady
+    from models.measured.axle_balance import equilibrium_residual
 
-    means = steady(axles)
+    means = equilibrium_residual(axles)
     each = (
         ("weight", "the wheel forces carry the vehicle's weight on average", "m/s^2", "m1, m2, m3"),
         ("balance", "front and rear wheel forces balance each other on average", "rad/s^2", "a, b"),

@@ -1,0 +1,99 @@
+"""Rigid constraints of a tree of bodies in plain numpy: what they ask of its coordinates, at a state.
+
+A constraint g(q) = 0 has rows J = dg/dq, and asks J q'' + J' q' = 0 of accelerations. Points kept together: g is the
+vector between them. Axes kept parallel: g are the products of three pairs of axes of both bodies, which must be square
+to each other: the same products as Exudyn's, so that paths that drift off by the error of a step drift alike.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, REST, Bodies, PlainMotion
+from models.vehicles.spatial import Vector
+
+Axes = tuple[np.ndarray, np.ndarray]
+"""(3, 3) each: axes of two bodies as columns, as they lie in the design position."""
+Joint = tuple[tuple[tuple[str | None, Vector], ...], Axes | None]
+"""Two points of bodies (None: the ground) in the design position, m, and axes that must be parallel."""
+SQUARE = ((2, 1), (2, 0), (0, 1))
+"""Axes of the first and of the second body that are square to each other where both turn alike."""
+
+
+class Asked(NamedTuple):
+    """What constraints ask at a state: J (c, n), J' q' (c,)."""
+
+    rows: np.ndarray
+    rest: np.ndarray
+
+
+class Gap(NamedTuple):
+    """How far coordinates are from satisfying constraints, (c,) in m and rad, and what changes that, (c, n)."""
+
+    size: np.ndarray
+    rows: np.ndarray
+
+
+class PlainConstraints:
+    """Constant rows (r, n) with rows q = offsets (r,), and joints between bodies."""
+
+    def __init__(self, bodies: Bodies, rows: np.ndarray, offsets: np.ndarray, joints: Sequence[Joint]) -> None:
+        self._bodies, self._rows, self._offsets = bodies, rows, offsets
+        self._ends = bodies.points([end for ends, _ in joints for end in ends])
+        turns = [(ends, axes) for ends, axes in joints if axes is not None]
+        self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
+
+    def asked(self, q: np.ndarray, v: np.ndarray) -> Asked:
+        """At coordinates and rates (n,)."""
+        motion = self._bodies.move(q, v)
+        terms = np.hstack((self._apart(motion), *(_products(*each).T for each in self._turned(motion))))
+        rest = np.concatenate((np.zeros(len(self._rows)), terms[REST]))
+        return Asked(np.vstack((self._rows, terms[FIRST:].T)), rest)
+
+    def gap(self, q: np.ndarray) -> Gap:
+        """At coordinates (n,); of axes the rotation vector between them, which is 0 where they lie alike alone."""
+        motion = self._bodies.move(q, np.zeros_like(q))
+        apart, turned = self._apart(motion), [rotation(*each) for each in self._turned(motion)]
+        size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
+        return Gap(size, np.vstack((self._rows, apart[FIRST:].T, *(each.rows for each in turned))))
+
+    def _apart(self, motion: PlainMotion) -> np.ndarray:
+        """(3 + n, 3 p): vectors between points, with their rates and derivatives in the rows of a motion."""
+        ends = motion.at(self._ends)
+        apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(motion.matrices[0]), -1)
+        return apart
+
+    def _turned(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
+        """(3 + n, 3, 3) each: axes of both bodies as columns, with their rates and derivatives."""
+        for rows, axes in self._turns:
+            yield [motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
+
+
+def _products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(3, 3 + n): products of pairs of axes of two bodies, by the product rule."""
+    terms = np.empty((len(SQUARE), len(first)))
+    for term, (i, j) in zip(terms, SQUARE, strict=True):
+        axis, other = first[:, :, i], second[:, :, j]
+        term[:] = axis @ other[PLACE] + other @ axis[PLACE]
+        term[PLACE] /= 2.0
+        term[REST] += 2.0 * axis[RATE] @ other[RATE]
+    return terms
+
+
+def rotation(first: np.ndarray, second: np.ndarray) -> Gap:
+    """The rotation vector from the first axes to the second (3,) in the first, and what turns it (3, n)."""
+    turn = first[PLACE].T @ second[PLACE]
+    change = first[FIRST:].transpose(0, 2, 1) @ second[PLACE] + first[PLACE].T @ second[FIRST:]
+    return Gap(Rotation.from_matrix(turn).as_rotvec(), _spins(change @ turn.T))
+
+
+def turning_rows(axes: np.ndarray) -> np.ndarray:
+    """(3, n): angular velocity of a body in space by the rates of coordinates, from its axes in a motion."""
+    return _spins(axes[FIRST:] @ axes[PLACE].T)
+
+
+def _spins(rates: np.ndarray) -> np.ndarray:
+    """(3, n): vectors of n matrices (3, 3) that turn."""
+    return np.array((rates[:, 2, 1], rates[:, 0, 2], rates[:, 1, 0]))

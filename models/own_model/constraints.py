@@ -1,0 +1,62 @@
+"""Rigid constraints of a description: what they ask of accelerations, and which states satisfy them."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from models.multibody.plain.constraints import PlainConstraints
+from models.multibody.plain.motion import Bodies
+from models.own_model.reading import TwinModel, tie_rows
+
+REDUNDANT = 1e-9
+"""Share of the largest singular value of the constraints' rows up to which they repeat others."""
+STRIDE = 0.02
+"""rad, m: how far all coordinates move together from one row of differences to the next."""
+SLOPES = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
+"""Differences of order 6 over one, two and three strides to either side."""
+MET, TRIES, LONGEST = 1e-12, 60, 0.5
+"""m, rad: gap of constraints that are satisfied; steps of Newton's method to get there; m, rad: the longest of them."""
+
+Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
+"""J (c, n) of constraints at each of some coordinates (n,)."""
+
+
+def plain_constraints(twin: TwinModel) -> PlainConstraints:
+    """The constraints of a model in plain numpy."""
+    driven = twin.driven
+    joints = [(connection.ends, connection.axes) for connection in driven.connections]
+    return PlainConstraints(Bodies(driven.vehicle), *tie_rows(driven.couplings, twin.size), joints)
+
+
+def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Forces (n,) with those of rigid constraints rows q'' + rest = 0, (c, n) and (c,), some of which may repeat
+    others."""
+    turned, sizes, rows = np.linalg.svd(rows, full_matrices=False)
+    kept = sizes > REDUNDANT * sizes[0]
+    rows, rest = rows[kept], (rest @ turned)[kept] / sizes[kept]
+    free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, rows.T)
+    answer: np.ndarray = force - rows.T @ np.linalg.solve(rows @ compliance, rows @ free + rest)
+    return answer
+
+
+def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """J (c, n), and J' q' (c,) by its differences along the motion, at coordinates and rates (n,)."""
+    stride = STRIDE / max(float(np.abs(v).sum()), 1e-9)
+    steps = [k * stride * v for k in range(1, len(SLOPES) + 1)]
+    rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
+    changes = [weight * (there - back) for weight, there, back in zip(SLOPES, others[::2], others[1::2], strict=True)]
+    rest: np.ndarray = np.sum(changes, axis=0) @ v / stride
+    return rows, rest
+
+
+def satisfying(constraints: PlainConstraints, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """The nearest coordinates, and the nearest rates (n,), that satisfy constraints, by Newton's method; None where it
+    does not get there."""
+    for _ in range(TRIES):
+        gap = constraints.gap(q)
+        inverse = np.linalg.pinv(gap.rows, REDUNDANT)
+        if np.abs(gap.size).max() <= MET:
+            return q, v - inverse @ (gap.rows @ v)
+        step = inverse @ gap.size
+        q = q - step * min(1.0, LONGEST / float(np.abs(step).max()))
+    return None

@@ -1,0 +1,35 @@
+"""Limits of joints and tendons, which are not built: which of them a state strikes.
+
+MuJoCo's limit is soft: with d the impedance of its documentation, and a the acceleration without it, it leaves
+(1 - d) a and adds d times a spring and a damper. So a joint that presses on a limit has 1 / (1 - d) of its inertia
+there. A stop of Exudyn is a spring and a damper beside the inertia. Inside its range a limit does nothing.
+"""
+
+from collections.abc import Callable
+from copy import copy
+
+import mujoco
+import numpy as np
+
+from models.own_model.reading import TwinModel, label
+
+KINDS = {
+    int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT): "joint",
+    int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON): "tendon",
+}
+"""Constraints of MuJoCo that are limits, and of what."""
+
+
+def limits_struck(twin: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
+    """Function of coordinates (n,): joints and tendons whose limits act there in the file's own model."""
+    model = copy(twin.model)
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    data, still = mujoco.MjData(model), np.zeros(twin.size)
+
+    def struck(q: np.ndarray) -> tuple[str, ...]:
+        data.qpos[:] = twin.coordinates.to_mujoco(q, still).qpos
+        mujoco.mj_fwdPosition(model, data)
+        rows = zip(data.efc_type.tolist(), data.efc_id.tolist(), strict=True)
+        return tuple(label(model, KINDS[kind], number) for kind, number in rows if kind in KINDS)
+
+    return struck

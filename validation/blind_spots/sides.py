@@ -1,0 +1,69 @@
+"""The plain Python functions that more than one side of a comparison calls, as a trace of short runs tells.
+
+Shared modules hold thousands of functions of Python. Of these the audit asks about the ones that at least two engines
+(the reference is one of them) call in runs of one scene and that give numbers there. Each run has a process of its own
+that has read the scene before the trace begins. So functions that read scenes, convert their units and check them are
+left out: they work once, for all sides, and a wrong one gives another scene to every side alike. Tests of scenes, of
+vehicle files and of the units of measured files notice those. So are functions that judge what a run assumed.
+"""
+
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
+from validation.blind_spots.rewriting import ROOT
+
+FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
+"""Scenes that are short to run, which name as many tables as go together; no two of one name."""
+JUDGE = ".assumptions"
+"""End of the names of modules that judge the answer of a run, and give no number of it."""
+Run = tuple[str, str]
+"""File of a scene, and an engine."""
+
+
+def scenes() -> dict[str, Path]:
+    """The scenes by the names of their files."""
+    return {path.name: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
+
+
+def runs() -> list[Run]:
+    """The runs that are traced: each scene in all engines of its system, where there are at least two."""
+    engines = {name: engines_of(path) for name, path in scenes().items()}
+    return [(name, engine) for name, several in engines.items() if len(several) > 1 for engine in several]
+
+
+def engines_of(scene: Path) -> tuple[str, ...]:
+    """The engines of a scene's system."""
+    system = SYSTEMS[tomllib.loads(scene.read_text(encoding="utf-8")).get("system", DEFAULT_SYSTEM)]
+    return (*system.engines, *system.on_request)
+
+
+def prepared(scene: str) -> Any:
+    """One of the ``scenes``, read and checked."""
+    path = scenes()[scene]
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table.pop("engines_asked", None)  # the key of a recorded job
+    return of_table(table, scene, path.parent)
+
+
+def sides(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
+    """Engines that share a function, by its name, sorted; none where no scene has it run in two.
+
+    traced : of each run its "run", a ``Run``, and "numbers", the names of functions that gave numbers in it.
+    """
+    engines = defaultdict[tuple[str, str], set[str]](set)
+    for each in traced:
+        scene, engine = each["run"]
+        for function in each["numbers"]:
+            engines[function, scene].add(engine)
+    shared = defaultdict[str, set[str]](set)
+    for (function, _), several in engines.items():
+        shared[function] |= several if len(several) > 1 else set()
+    return {
+        function: tuple(sorted(several))
+        for function, several in shared.items()
+        if several and not function.partition(":")[0].endswith(JUDGE)
+    }
