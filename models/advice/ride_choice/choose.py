@@ -193,13 +193,18 @@ class Chooser(Candidates):
         for each other."""
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
-            if self.cost(less).step < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
-                continue  # it alone bounds the step
-            same = self.cost(less).step >= self.cost(chosen).step * (1 - EQUAL_COST_LOG)
-            same = same or self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
-            if same and self.within_tolerance(less):
+            if self._costs_the_same(less, chosen) and self.within_tolerance(less):
                 return self._worthwhile(less)
         return chosen
+
+    def _costs_the_same(self, less: Set, chosen: Set) -> bool:
+        """Whether a smaller set has no shorter stable step than a larger one, or as few calls at equal accuracy."""
+        stable = self.cost(less).step
+        if stable >= self.cost(chosen).step * (1 - EQUAL_COST_LOG):
+            return True
+        if stable < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
+            return False  # what is in the larger one alone bounds the step
+        return self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
 
     def further(self, chosen: Set) -> dict[Effect, float]:
         """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it

@@ -12,9 +12,9 @@ from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
-PROBLEMS = 6.0
-"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED`` speeds: fitted to 14
-scenes of 7 to 26 effects and 10 to 42 states, all of them within a factor of two."""
+PROBLEMS = 4.0
+"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED`` speeds: in proportion
+fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and in size to the largest."""
 FURTHER = 0.05
 """What a further speed takes by one at which effects are screened: it is confirmed there, and nothing else."""
 SIZE, TIMES = 40, 9
