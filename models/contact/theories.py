@@ -197,7 +197,7 @@ def _exact_sum(grids: Sequence[Pressed], motion: Motion, friction: float, pair: 
 
 
 MARGINS = (1.2, 1.6, 2.2)
-"""Sides of the grid of the exact normal problem by those of the simplified theory's area, until it fits."""
+"""Sides of the grid of the exact normal problem divided by those of the simplified theory's area, until it fits."""
 
 
 def _solved(patch: PatchPressure, cells: int, pair: Pair) -> NormalSolution:

@@ -50,7 +50,7 @@ class Judged:
 
     @property
     def saving(self) -> float:
-        """Calls at equal accuracy of the whole scene by those of what is left."""
+        """Calls at equal accuracy of the whole scene divided by those of what is left."""
         return self.choice.before.calls / self.choice.after.calls
 
     @property

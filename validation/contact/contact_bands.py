@@ -63,7 +63,8 @@ class TheoryErrors:
 
 
 def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
-    """Force by mu N and moment by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or "simplified"."""
+    """Force divided by mu N and moment divided by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or
+    "simplified"."""
     axes, motions = _arrays(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":

@@ -59,7 +59,7 @@ def against_naive(folder: Path) -> str:
 
 
 def lift_off(implementation: str, folder: Path) -> float:
-    """Force by mu N as the load goes to nothing and below: full sliding, then exactly none."""
+    """Force divided by mu N as the load goes to nothing and below: full sliding, then exactly none."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
     contact = hertz.by_load(1.1, 0.8, load, PAIR)
     answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), PAIR)

@@ -50,7 +50,8 @@ Roll = Callable[[Motion], Any]
 
 @dataclass(frozen=True)
 class ContactCase:
-    """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N.
+    """One contact of semi-axes a and b (m). fx, fy divided by mu N; mz divided by mu N sqrt(ab); error: of the exact
+    grid, divided by mu N.
 
     parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
     """
@@ -83,7 +84,7 @@ class ContactCase:
 
     @property
     def force(self) -> Array:
-        """Exact force by mu N, (2,)."""
+        """Exact force divided by mu N, (2,)."""
         return np.array([self.fx, self.fy])
 
     def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
@@ -182,12 +183,12 @@ class TheoryPoint:
 
     @property
     def mean(self) -> float:
-        """Mean error by mu N."""
+        """Mean error divided by mu N."""
         return float(np.mean(self.errors))
 
     @property
     def most(self) -> float:
-        """Error by mu N that 95 of 100 cases keep to."""
+        """Error divided by mu N that 95 of 100 cases keep to."""
         return float(np.quantile(self.errors, 0.95))
 
 
@@ -273,7 +274,7 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
 
 
 TARGETS = (0.05, 0.02, 0.01, 0.005)
-"""Errors by mu N that are asked for."""
+"""Errors divided by mu N that are asked for."""
 
 
 def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
