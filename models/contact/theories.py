@@ -39,7 +39,7 @@ class Rolled:
 
     @property
     def force(self) -> np.ndarray:
-        """fx and fy."""
+        """Creep forces fx and fy (N)."""
         return np.array([self.fx, self.fy])
 
 
@@ -95,7 +95,8 @@ class Linear(OnEllipse):
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """Sentence against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    """Sentence against the linear theory's forces ``used`` (n,) divided by mu N; "" where friction can carry them
+    all."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""

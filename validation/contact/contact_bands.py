@@ -34,7 +34,7 @@ FASTSIM = [
 
 @dataclass(frozen=True)
 class TheoryErrors:
-    """A theory against the exact one: force (n, 2) by mu N, moment (n,) by mu N times the lever.
+    """A theory against the exact one: force (n, 2) divided by mu N, moment (n,) divided by mu N times the lever.
 
     error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
     ``groups``.

@@ -146,7 +146,8 @@ def frictions(implementation: str, folder: Path) -> float:
 
 
 def pure_spin(implementation: str, folder: Path) -> float:
-    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, by mu N (r)."""
+    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, divided by mu N
+    (r)."""
     spinning = CHOSEN.changed(conicity=0.5)
     wheelset = built_wheelset(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]

@@ -157,7 +157,7 @@ def parked(implementation: str, folder: Path) -> float:
 
 
 def locked(implementation: str, folder: Path) -> float:
-    """Force of locked wheels beside mu N against their sliding, by mu N."""
+    """Force of locked wheels beside mu N against their sliding, divided by mu N."""
     run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
     return float(np.abs(run["fx"] / run.grip() + 1.0).max())
 

@@ -44,7 +44,7 @@ KINDS: dict[str, Parts] = {
 """Parts of the three creepages, each in units of its linear scale."""
 FINEST, ENOUGH = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
-taken where that error, by mu N, is larger."""
+taken where that error, divided by mu N, is larger."""
 Roll = Callable[[Motion], Any]
 
 
@@ -172,7 +172,8 @@ WAYS = (
 
 @dataclass(frozen=True)
 class TheoryPoint:
-    """A theory on a number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
+    """A theory on a number of cells. errors : (cases,) divided by mu N. seconds : of one evaluation, median over the
+    cases;
     range : the least and the most of them."""
 
     name: str

@@ -196,7 +196,7 @@ class ManoeuvreRerun:
 
     @property
     def step(self) -> float:
-        """s."""
+        """Step of the run (s)."""
         return float(self.drive.run.times[1])
 
     @cached_property

@@ -38,7 +38,7 @@ DEFAULT_ANSWER = ("FASTSIM", 21)
 
 @dataclass(frozen=True)
 class ContactResult:
-    """Forces (n, 2) by mu N, what they took, and what the program says against them, if anything."""
+    """Forces (n, 2) divided by mu N, what they took, and what the program says against them, if anything."""
 
     forces: np.ndarray
     counts: dict[str, int]
