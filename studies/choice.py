@@ -37,7 +37,7 @@ class Options(Strict):
 @dataclass(frozen=True)
 class Alone:
     """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot be; what it saves: work
-    of the scene with longer steps alone, by that of what is left at the longest step that is then allowed."""
+    of the scene with longer steps alone, divided by that of what is left at the longest step that is then allowed."""
 
     effect: str
     changes: np.ndarray

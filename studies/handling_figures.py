@@ -74,7 +74,7 @@ def _path(axis: Axes, drive: Drive) -> None:
 
 
 def _circle(axis: Axes, drive: Drive) -> None:
-    """Forces of each tyre by mu N: inside of the unit circle."""
+    """Forces of each tyre divided by mu N: inside of the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)

@@ -141,7 +141,7 @@ def split_rate(k_low: float, k_high: float) -> float:
 
 
 def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
-    """Yaw rate by that of the circle at the momentary speed, r R / v: 1 of a vehicle that stays on its circle.
+    """Yaw rate divided by that of the circle at the momentary speed, r R / v: 1 of a vehicle that stays on its circle.
 
     Source: ISO 7975 and ISO 14794, one second after the brake is applied; not checked against the text of the standard.
     """

@@ -43,7 +43,7 @@ SLENDER = (0.1, 10.0)
 FILE = Path(__file__).with_name("error_bands.csv")
 (_, _, _, *_KNOTS), *_ROWS = csv.reader(FILE.read_text().splitlines())
 KNOTS = np.array(_KNOTS, float)
-"""Tangential force by mu N at which the bands are kept."""
+"""Tangential force divided by mu N at which the bands are kept."""
 BANDS, MOMENT_BANDS = (
     {
         theory: [np.array(values, float) for kind, name, _, *values in _ROWS if (kind, name) == (quantity, theory)]
@@ -51,8 +51,8 @@ BANDS, MOMENT_BANDS = (
     }
     for quantity in ("force", "moment")
 )
-"""Name of a theory -> error by mu N that 95 % of the contacts keep to at each knot, without spin and with it; that of
-the moment by mu N times the lever: abscissa is ``used_with_moment``, and all vanish at its zero."""
+"""Name of a theory -> error divided by mu N that 95 % of the contacts keep to at each knot, without spin and with it;
+that of the moment divided by mu N times the lever: abscissa is ``used_with_moment``, and all vanish at its zero."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def remaining_errors(contact: Contact, motion: Motion, cells: int, fine: Rolled)
 
 
 def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
-    """Forces by mu N, and moments by mu N times the lever, (3,) each."""
+    """Forces divided by mu N, and moments divided by mu N times the lever, (3,) each."""
     limit = contact.friction * contact.pressing.load
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
@@ -137,10 +137,10 @@ def coarser_cells(cells: int) -> int:
 
 
 def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
-    """Error by mu N, and of the moment by mu N times the lever, that ``cells`` leave, (...).
+    """Error divided by mu N, and of the moment divided by mu N times the lever, that ``cells`` leave, (...).
 
-    fine, coarse : (3, ...) fx and fy by mu N, mz by mu N times the lever, on ``cells`` and half of them. order : of the
-    theory in the size of a cell.
+    fine, coarse : (3, ...) fx and fy divided by mu N, mz divided by mu N times the lever, on ``cells`` and half of
+    them. order : of the theory in the size of a cell.
     """
     used, gained = np.linalg.norm(fine, axis=0), (cells / coarser_cells(cells)) ** order - 1.0
     unseen = UNSEEN * used**2 * np.clip(2.0 - used * cells / 3.0, 0.0, 1.0)
@@ -148,14 +148,16 @@ def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
 
 
 def band(name: str, used: Array, spinning: Array) -> Array:
-    """Error by mu N of a theory, one of BANDS, at forces ``used`` (by mu N) and shares ``spinning`` of spin."""
+    """Error divided by mu N of a theory, one of BANDS, at forces ``used`` (divided by mu N) and shares ``spinning`` of
+    spin."""
     without, with_spin = (np.interp(used, KNOTS, values) for values in BANDS[name])
     without = without * np.minimum(used / KNOTS[0], 1.0)  # the linear theory is met, but not where spin meets creepage
     return without + spinning * (with_spin - without)
 
 
 def moment_band(name: str, used: Array, spinning: Array) -> Array:
-    """Error of the moment by mu N times the lever; ``used`` as by ``used_with_moment``, the rest as of ``band``."""
+    """Error of the moment divided by mu N times the lever; ``used`` as by ``used_with_moment``, the rest as of
+    ``band``."""
     without, with_spin = (np.interp(used, (0.0, *KNOTS), (0.0, *values)) for values in MOMENT_BANDS[name])
     return without + spinning * (with_spin - without)
 
@@ -167,7 +169,8 @@ def slenderness(a: Array, b: Array) -> Array:
 
 
 def used_with_moment(used: Array, moment: Array) -> Array:
-    """Share of friction that is used where moments count: force by mu N and moment by mu N times the lever."""
+    """Share of friction that is used where moments count: force divided by mu N and moment divided by mu N times the
+    lever."""
     return np.hypot(used, moment)
 
 

@@ -5,8 +5,8 @@ that of its angle: with phi the angle of -w, psi from there to the traction, and
 
     d angle = d phi + (sin psi' / sin psi) d psi - sin psi' dz,
 
-psi' being psi after the step. The load enters through the scale alone: forces by mu N depend on creepages by N/(a b)
-and nothing else, so its derivative follows from the others (Euler's theorem).
+psi' being psi after the step. The load enters through the scale alone: forces divided by mu N depend on creepages by
+N/(a b) and nothing else, so its derivative follows from the others (Euler's theorem).
 """
 
 import math

@@ -20,7 +20,7 @@ PLAIN, SECOND_ORDER = 0, 1
 LARGEST_EXPONENT = 50.0
 """exp(-50) of an angle is nothing; larger exponents would overflow."""
 NEGLIGIBLE_SLIP = 1e-60
-"""Square of a rigid slip per cell that turns no traction."""
+"""Square of a rigid slip per cell that is too small to change the direction of a traction."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")

@@ -17,11 +17,11 @@ nearly right, and those are the tractions on cells twice as long and wide, solve
 coarsest cells, and wherever Newton's steps alone lead nowhere, Gauss-Seidel sweeps come before each of them. Sweeps
 alone do not settle many cells that are wider than long: they made things worse on 100 x 100 cells of a/b = 0.2.
 
-Error of the cells, in forces by mu N (validation case ``contact_exact``): with 40 cells along each axis of an ellipse
-0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips, 1 where much sticks:
-the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's cylinder is
-met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to rounding.
-"""
+Error of the cells, in forces divided by mu N (validation case ``contact_exact``): with 40 cells along each axis of an
+ellipse 0.1 to 0.4 %, 0.7 % for spin on a long one, with 80 half as much. The order is 2 where all slips, 1 where much
+sticks: the edge of the contact and the leading edge of the zone that sticks lie somewhere within a cell. Carter's
+cylinder is met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full sliding gives mu N to
+rounding."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -39,7 +39,7 @@ class Rolled:
 
     @property
     def force(self) -> np.ndarray:
-        """fx and fy."""
+        """Creep forces fx and fy (N)."""
         return np.array([self.fx, self.fy])
 
 
@@ -95,7 +95,8 @@ class Linear(OnEllipse):
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """Sentence against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    """Sentence against the linear theory's forces ``used`` (n,) divided by mu N; "" where friction can carry them
+    all."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""
@@ -197,7 +198,7 @@ def _exact_sum(grids: Sequence[Pressed], motion: Motion, friction: float, pair: 
 
 
 MARGINS = (1.2, 1.6, 2.2)
-"""Sides of the grid of the exact normal problem by those of the simplified theory's area, until it fits."""
+"""Sides of the grid of the exact normal problem divided by those of the simplified theory's area, until it fits."""
 
 
 def _solved(patch: PatchPressure, cells: int, pair: Pair) -> NormalSolution:

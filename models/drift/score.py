@@ -66,7 +66,7 @@ class RunFigures:
     Attributes
     ----------
     moment_rms, moment_max : artificial moment in N m, all frequencies
-    moment_share, moment_share_band : its rms by that of I pitch'', over all frequencies and up to BAND
+    moment_share, moment_share_band : its rms divided by that of I pitch'', over all frequencies and up to BAND
     force_share_band : the same for the vertical force on the chassis, by m3 z3''
     pitch_max : largest |pitch| in rad
     seconds, force_calls, steps : what it cost

@@ -75,7 +75,8 @@ def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
-    """Pseudo-damage of a load (n,) by that of the true one (m,); raises InputError if the true one never varies."""
+    """Pseudo-damage of a load (n,) divided by that of the true one (m,); raises InputError if the true one never
+    varies."""
     whole = pseudo_damage(truth, slope)
     if whole == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():
         raise InputError("", "true load", None, "never varies, so it does no damage to which another could be compared")

@@ -61,7 +61,7 @@ class Clock:
 
     @property
     def period(self) -> float:
-        """s."""
+        """Sampling period (s)."""
         return float(self.times[1] - self.times[0])
 
     @property

@@ -21,7 +21,7 @@ from models.core.errors import InputError, RunFailed
 CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
 """Cells along x, and along y over the narrowest patch; along y at most."""
 MARGINS = (1.4, 2.0, 3.0)
-"""Sides of the grid by those of the areas that the simplified theory finds."""
+"""Sides of the grid divided by those of the areas that the simplified theory finds."""
 UNKNOWN_HEIGHT = 1e-3
 """Height (m) where a distance is not known."""
 PRECISION, ITERATIONS = 1e-6, 30

@@ -50,7 +50,7 @@ SPEED, PERIOD = len(RETURNS), len(RETURNS) + 1
 """Columns of the slopes after those of the states."""
 AMPLITUDE, RATE = RETURNS.index(Y), RETURNS.index(Y_RATE)
 SECTION_COORDINATES = [k for k in range(len(RETURNS)) if k != RATE]
-"""The section's coordinates."""
+"""Indices of the coordinates that span the Poincaré section."""
 DECAYED_DISPLACEMENT = 1e-5
 """Displacement (m) below which a motion has died out."""
 MARCH, MARCHES = 2.0, 20

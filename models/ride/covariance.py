@@ -201,8 +201,8 @@ def _refuse(name: str, error: float) -> None:
 
 
 REFINEMENTS, REFINED = 6, 1e-11
-"""Corrections of the first solution at most, and the size of the last by that of P: what is left is its square. One
-is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
+"""Corrections of the first solution at most, and the size of the last divided by that of P: what is left is its square.
+One is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
 
 
 def _with_marginal(

@@ -41,7 +41,7 @@ class Quality:
     """Quality of a rigid-body fit to accelerometer readings.
 
     misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
-    share : its rms over the record by that of the relative accelerations
+    share : its rms over the record divided by that of the relative accelerations
     expected : what the stated noise of the readings alone would leave (m/s^2)
     redundancy : equations per sample behind it; 0 means that nothing can be said
     suspect : the sensor without which the body is rigid; "" if there is no single one

@@ -24,7 +24,7 @@ LEAST_SPRUNG_RATIO = 0.7
 SHARE = 0.03
 """Of the weight, that an axle carries at the least, where there are several."""
 UNEVEN = 3.0
-"""Load, or stiffness, of one wheel of an axle by that of the other."""
+"""Load, or stiffness, of one wheel of an axle divided by that of the other."""
 BOUNCE = 0.5, 6.0
 """Hz, of the whole vehicle on springs and tyres, from how far it sinks under its weight."""
 HOP = 3.0, 60.0

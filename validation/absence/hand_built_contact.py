@@ -30,8 +30,8 @@ def forces(axis, limit, along, across, halves, shares, bound):
     """fx, fy (N) of a contact of two equal semi-axes (m).
 
     limit : friction by load (N); along, across : creepages by their flexibilities (N/m^3); halves, shares (n,) : half
-    length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear by that in the
-    strip's middle
+    length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear divided by that in
+    the strip's middle
     """
     cells, count, fx, fy = bound.size, halves.size, 0.0, 0.0
     for k in range(count):

@@ -96,7 +96,8 @@ def constant(mu: float) -> Tables:
 
 
 def transfer_errors(mu: float = 0.4) -> dict[str, float]:
-    """Loads of the axles against their closed form, by those at rest, with all wheels locked, the front or the rear.
+    """Loads of the axles against their closed form, divided by those at rest, with all wheels locked, the front or the
+    rear.
 
     Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
     axles' loads change by m z g h / E.

@@ -25,7 +25,7 @@ TRUCK, HIGH_TRUCKS = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}
 
 def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
     """A case of the truck at rates of x, y (m/s) and heading (rad/s) under torques (N m) on ice: largest gain of its
-    kinetic energy over 20 ms, by that of the start."""
+    kinetic energy over 20 ms, divided by that of the start."""
 
     def energy(rates: np.ndarray) -> float:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)

@@ -59,7 +59,7 @@ class Moved(Moving):
 
     @property
     def rims(self) -> float:
-        """Speed of the first wheel's rim by that of the vehicle, less 1, as a magnitude."""
+        """Speed of the first wheel's rim divided by that of the vehicle, less 1, as a magnitude."""
         return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
 
 

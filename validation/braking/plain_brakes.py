@@ -24,7 +24,7 @@ STATES = 400
 SEED = 20_26
 LOADS = np.array([1e3, 4e3, 1e4])
 BY_LOAD = np.array([1.1, 1.0, 0.8])
-"""Friction at these loads (N) by that of the surface."""
+"""Friction at these loads (N) divided by that of the surface."""
 
 
 def by_load(on: str) -> TyreTable:

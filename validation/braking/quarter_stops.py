@@ -24,7 +24,7 @@ SCHEMES = (EULER, RK4, LITERAL)
 SLOWEST_SPEED = 1e-6
 """Speed (m/s) below which slip is taken at this one."""
 SETTLED_RATE = 1e-11
-"""Rate of the slip by that of the start at which it has settled."""
+"""Rate of the slip divided by that of the start at which it has settled."""
 LONGEST_TIME_RATIO = 3.0
 
 
@@ -192,7 +192,8 @@ def stop(
     after: float = 0.0,
     turning: float | None = None,
 ) -> QuarterStop:
-    """Braked by a constant torque (N m) for more than it takes at the least of both forces, and ``after`` (s)."""
+    """A run under a constant torque (N m) that lasts longer than the stop takes at the smaller of both forces, plus
+    ``after`` (s)."""
     least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
     return braked(quarter, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, turning)

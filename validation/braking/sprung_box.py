@@ -86,7 +86,7 @@ def constant(mu: float) -> TyreTable:
 
 
 def steady_torques(*torques: float) -> Pressures:
-    """Torques (W,) in N m of the brakes of ``braked``, which stay."""
+    """Constant brake torques (W,) in N m of the runs of ``braked``."""
     return Pressures(np.array(torques) / GRADIENT)
 
 

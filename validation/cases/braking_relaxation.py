@@ -16,7 +16,7 @@ TITLE = "Relaxing tyres on the suspension"
 SYSTEM: System = "anti-lock"
 ENGINES = ("mujoco", "exudyn")
 SLICK = 1e-6
-"""Friction by that of a wet road: the car keeps its course whatever its wheels are steered."""
+"""Friction divided by that of a wet road: the car keeps its course whatever its wheels are steered."""
 SPEED, STEER = 20.0, 0.02
 TURNING = (200.0, 200.0, 100.0, 100.0)
 """Torques (N m) at which no wheel locks."""

@@ -54,8 +54,8 @@ FINE_STEP = 5e-4
 FULL_SWEEP_SURFACES = ("dry", "wet", "snow", "ice")
 """Surfaces of the sweep that take every level of the brake in every step."""
 TORQUE_LEVELS, SOME_LEVELS = np.linspace(0.0, 1.5, 16), slice(None, None, 5)
-"""Torque of the brake by that of locking, and those of the other surfaces in steps below the paper's, which are many
-(and all that the quick share takes)."""
+"""Torque of the brake divided by that of locking, and those of the other surfaces in steps below the paper's, which are
+many (and all that the quick share takes)."""
 SLOW_SPEED = 0.5
 """Speed (m/s) of the sweep in steps below 1 ms, which are many."""
 WATCHED_SECONDS = 2.0

@@ -50,7 +50,7 @@ class Judged:
 
     @property
     def saving(self) -> float:
-        """Calls at equal accuracy of the whole scene by those of what is left."""
+        """Calls at equal accuracy of the whole scene divided by those of what is left."""
         return self.choice.before.calls / self.choice.after.calls
 
     @property
@@ -130,7 +130,7 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
 
 
 def _prediction_row(choices: list[Judged]) -> Row:
-    """Predicted by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
+    """Predicted divided by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
     predicted, confirmed_ = (
         np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
     )

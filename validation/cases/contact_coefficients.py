@@ -97,7 +97,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def deviation(solved: Array) -> Array:
-    """Coefficients as the library gives them by those of the exact theory, minus 1, (n, 4), of rows (n, 6)."""
+    """Coefficients as the library gives them divided by those of the exact theory, minus 1, (n, 4), of rows (n, 6)."""
     c = coefficients(solved[:, 0], solved[:, 1])
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / solved[:, 2:] - 1.0
 

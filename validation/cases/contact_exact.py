@@ -34,7 +34,7 @@ CASES: dict[str, tuple[float, float, float, float]] = {
     "x, y against spin": (2.0, 0.12, -0.13, 0.25),
     "spin, long": (5.0, 0.0, 0.0, 0.15),
 }
-"""a/b, creepages by mu N / (G ab), spin by mu N / (G (ab)^(3/2))."""
+"""a/b, creepages divided by mu N / (G ab), spin divided by mu N / (G (ab)^(3/2))."""
 DRAWN, SEED = 12, 47
 """Contacts that are drawn to see whether the solver converges: ellipses, creepages with spin and cells at random."""
 SHARE = 0.0075
@@ -116,7 +116,8 @@ def carter(x: Array, a: float, share: float) -> Array:
 
 
 def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
-    """x/a, traction by mu p0 in the middle of a slender ellipse, and the error of its sum by that of full sliding."""
+    """x/a, traction by mu p0 in the middle of a slender ellipse, and the error of its sum divided by that of full
+    sliding."""
     b = SIZE / STRIP**0.5
     a = STRIP * b
     pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
@@ -164,7 +165,7 @@ def _shift_rows() -> list[Row]:
 
 
 def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Array:
-    """fx, fy by mu N and mz by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
+    """fx, fy divided by mu N and mz divided by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
     ratio, xi_x, xi_y, spin = CASES[name]
     creepage = LIMIT / (PAIR.G * SIZE**2) * sign
     pressed = hertzian(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, cells)
@@ -296,7 +297,8 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
 
 
 def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
-    """Kind, a/b, difference of the force by mu N and of the moment by mu N sqrt(ab); the file is in mm, N and MPa."""
+    """Kind, a/b, difference of the force divided by mu N and of the moment divided by mu N sqrt(ab); the file is in mm,
+    N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)

@@ -43,7 +43,7 @@ REFERENCE = {True: 0.01, False: 0.005}
 MISSED_SHARE = 0.06
 """Share of contacts of the set that a stated error may miss: the band's 5 % and a row or two."""
 MOMENTS = {"intermediate": (0.024, 0.06), "elliptic": (0.013, 0.045)}
-"""Mean error of the moment by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
+"""Mean error of the moment divided by mu N sqrt(ab) that is asked for, and the error that 95 % are to keep to."""
 CONVERGED = 161
 """Cells that are taken for the truth about fewer."""
 SLENDER = (

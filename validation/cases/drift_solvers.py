@@ -53,8 +53,8 @@ SOLVERS = (
 DOPRI5 steps over the kinks of the samples, and rounding decides which of its steps it rejects: changes of the tolerance
 by 1e-9 of itself move its drift-off by 0.5 % at 1e-7, which is TIGHT_SHARE, and by 0.02 % at 1e-8."""
 TIGHT_SHARE, LOOSE_SHARE = 0.005, 0.1
-"""Allowed difference of drift-off by that of the first solver; LOOSE_SHARE is for tolerances of 1e-5 and above, whose
-own error is as large as that of the samples."""
+"""Allowed difference of drift-off divided by that of the first solver; LOOSE_SHARE is for tolerances of 1e-5 and above,
+whose own error is as large as that of the samples."""
 ADAPTIVE = ("DOP853", "LSODA", "Radau", "DOPRI5")
 NOISE, NOISY_RATE, NOISY = 30.7, 1000.0, 8.0
 """Noise (N) on the samples at this rate (Hz), and the length (s) of the runs that are smoothed or not."""
@@ -72,7 +72,8 @@ SCORED = 5.0
 
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
-    """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
+    """Compares the drift-off of solvers and of interpolations, and growth and bias of smoothings and schemes; quick:
+    four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
     if quick:

@@ -76,7 +76,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
-    """Contacts of every ratio, kind and level of creepage, by mu N / (G c^2 C) with C11, C22 and C23 c, as columns."""
+    """Contacts of every ratio, kind and level of creepage, divided by mu N / (G c^2 C) with C11, C22 and C23 c, as
+    columns."""
     ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
     part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
     known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
@@ -95,7 +96,7 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
 
 
 def _vector(columns: Contacts, **options: Any) -> Array:
-    """Forces (n, 2) by mu N."""
+    """Forces (n, 2) divided by mu N."""
     answers = fastsim(RollingEllipse(**columns), PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 

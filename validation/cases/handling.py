@@ -78,7 +78,8 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
 
 
 def locked_error() -> float:
-    """Largest error, by mu N, of the force on wheels that do not turn, from one that opposes sliding with mu N."""
+    """Largest error, divided by mu N, of the force on wheels that do not turn, from one that opposes sliding with mu
+    N."""
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
     slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()

@@ -255,7 +255,7 @@ def _scene(frame: str) -> HubScene:
 
 
 def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
-    """Engines before drift-off, both angles with the filter, and the damage that each run leaves."""
+    """Compares the engines before drift-off, both angles with the filter, and the damage that each run predicts."""
     off = np.abs(comparison.errors(comparison.runs[FILTER])).max(axis=0)
     rows = [
         Observed(

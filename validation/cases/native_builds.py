@@ -80,7 +80,7 @@ def _row_of_native_parts(name: str, car: CutVehicle, engine: str) -> Row:
 
 
 def _seconds(car: CutVehicle) -> list[Row]:
-    """Seconds of a step by those with compiled forces, least of interleaved runs: told, not judged."""
+    """Seconds of a step divided by those with compiled forces, least of interleaved runs: told, not judged."""
     rows = []
     for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
         models = {route: model(engine, car, route, TIMED) for route in ("native", "compiled")}

@@ -29,7 +29,8 @@ ENGINE = "mujoco"
 STRIDE = 1000
 """Between the number of a scene and of the one that is drawn in its place."""
 LEAST_MET_SHARE, SECONDS_FACTOR = 0.95, 3.0
-"""Least share of scenes whose every recommended setting holds its tolerance; bound of predicted by true error."""
+"""Least share of scenes whose every recommended setting holds its tolerance; bound of predicted divided by true
+error."""
 
 
 @allowing("random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same")

@@ -119,7 +119,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
 
 
 def _adjoint() -> Row:
-    """The end of a drive with a stop in it by the other route."""
+    """Compares the end of a drive that includes a stop with the same quantity computed by the other route."""
     vehicle, road = ride("half_car")
     varied = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")

@@ -61,7 +61,7 @@ def samples(name: str, count: int) -> list[Saved]:
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
-    """A sample as JSON keeps it; ``ratio`` : true by stated error, None where there is no number."""
+    """A sample as JSON keeps it; ``ratio`` : true divided by stated error, None where there is no number."""
     told = {
         "system": system,
         "name": sample.name,
@@ -85,7 +85,7 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
 
 
 def ratio(true: float, stated: float) -> float:
-    """True by stated error."""
+    """True divided by stated error."""
     return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
 
 

@@ -34,7 +34,7 @@ FASTSIM = [
 
 @dataclass(frozen=True)
 class TheoryErrors:
-    """A theory against the exact one: force (n, 2) by mu N, moment (n,) by mu N times the lever.
+    """A theory against the exact one: force (n, 2) divided by mu N, moment (n,) divided by mu N times the lever.
 
     error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
     ``groups``.
@@ -63,7 +63,8 @@ class TheoryErrors:
 
 
 def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
-    """Force by mu N and moment by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or "simplified"."""
+    """Force divided by mu N and moment divided by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or
+    "simplified"."""
     axes, motions = _arrays(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":

@@ -177,7 +177,7 @@ UPRIGHT = 0.15
 
 
 MARGINS = (1.4, 2.0, 3.0)
-"""Sides of the exact grid by those of the simplified theory's area."""
+"""Sides of the exact grid divided by those of the simplified theory's area."""
 
 
 def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> NormalSolution:

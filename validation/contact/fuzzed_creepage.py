@@ -63,7 +63,8 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
 
 
 def worst_violation(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
-    """Largest violation of each invariant, by mu N and the creepages where it has a size; not finite counts as inf."""
+    """Largest violation of each invariant, divided by mu N and the creepages where it has a size; not finite counts as
+    inf."""
     creep = fastsim(RollingEllipse(**columns), pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
     least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])

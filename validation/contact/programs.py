@@ -19,7 +19,8 @@ ROUNDS = 5
 
 
 def compare(cases: list[ContactCase]) -> dict[str, Any]:
-    """Errors of both programs by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one evaluation."""
+    """Errors of both programs divided by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one
+    evaluation."""
     pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
     def old(case: ContactCase) -> Creep:

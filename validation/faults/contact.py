@@ -84,7 +84,7 @@ def _sliding() -> float:
 
 
 def _theories() -> float:
-    """Exact theory and FASTSIM under creepages that slip in part, by mu N."""
+    """Exact theory and FASTSIM under creepages that slip in part, divided by mu N."""
     pressed, a = _normal_solution(), _ball()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
     exact = rolling_problem.solve_rolling(pressed, MU, *motion, PAIR)

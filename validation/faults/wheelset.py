@@ -86,7 +86,7 @@ def _report(state: Array, law: Law = "fastsim") -> Array:
 
 
 def _friction() -> float:
-    """Creep forces of wheels that slide all over, by mu N, less 1; infinite if they have power."""
+    """Creep forces of wheels that slide all over, divided by mu N, less 1; infinite if they have power."""
     report = _report(states()[SLIDING])
     if report["power"].max() > 0.0:
         return np.inf

@@ -41,7 +41,7 @@ def next_to_none(implementation: str, folder: Path) -> float:
 
 
 def against(implementation: str, folder: Path) -> float:
-    """Spin whose pole is anywhere in the ellipse: error of 21 cells by mu N, all bounded."""
+    """Spin whose pole is anywhere in the ellipse: error of 21 cells divided by mu N, all bounded."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
     coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=cells) for cells in (21, 201))
@@ -59,7 +59,7 @@ def against_naive(folder: Path) -> str:
 
 
 def lift_off(implementation: str, folder: Path) -> float:
-    """Force by mu N as the load goes to nothing and below: full sliding, then exactly none."""
+    """Force divided by mu N as the load goes to nothing and below: full sliding, then exactly none."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
     contact = hertz.by_load(1.1, 0.8, load, PAIR)
     answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), PAIR)
@@ -67,7 +67,7 @@ def lift_off(implementation: str, folder: Path) -> float:
 
 
 def flipping(implementation: str, folder: Path) -> float:
-    """Largest deviation of a creep curve from a smooth one, by mu N, over 2001 creepages."""
+    """Largest deviation of a creep curve from a smooth one, divided by mu N, over 2001 creepages."""
     creep = np.linspace(0.0, 4e-3, 2001)
     force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), PAIR).fx / (MU * LOAD)
     return float(np.abs(np.diff(force, 2)).max())

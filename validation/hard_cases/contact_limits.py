@@ -43,7 +43,7 @@ def _draw_creepages(count: int = 400) -> np.ndarray:
 
 
 def reversed_signs(implementation: str, folder: Path) -> float:
-    """All creepages turned round: forces that do not turn round exactly, by mu N."""
+    """All creepages turned round: forces that do not turn round exactly, divided by mu N."""
     along, across, spin = _draw_creepages()
     ellipses = (RollingEllipse(A, B, LOAD, MU, s * along, s * across, s * spin) for s in (1.0, -1.0))
     first, second = (fastsim(ellipse, PAIR) for ellipse in ellipses)
@@ -51,14 +51,14 @@ def reversed_signs(implementation: str, folder: Path) -> float:
 
 
 def mirrored(implementation: str, folder: Path) -> float:
-    """Left and right exchanged: lateral creepage, spin and lateral force change their sign; by mu N."""
+    """Left and right exchanged: lateral creepage, spin and lateral force change their sign; divided by mu N."""
     along, across, spin = _draw_creepages()
     first, second = (fastsim(RollingEllipse(A, B, LOAD, MU, along, s * across, s * spin), PAIR) for s in (1.0, -1.0))
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def power_gained(implementation: str, folder: Path) -> float:
-    """Most power gained per metre, by mu N times the creepage, 21 cells."""
+    """Most power gained per metre, divided by mu N times the creepage, 21 cells."""
     along, across, spin = _draw_creepages()
     size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
     lost = fastsim(RollingEllipse(A, B, LOAD, MU, along, across, spin), PAIR).dissipation

@@ -43,7 +43,8 @@ def displaced_state(equations: Equations, **values: float) -> np.ndarray:
 
 
 def beyond_friction(motion: Motion, mu: float) -> float:
-    """Largest tangential force by mu N less 1, or infinity for one that has power or is there without a bound."""
+    """Largest tangential force divided by mu N less 1, or infinity for one that has power or is there without a
+    bound."""
     force = np.hypot(motion.contacts["fx"], motion.contacts["fy"])
     bound = mu * motion.contacts["load"]
     if motion.contacts["power"].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
@@ -66,7 +67,8 @@ def standing_naive(folder: Path) -> str:
 
 
 def reversal(implementation: str, folder: Path) -> float:
-    """Largest jump of an acceleration by mu N / m, as the speed passes 0 and where regularisation begins and ends."""
+    """Largest jump of an acceleration divided by mu N / m, as the speed passes 0 and where regularisation begins and
+    ends."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
         below, above = (built_wheelset(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
@@ -101,7 +103,7 @@ def energies(motion: Motion, w: Wheelset) -> np.ndarray:
 
 
 def falling(implementation: str, folder: Path, **moved: float) -> float:
-    """Energy gained by that of 1 mm, of an elastic wheelset without friction that is let go above its rails."""
+    """Energy gained divided by that of 1 mm, of an elastic wheelset without friction that is let go above its rails."""
     elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
     wheelset = built_wheelset(implementation, elastic)
     motion = wheelset.run(displaced_state(wheelset, **moved), 0.06, 5e-5)
@@ -144,7 +146,8 @@ def frictions(implementation: str, folder: Path) -> float:
 
 
 def pure_spin(implementation: str, folder: Path) -> float:
-    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, by mu N (r)."""
+    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, divided by mu N
+    (r)."""
     spinning = CHOSEN.changed(conicity=0.5)
     wheelset = built_wheelset(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]

@@ -59,7 +59,7 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
 
 
 def beyond_friction_share(wheels: Wheels, forces: np.ndarray) -> float:
-    """Largest force by mu N, less 1; infinite where one has power."""
+    """Largest force divided by mu N, less 1; infinite where one has power."""
     if (forces * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
     return max(0.0, float(np.hypot(forces[:, 0], forces[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
@@ -76,7 +76,7 @@ def bounded(implementation: str, folder: Path, **changes: Any) -> float:
 
 
 def jumps(implementation: str, folder: Path) -> float:
-    """Largest change of a force by mu N, as the speed passes 0 and both ends of what is mixed."""
+    """Largest change of a force divided by mu N, as the speed passes 0 and both ends of what is mixed."""
     shares = []
     for middle in (-REGULAR, 0.0, REGULAR):
         backwards, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
@@ -86,7 +86,7 @@ def jumps(implementation: str, folder: Path) -> float:
 
 
 def spinning(implementation: str, folder: Path) -> float:
-    """Force along the rail by mu N, of wheels that do nothing but spin; infinite if there is none across."""
+    """Force along the rail divided by mu N, of wheels that do nothing but spin; infinite if there is none across."""
     wheels = Wheels(cells=7)
     shares = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
     return float(np.abs(shares[:, 0]).max()) if np.abs(shares[:, 1]).min() > 1e-3 else np.inf
@@ -132,7 +132,8 @@ def is_wrong(run: Drive) -> bool:
 
 
 def left_open(run: Drive) -> float:
-    """Energy at the end, by that of the start, that the powers of the run do not account for; its steps are even."""
+    """Energy at the end, divided by that of the start, that the powers of the run do not account for; its steps are
+    even."""
     times, ends = run.run.times, [0, -1]
     few = Trajectory(times[ends], run.run.states[ends])
     first, last = energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
@@ -156,7 +157,7 @@ def parked(implementation: str, folder: Path) -> float:
 
 
 def locked(implementation: str, folder: Path) -> float:
-    """Force of locked wheels beside mu N against their sliding, by mu N."""
+    """Force of locked wheels beside mu N against their sliding, divided by mu N."""
     run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
     return float(np.abs(run["fx"] / run.grip() + 1.0).max())
 

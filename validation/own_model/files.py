@@ -160,7 +160,7 @@ def tree(count: int, seed: int) -> str:
 
 
 def changed(text: str, name: str, old: str, new: str) -> str:
-    """A model's text with a part that follows a name replaced by another one."""
+    """A model's text in which a piece of text that follows a name is replaced by another."""
     there = text.index(old, text.index(f'"{name}"'))
     return text[:there] + new + text[there + len(old) :]
 

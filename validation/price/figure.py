@@ -43,7 +43,7 @@ LONGEST_LABEL = 27
 SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
 """Coinciding curves show as rings within each other."""
 SINGLE_RUN_MARKER = 0.5
-"""Size of a marker whose seconds are those of one run, by that of the others."""
+"""Size of a marker whose seconds are those of one run, divided by that of the others."""
 FRONT: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
 BROKEN: Style = {
     "marker": "o",

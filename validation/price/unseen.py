@@ -82,7 +82,8 @@ class Verdict:
 
     @property
     def factor(self) -> float:
-        """Predicted by true error, or its inverse, whichever is above 1; errors below the floor count as the floor."""
+        """Predicted divided by true error, or its inverse, whichever is above 1; errors below the floor count as the
+        floor."""
         first, other = max(self.predicted, self.floor), max(self.true, self.floor)
         if first == other:
             return 1.0

@@ -107,7 +107,7 @@ class MeshedScene(ABC):
         return None if self.cells else Setting("reference", OTHER_METHOD, last.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> Any:
-        """Cells and run."""
+        """Number of cells, 0 where the scene has none, and the run with a setting for a duration (s)."""
         cells = round(1.0 / setting.value) if self.cells else 0
         rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
         if setting.method == OTHER_METHOD:

@@ -34,7 +34,7 @@ def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
 
 
 def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
-    """The vehicle with these values so many times as large; those that it has not are passed over."""
+    """The vehicle with its values multiplied by these factors; factors of values that it does not have are ignored."""
 
     def part(group: str, before: Any) -> Any:
         known = [key for key in PARAMETERS_OF_PARTS[group] if (group, before.name, key) in factors]

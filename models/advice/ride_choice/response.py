@@ -42,7 +42,7 @@ class Response:
         self.H = self._between(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
 
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates by heights (w, n, wheels), and outputs by forces on coordinates (w, q, n)."""
+        """Responses of coordinates to heights (w, n, wheels), and of outputs to forces on coordinates (w, q, n)."""
         one = np.eye(len(self.vehicle.linear.mass))
         return self._between([one], self.by_heights), self._between(self.read.by_motion, [one])
 

@@ -17,7 +17,7 @@ FADING_SPEED = 0.1
 MARGIN = 1.0 + 2e-15
 """A bound is a little more than itself where a traction on it is projected."""
 NEGLIGIBLE_SLIP = 1e-60
-"""Square of a rigid slip that turns no traction."""
+"""Square of a rigid slip that is too small to change the direction of a traction."""
 LARGEST_EXPONENT = 50.0
 
 

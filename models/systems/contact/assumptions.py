@@ -145,7 +145,7 @@ def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
 
 
 def _utilised_friction(run: Result, body: Contact) -> np.ndarray:
-    """Tangential forces by mu N; without friction any force is too large."""
+    """Tangential forces divided by mu N; without friction any force is too large."""
     force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
 

@@ -44,13 +44,14 @@ KINDS: dict[str, Parts] = {
 """Parts of the three creepages, each in units of its linear scale."""
 FINEST, ENOUGH = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
-taken where that error, by mu N, is larger."""
+taken where that error, divided by mu N, is larger."""
 Roll = Callable[[Motion], Any]
 
 
 @dataclass(frozen=True)
 class ContactCase:
-    """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N.
+    """One contact of semi-axes a and b (m). fx, fy divided by mu N; mz divided by mu N sqrt(ab); error: of the exact
+    grid, divided by mu N.
 
     parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
     """
@@ -83,7 +84,7 @@ class ContactCase:
 
     @property
     def force(self) -> Array:
-        """Exact force by mu N, (2,)."""
+        """Exact force divided by mu N, (2,)."""
         return np.array([self.fx, self.fy])
 
     def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
@@ -171,7 +172,8 @@ WAYS = (
 
 @dataclass(frozen=True)
 class TheoryPoint:
-    """A theory on a number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
+    """A theory on a number of cells. errors : (cases,) divided by mu N. seconds : of one evaluation, median over the
+    cases;
     range : the least and the most of them."""
 
     name: str
@@ -182,12 +184,12 @@ class TheoryPoint:
 
     @property
     def mean(self) -> float:
-        """Mean error by mu N."""
+        """Mean error divided by mu N."""
         return float(np.mean(self.errors))
 
     @property
     def most(self) -> float:
-        """Error by mu N that 95 of 100 cases keep to."""
+        """Error divided by mu N that 95 of 100 cases keep to."""
         return float(np.quantile(self.errors, 0.95))
 
 
@@ -273,7 +275,7 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
 
 
 TARGETS = (0.05, 0.02, 0.01, 0.005)
-"""Errors by mu N that are asked for."""
+"""Errors divided by mu N that are asked for."""
 
 
 def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:

@@ -125,7 +125,7 @@ class Drive:
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
-        """(m, w): horizontal force of each tyre by mu N, 0 in the air."""
+        """(m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
@@ -196,7 +196,7 @@ class ManoeuvreRerun:
 
     @property
     def step(self) -> float:
-        """s."""
+        """Step of the run (s)."""
         return float(self.drive.run.times[1])
 
     @cached_property

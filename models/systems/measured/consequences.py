@@ -42,8 +42,8 @@ Run = Callable[[Recording, Path], Outcome]
 
 @dataclass(frozen=True)
 class Consequence:
-    """The section that a finding changes most: rms of the change by that of the force, and damage as recorded by that
-    of the finding put right; NaN and no section where it cannot be told."""
+    """The section that a finding changes most: rms of the change divided by that of the force, and damage as recorded
+    divided by that with the finding put right; NaN and no section where it cannot be told."""
 
     finding: Finding
     section: str = ""

@@ -67,8 +67,8 @@ class Compared:
     """One check channel.
 
     offset : mean of the error; bands : of all but that; explained : part of the measured variance that the run gives,
-    1 at best; damage : of the run by that of the channel, by slope, NaN where the channel never moves; trusted : s
-    until the error of a stretch of ``STRETCH`` s exceeds ``HALF`` of the channel's rms, infinite if never.
+    1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
+    trusted : s until the error of a stretch of ``STRETCH`` s exceeds ``HALF`` of the channel's rms, infinite if never.
     """
 
     signal: Signal
@@ -276,7 +276,8 @@ def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Erro
 
 
 def disagreement(compared_channel: Compared, noise: float = 0.0) -> float:
-    """Rms of the error of a check channel by that of the channel, its noise (standard deviation) taken off both.
+    """Rms of the error of a check channel divided by that of the channel, its noise (standard deviation) taken off
+    both.
 
     0 of a channel that is more than a third noise: it can contradict nothing. Noise that is not known, NaN, is none.
     """

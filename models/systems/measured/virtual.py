@@ -84,7 +84,7 @@ class VirtualMeasurement:
 
     @property
     def step(self) -> float:
-        """s."""
+        """Step of the run (s)."""
         return float(self.run.times[1])
 
     @property

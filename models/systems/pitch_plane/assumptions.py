@@ -23,8 +23,8 @@ SIDEWALL = 0.12
 SEATED = 1e-3
 """m: a spring that is longer than it is free by less is at its edge."""
 ARTIFICIAL = 0.15
-"""Rms of an artificial moment up to 15 Hz by that of I pitch'', and of the force by that of m3 z3'', from which on it
-takes part in the damage: the limit that models/drift/score.py judges stabilisers by."""
+"""Rms of an artificial moment up to 15 Hz divided by that of I pitch'', and of the force divided by that of m3 z3'',
+from which on it takes part in the damage: the limit that models/drift/score.py judges stabilisers by."""
 
 
 def assumptions(assembly: Assembly) -> list[Assumption]:

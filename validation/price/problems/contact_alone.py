@@ -28,7 +28,7 @@ CURVES = {
     "theory of 1983": ("1983", "theory"),
     "exact theory": ("exact", "theory"),
 }
-"""Family and member of every way."""
+"""Family and member of every method."""
 _STRIPS, _NET = (5, 7, 11, 15, 21, 41, 81, 161), (7, 11, 15, 21, 31, 45)
 CELLS = {"linear theory": (1,), "theory of 1983": _NET, "exact theory": (6, 7, 8, 10, 14, 20)}
 """Cells along each axis of a contact, those of FASTSIM left out."""
@@ -38,7 +38,7 @@ DEFAULT_ANSWER = ("FASTSIM", 21)
 
 @dataclass(frozen=True)
 class ContactResult:
-    """Forces (n, 2) by mu N, what they took, and what the program says against them, if anything."""
+    """Forces (n, 2) divided by mu N, what they took, and what the program says against them, if anything."""
 
     forces: np.ndarray
     counts: dict[str, int]

@@ -174,7 +174,7 @@ class PrescribedPitch(ForceExcited):
         return guided
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """Moment and states."""
+        """Moment of the prescribed pitch and the states, of a run."""
         assert run.moment is not None
         return {"enforced moment": run.moment, "state": run.states}
 

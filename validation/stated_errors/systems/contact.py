@@ -17,7 +17,7 @@ from models.systems.contact.stated_error import rms
 from validation.stated_errors.sample import Sample, drawn
 
 MORE, MOST, OF_EXACT = 10, 400, 60
-"""Cells of the truths by those of the run; cells at most, along each axis, and those of the exact theory."""
+"""Cells of the truths divided by those of the run; cells at most, along each axis, and those of the exact theory."""
 THEORIES = ("fastsim", "fastsim", "fastsim", "simplified", "exact")
 LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 """Cells along each axis."""

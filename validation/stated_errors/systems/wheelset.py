@@ -22,7 +22,7 @@ from validation.stated_errors.sample import Sample, drawn
 
 ENGINES = ("reference", "exudyn", "mujoco")
 FINER, MORE, MOST = 8.0, 10, 200
-"""Steps and cells of the truths by those of the run; cells at most."""
+"""Steps and cells of the truths divided by those of the run; cells at most."""
 LONGEST = 2.4
 """Steps by the fastest motion's rate, at most."""
 

@@ -115,7 +115,7 @@ class PricedContact:
         return Answer(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Cells and march."""
+        """Lines of a scene that set the number of cells and the march."""
         march = [f'march = "{setting.method}"'] if setting.method in MARCHES["fastsim"] else []
         return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]
 

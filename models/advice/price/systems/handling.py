@@ -72,7 +72,7 @@ class PricedHandling(MeshedScene):
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
-        """Cells and step."""
+        """Lines of a scene that set the number of cells and the step."""
         return [
             "[tyres]",
             f"cells = {round(1 / setting.value)}",

@@ -54,7 +54,7 @@ class PricedWheelset(MeshedScene):
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
-        """Cells and step."""
+        """Lines of a scene that set the number of cells and the step."""
         step = f"step = {self.steps.get(setting.method, setting.value)!r}"
         cells = ["[contact]", f"cells = {round(1 / setting.value)}"] if self.cells else []
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]

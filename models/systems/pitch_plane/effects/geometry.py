@@ -13,7 +13,7 @@ def named(scene: Any) -> bool:
 
 
 def leave_out(table: dict[str, Any], scene: Any) -> None:
-    """Equations that are linear in the pitch."""
+    """Leave the effect out: the equations become linear in the pitch."""
     table.setdefault("vehicle", {})["geometry"] = "linear"
 
 
