@@ -1,6 +1,7 @@
 """What several test files share: an empty folder to work in, the command, and a new file among a system's effects."""
 
 import sys
+from functools import wraps
 from importlib import import_module
 
 import pytest
@@ -18,6 +19,7 @@ def figure_rules():
     def held(canvas_type, method):
         written = getattr(canvas_type, method)
 
+        @wraps(written)  # matplotlib passes the options that are in the signature
         def checked(canvas, *args, **options):
             with pytest.MonkeyPatch.context() as within:  # the rules draw the figure, which asks for the same once more
                 within.setattr(canvas_type, method, written)

@@ -47,7 +47,7 @@ def test_every_kernel_is_compiled_that_way():
 
 FACTORY = """
 from numba.extending import register_jitable
-from models.machine.compiled import named, njit
+from models.machine.compiled import named_closure, njit
 
 def inner(factor):
     def times(x):
@@ -61,7 +61,7 @@ def kernel(factor):
     times = inner(factor)
     def whole(x):
         return times(x) + times(2 * x)
-    return njit(cache=True)(named(whole, int(factor)))
+    return njit(cache=True)(named_closure(whole, int(factor)))
 """
 
 
@@ -78,7 +78,7 @@ def answers(folder, name, *factors):
 
 def test_closures_of_one_factory_never_stand_in_for_one_another(tmp_path):
     """Two processes keep a kernel each, a third loads both: each must call its own inner function, 3 times 1 x."""
-    named = "named(times, int(factor))"
+    named = "named_closure(times, int(factor))"
     assert answers(tmp_path, named, 2.0) == pytest.approx([6.0])
     assert answers(tmp_path, named, 3.0) == pytest.approx([9.0])
     assert answers(tmp_path, named, 2.0, 3.0) == pytest.approx([6.0, 9.0])
