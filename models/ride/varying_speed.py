@@ -207,7 +207,7 @@ class _Queue:
         self.met = _Met(responses, axle, met[~before], ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
-        """All go on for one step, those that are met in it join."""
+        """Moves all responses on by one step; those whose noise is met within the step join them."""
         n, _, k = self.waiting.shape
         moved = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
         self.waiting = np.concatenate([moved, self.met.of(step)], axis=1)

@@ -35,7 +35,7 @@ def by_load(on: str) -> TyreTable:
 
 
 def tables() -> Tables:
-    """Three surfaces, each by load."""
+    """Friction tables of three surfaces, each at several loads."""
     return stacked([by_load(name) for name in ("dry", "wet", "ice")])
 
 

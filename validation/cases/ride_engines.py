@@ -39,7 +39,7 @@ SAME_LAWS = "the same laws, added up in another order: 1e-16 of the largest forc
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Matrices always; states, paths, rest and price in the full share."""
+    """Compares matrices always; states, paths, rest and price in the full share alone."""
     rows: list[Row] = []
     for name in SHARES[not quick]:
         rows += _linearised(of_name(name), name, "unloaded", BOUNDS)

@@ -26,7 +26,7 @@ LOGARITHMS = np.log(TABLE)
 NODES = CubicHermiteSpline(LOG_RATIOS, LOGARITHMS, np.gradient(LOGARITHMS, LOG_RATIOS, axis=0, edge_order=2))
 LONG_NODES = make_interp_spline(np.log(LONG_RATIOS), np.log(LONG_C33), k=1)
 Left = Callable[[float], float]
-"""Share of the friction that is left at a slip, by the rolling speed."""
+"""Share of the friction that is left at a slip velocity divided by the rolling speed."""
 
 
 def constant(slip: float) -> float:
