@@ -332,6 +332,9 @@ def twin(
         float | None, typer.Option(help="Find the engine, integrator and step that hold this error, rad or m.")
     ] = None,
     quantity: Annotated[str | None, typer.Option(help="Joint that the tolerance is of; all joints if none.")] = None,
+    controls: Annotated[
+        Path | None, typer.Option(help="CSV of the actuators' controls over time, for the paths; constant if none.")
+    ] = None,
 ) -> None:
     """Build a model of your own in every engine, and prove it equal or tell where it differs.
 
@@ -342,7 +345,7 @@ def twin(
 
     check_asked(files, page)
     with waiting("building the model") as tell:
-        twins = examine(files, kinds(without), Wanted(states, march, tolerance, quantity), tell)
+        twins = examine(files, kinds(without), Wanted(states, march, tolerance, quantity, controls), tell)
     print("\n".join(lines(twins)))
     if page is not None:
         from studies.twin_page import write

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import SLIDES
-from models.multibody.plain.joint_elements import PlainTree
+from models.multibody.plain.joint_elements import Acting, PlainTree
 from models.own_model.constraints import Rows, by_differences, plain_constraints, tied
 from models.own_model.coordinates import MujocoState
 from models.own_model.reading import TwinModel, controls
@@ -84,7 +84,7 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
     turns = [(turn.bodies, turn.axes, turn.stiffness, turn.damping) for turn in twin.driven.turning_springs]
     pushes = [(load.body, load.point, load.force, load.moment) for load in twin.driven.body_loads]
-    return PlainTree(twin.driven.vehicle, twin.driven.gravity, loads, lines, frictions, turns, pushes)
+    return PlainTree(twin.driven.vehicle, twin.driven.gravity, Acting(loads, lines, frictions, turns, pushes))
 
 
 def expected(twin: TwinModel, build: str) -> Equations:

@@ -5,19 +5,22 @@ Builds have the same coordinates, so they agree to rounding as long as the motio
 same tableau is another approximation of the same motion, and its distance is of the order of the step's error.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import mujoco
 import numpy as np
+from scipy.integrate import simpson
 
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
+from models.multibody.plain.joint_elements import PlainTree
 from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
 from models.own_model.content import ranges
+from models.own_model.control_table import ControlTable, Leg, constant_leg
 from models.own_model.limits import limits_struck
 from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
@@ -38,7 +41,7 @@ class PathReport:
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
     whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
     whether there is dry friction: paths are compared as long as it slides; struck : whose limit, which is not
-    built, ends the comparison, empty if none's."""
+    built, ends the comparison, empty if none's; controls : name of their file, empty where they are constant."""
 
     step: float
     horizon: float
@@ -49,6 +52,7 @@ class PathReport:
     soft: bool = False
     rubbing: bool = False
     struck: str = ""
+    controls: str = ""
 
     @property
     def alike(self) -> bool:
@@ -59,7 +63,8 @@ class PathReport:
 
     def lines(self) -> list[str]:
         """For the terminal."""
-        rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state:"]
+        under = f", under {self.controls}" if self.controls else ""
+        rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state{under}:"]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
         if self.struck:
             rows.append(
@@ -80,26 +85,29 @@ class PathReport:
         return rows
 
 
-def paths(twin: TwinModel, step: float | None = None) -> PathReport:
-    """Paths over 1 s; step (s): the file's unless given."""
+def paths(twin: TwinModel, step: float | None = None, table: ControlTable | None = None) -> PathReport:
+    """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without."""
     step = DURATION / np.ceil(DURATION / (step or float(twin.model.opt.timestep)) - 1e-9)
     steps, (q,), (v,) = round(DURATION / step), *random_states(twin, 1)
+    legs = table.legs(twin, steps, step) if table else constant_leg(twin, steps)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for build in (*ENGINES, PLAIN):
-        _march(build, partial(_by_build, twin, build, (q, v), (steps, step)), built, failed)
-    _march(FILE, lambda: file_path(twin, (q, v), (steps, step)), built, failed)
+        _march(build, partial(_by_build, legs, build, (q, v), step), built, failed)
+    held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
+    _march(FILE, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
     first = built.pop(ENGINES[0], None)
+    under = table.path.name if table else ""
     if first is None:
-        return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None)
+        return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None, controls=under)
     soft = twin.driven.tied
     calm = PLAIN if soft and PLAIN in built else ENGINES[0]
-    disturbed = _model(twin, calm).march(q + DISTURBED, v, steps, step)
-    rows = _sliding_rows(twin, first[: _rows(built.get(calm, first), disturbed, steps)])
+    disturbed = _by_build(legs, calm, (q + DISTURBED, v), step)
+    rows = _sliding_rows(legs, first[: _rows(built.get(calm, first), disturbed, steps)])
     rows, struck = _unlimited_rows(twin, first[:rows])
     base = {FILE: built.get(SOFT, first)} if soft else {}
     distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
-    energy = _ledger(twin, first[:rows], step)
-    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck
+    energy = _ledger(legs, first[:rows], step)
+    kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck, under
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
 
 
@@ -116,9 +124,13 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
         failed[name] = "the motion blows up at this step"
 
 
-def _by_build(twin: TwinModel, build: str, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float]) -> np.ndarray:
-    """States (steps + 1, 2 n) of a build from coordinates and rates, by so many steps of so many seconds."""
-    return _model(twin, build).march(*start, *grid)
+def _by_build(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
+    """States (steps + 1, 2 n) of a build from coordinates and rates (n,), leg by leg, by steps of so many seconds."""
+    path = np.concatenate(start)[None]
+    for leg in legs:
+        q, v = np.split(path[-1], 2)
+        path = np.concatenate((path, _model(leg.twin, build).march(q, v, leg.steps, step)[1:]))
+    return path
 
 
 def _model(twin: TwinModel, build: str) -> FreeModel:
@@ -131,15 +143,19 @@ def _model(twin: TwinModel, build: str) -> FreeModel:
 
 
 def file_path(
-    twin: TwinModel, start: tuple[np.ndarray, np.ndarray], grid: tuple[int, float], integrator: str = "RK4"
+    twin: TwinModel,
+    start: tuple[np.ndarray, np.ndarray],
+    grid: tuple[int, float],
+    integrator: str = "RK4",
+    held: np.ndarray | None = None,
 ) -> np.ndarray:
     """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), by so many steps of
-    so many seconds."""
+    so many seconds; held : controls (steps, nu), constant without."""
     (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
     state = twin.coordinates.to_mujoco(*start)
-    held = np.tile(controls(model), (steps, 1)) if model.nu else np.empty((steps, 0))
+    held = np.tile(controls(model), (steps, 1)) if held is None else held
     try:
         return march(model, data, np.concatenate((state.qpos, state.qvel)), held)
     finally:
@@ -153,11 +169,12 @@ def _rows(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
     return max(2, int(grown[0])) if len(grown) else steps + 1
 
 
-def _sliding_rows(twin: TwinModel, path: np.ndarray) -> int:
+def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
     """How many states of a path lie before dry friction sticks in MuJoCo, less one whose step may have met that."""
-    n = twin.size
-    for i, row in enumerate(path if twin.driven.frictions else ()):
-        if not sliding(twin, [(row[:n], row[n:])]):
+    acting = (leg.twin for leg in legs for _ in range(leg.steps))
+    for i, (twin, row) in enumerate(zip(acting, path, strict=False)):
+        q, v = np.split(row, 2)
+        if twin.driven.frictions and not sliding(twin, [(q, v)]):
             return max(2, i - 1)
     return len(path)
 
@@ -183,18 +200,21 @@ def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -
     return float(np.abs(path - first).max() / max(1.0, np.abs(first).max()))
 
 
-def _ledger(twin: TwinModel, path: np.ndarray, step: float) -> float | None:
+def _ledger(legs: Sequence[Leg], path: np.ndarray, step: float) -> float | None:
     """Kinetic energy less the work of all forces by Simpson's rule, as a share; None for fewer than three states."""
-    n, rows = twin.size, len(path) - 1 + len(path) % 2
-    if rows < 3:
+    if len(path) < 3:
         return None
-    plain = plain_tree(twin)
-    kinetic, power = np.empty(rows), np.empty(rows)
-    for i, row in enumerate(path[:rows]):
-        q, v = row[:n], row[n:]
-        mass, _ = plain.mass_and_force(0.0, q, v)
-        kinetic[i], power[i] = 0.5 * v @ mass @ v, v @ plain.applied(q, v)
-    weights = np.full(rows, 2.0)
-    weights[1::2], weights[[0, -1]] = 4.0, 1.0
-    work = step / 3.0 * float(weights @ power)
-    return float(abs(kinetic[-1] - kinetic[0] - work) / max(kinetic.max(), 1e-12))
+    kinetic, work, first = list[float](), 0.0, 0
+    for leg in legs:
+        plain, states = plain_tree(leg.twin), path[first : first + leg.steps + 1]
+        energies, powers = zip(*(_energy_and_power(plain, *np.split(row, 2)) for row in states), strict=True)
+        kinetic, work, first = [*kinetic, *energies], work + float(simpson(powers, dx=step)), first + leg.steps
+        if first >= len(path) - 1:
+            break
+    return float(abs(kinetic[-1] - kinetic[0] - work) / max(*kinetic, 1e-12))
+
+
+def _energy_and_power(plain: PlainTree, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    """Kinetic energy (J), and power of all forces (W)."""
+    mass, _ = plain.mass_and_force(0.0, q, v)
+    return 0.5 * float(v @ mass @ v), float(v @ plain.applied(q, v))

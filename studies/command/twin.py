@@ -7,6 +7,7 @@ from pathlib import Path
 
 from models.core.errors import InputError
 from models.own_model.certificate import ALIKE, MET, Agreement, certificate, softness, states_of
+from models.own_model.control_table import ControlTable, read_controls
 from models.own_model.elements import Element
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
@@ -26,12 +27,13 @@ def _silent(what: str, share: float) -> None:
 @dataclass(frozen=True)
 class Wanted:
     """states : random ones, at which accelerations are compared; paths : whether they are compared, too; tolerance
-    (rad, m), quantity : of the price, None for none and for all joints."""
+    (rad, m), quantity : of the price, None for none and for all joints; controls : file of those of paths."""
 
     states: int = COUNT
     paths: bool = True
     tolerance: float | None = None
     quantity: str | None = None
+    controls: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +104,16 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
     """
     if wanted.states < 1:
         raise InputError("--states", "", wanted.states, "must be 1 or more")
+    if wanted.controls and (not wanted.paths or wanted.tolerance is not None):
+        allowed = "acts on paths alone: leave out --no-paths and --tolerance"
+        raise InputError("--controls", "", str(wanted.controls), allowed)
     read_files = [read(path, without) for path in files]
+    tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
     parts = len(files) + (len(files) > 1)
-    examined = [_examined(file, wanted, partial(_told, tell, i, parts)) for i, file in enumerate(read_files)]
+    examined = [
+        _examined(file, table, wanted, partial(_told, tell, i, parts))
+        for i, (file, table) in enumerate(zip(read_files, tables, strict=True))
+    ]
     if len(examined) < 2:
         return Twins(tuple(examined), None)
     tell("comparing the files", len(files) / parts)
@@ -120,13 +129,13 @@ def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
     tell(what, (number + share) / parts)
 
 
-def _examined(file: ModelFile, wanted: Wanted, tell: Tell) -> Examined:
+def _examined(file: ModelFile, table: ControlTable | None, wanted: Wanted, tell: Tell) -> Examined:
     """One file: the certificate is a third of the work, paths another one, the price the last."""
     agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
     explained = {each.build: culprits(file.twin, each.build) for each in agreements if not each.alike}
     lost = misread(file) if file.document.kind == "URDF" else []
     tell("marching", 1 / 3)
-    report = paths(file.twin) if wanted.paths else None
+    report = paths(file.twin, table=table) if wanted.paths else None
     price: tuple[str, ...] = ()
     if wanted.tolerance is not None:
         from models.advice.own_model_price import priced

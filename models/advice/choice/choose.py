@@ -93,14 +93,13 @@ class Chooser:
         engine: str,
         quantities: list[str],
         tolerance: float,
-        window: float = WINDOW,
         progress: Callable[[float], None] = lambda share: None,
         executor: Executor | None = None,
     ) -> None:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine, executor), quantities)
         self.alike = self.whole.sampled == set(quantities)
-        part = self._part(window)
+        part = self._part()
         self.step_factor, self.error = self._steps(part)
         self.teller = self._coarse(self.whole)
         self.screen = self._coarse(part) if self.alike else self.teller
@@ -111,12 +110,12 @@ class Chooser:
         self._pairs: list[Set] | None = None
         self.rounds, self._doubtful, self.ended = 0, list[float](), False
 
-    def _part(self, window: float) -> Screen:
+    def _part(self) -> Screen:
         """The first part of the scene, or few of its samples."""
         whole = self.whole.variants
         if not whole.system.WINDOWED:
             return self.whole
-        part = whole.window(math.ceil(window * whole.system.steps(whole.scene)))
+        part = whole.window(math.ceil(WINDOW * whole.system.steps(whole.scene)))
         return self.whole if part is whole else Screen(part, self.whole.quantities)
 
     def _coarse(self, screen: Screen) -> Screen:

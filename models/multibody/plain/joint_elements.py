@@ -4,6 +4,7 @@ Nothing here is shared with an engine or with the compiled kernels: bodies move 
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,19 @@ Friction = tuple[int, float, float]
 """A coordinate's number, its dry friction (N, N m), and the speed (m/s, rad/s) from which it has that force."""
 Load = tuple[str, Vector, np.ndarray]
 """A body, a point (m) on it in the design position, a force (3,) in N along the axes of space."""
+
+
+class Acting(NamedTuple):
+    """What acts on bodies besides gravity and joint elements; lists may be empty."""
+
+    loads: Sequence[Load] = ()
+    lines: Sequence[Line] = ()
+    frictions: Sequence[Friction] = ()
+    turns: Sequence[Turn] = ()
+    followers: Sequence[Follower] = ()
+
+
+NOTHING_ACTS = Acting()
 
 
 def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
@@ -41,17 +55,9 @@ def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
 class PlainTree:
     """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
-    def __init__(
-        self,
-        vehicle: SpatialVehicle,
-        gravity: np.ndarray,
-        loads: Sequence[Load] = (),
-        lines: Sequence[Line] = (),
-        frictions: Sequence[Friction] = (),
-        turns: Sequence[Turn] = (),
-        followers: Sequence[Follower] = (),
-    ) -> None:
+    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, acting: Acting = NOTHING_ACTS) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
+        loads, lines, frictions, turns, followers = acting
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])

@@ -1,0 +1,87 @@
+"""Controls of a model's actuators over time, from a CSV: those of a row hold until the next row's time.
+
+MuJoCo holds controls over each of its steps; so do all builds here, and every row lies on a step.
+"""
+
+import copy
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.tables import SECONDS, read_table
+from models.own_model.reading import TwinModel, controls, described
+
+UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
+"""Units that a control may have: SI, as MuJoCo takes it."""
+ON_STEP = 1e-6
+"""Share of a step by which a row's time may miss it."""
+
+
+class Leg(NamedTuple):
+    """So many steps of a path under constant controls (nu,): ``twin`` has them among the constants of its actuators."""
+
+    twin: TwinModel
+    steps: int
+    controls: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ControlTable:
+    """path : of the file; times (rows,) in s from 0, rising; values (rows, nu) in the order of the actuators."""
+
+    path: Path
+    times: np.ndarray
+    values: np.ndarray
+
+    def legs(self, twin: TwinModel, steps: int, step: float) -> list[Leg]:
+        """Those of a path of so many steps of so many seconds; InputError where a row lies between two steps."""
+        first = self.times / step
+        off = np.flatnonzero(abs(first - np.round(first)) > ON_STEP)
+        if len(off):
+            time, allowed = float(self.times[off[0]]), f"times must be multiples of the step, {step:g} s"
+            raise InputError(self.path, f"row {off[0] + 1}, column 'time'", time, allowed)
+        ends = [*np.round(first).astype(int).tolist(), steps]
+        counts = [min(end, steps) - start for start, end in pairwise(ends) if start < steps]
+        return [Leg(held_at(twin, row), count, row) for row, count in zip(self.values, counts, strict=False)]
+
+
+def constant_leg(twin: TwinModel, steps: int) -> list[Leg]:
+    """The whole path under the constant controls of the model."""
+    return [Leg(twin, steps, controls(twin.model))]
+
+
+def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
+    """Read a CSV with columns ``time [s]`` and one for each actuator, by name (``actuator 3`` where it has none).
+
+    Raises InputError for what ``read_table`` refuses, a first time that is not 0, and a control out of its range.
+    """
+    names = [model.actuator(i).name or f"actuator {i}" for i in range(model.nu)]
+    if not names:
+        raise InputError("--controls", "", str(path), "the model has no actuators")
+    table = read_table(path, {"time": SECONDS, **dict.fromkeys(names, UNITS)}, increasing="time")
+    if table["time"][0] != 0.0:
+        raise InputError(path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")
+    for i, name in enumerate(names):
+        low, high = model.actuator_ctrlrange[i] if model.actuator_ctrllimited[i] else (-np.inf, np.inf)
+        beyond = np.flatnonzero((table[name] < low) | (table[name] > high))
+        if len(beyond):
+            place = f"row {beyond[0] + 1}, column {name!r}"
+            raise InputError(path, place, float(table[name][beyond[0]]), f"its range is from {low:g} to {high:g}")
+    return ControlTable(path, table["time"], np.column_stack([table[name] for name in names]))
+
+
+def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
+    """The model whose actuators do at its own constant controls what they do at others (nu,): in their bias."""
+    model, change = copy.copy(twin.model), constant - controls(twin.model)
+    for i in range(model.nu):
+        gain = np.array(model.actuator_gainprm[i, :3])
+        gain[1:] *= model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_AFFINE
+        model.actuator_biasprm[i, :3] *= model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
+        model.actuator_biasprm[i, :3] += gain * change[i]
+        model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
+    return described(model, twin.name)
