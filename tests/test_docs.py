@@ -1,5 +1,6 @@
 """The pages of the documentation: links, names, scenes and the reference are those of the repository."""
 
+import ast
 import re
 import tomllib
 from functools import cache
@@ -138,6 +139,26 @@ def test_every_name_of_code_is_there(name):
             "export",
             "twin",
         ), command
+
+
+@each_page
+def test_every_name_that_an_example_imports_is_there(name):
+    """Names that ``from MODULE import ...`` takes from the project."""
+    for block in blocks(PAGES[name].read_text()):
+        for node in ast.walk(ast.parse(block.text)) if block.language == "python" else ():
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in TOP:
+                missing = [each.name for each in node.names if not _is_there(node.module, each.name)]
+                assert not missing, f"{node.module}: {missing}"
+
+
+TOP = ("models", "studies", "validation", "twinrig", "docs")
+
+
+def _is_there(module: str, name: str) -> bool:
+    try:
+        return hasattr(import_module(module), name) or bool(import_module(f"{module}.{name}"))
+    except ImportError:
+        return False
 
 
 NEW_FILES = ("models/systems/handling/effects/side_wind.py",)
