@@ -65,6 +65,7 @@ def test_the_price_names_a_setting_of_every_engine_and_what_its_default_loses(as
         (("cart.xml", "--states", "0"), "--states = 0: must be 1 or more"),
         (("cart.xml", "arm.urdf", "other.xml"), "one, or two to be compared"),
         (("cart.xml", "--page", "no/page.html"), "no/page.html"),
+        (("cart.xml", "--quantity", "tilt"), "give both, or neither"),
         (("cart.xml", "--controls", "c.csv"), "the model has no actuators"),
         (("cart.xml", "--controls", "c.csv", "--no-paths"), "leave out --no-paths"),
         (("cart.xml", "--tolerance", "-1", "--states", "1", "--no-paths"), "--tolerance = -1.0: must be a finite"),

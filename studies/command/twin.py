@@ -104,6 +104,8 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
     """
     if wanted.states < 1:
         raise InputError("--states", "", wanted.states, "must be 1 or more")
+    if wanted.quantity is not None and wanted.tolerance is None:
+        raise InputError("--quantity", "", wanted.quantity, "is what --tolerance is of: give both, or neither")
     if wanted.controls and (not wanted.paths or wanted.tolerance is not None):
         allowed = "acts on paths alone: leave out --no-paths and --tolerance"
         raise InputError("--controls", "", str(wanted.controls), allowed)
