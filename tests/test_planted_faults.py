@@ -38,6 +38,14 @@ def test_there_are_enough_and_each_has_a_name_of_its_own():
     assert len({fault.name for fault in FAULTS}) == len(FAULTS)
 
 
+@pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
+def test_what_a_fault_changes_is_there(own):
+    """What it is planted in has not been renamed since; the full campaigns run it."""
+    for each in own.faults:
+        with each.inside()():
+            pass
+
+
 @pytest.mark.full
 def test_all_rows_pass(measured):
     assert [row.reason for row in case.rows(measured) if row.status in ("failed", "not run")] == []

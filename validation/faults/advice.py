@@ -230,7 +230,8 @@ FAULTS = (
         "the engine's default dropped from the race",
         "recommendation",
         _in_module(
-            "_timed", lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default]
+            "_timed_settings",
+            lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default],
         ),
     ),
     Fault(
@@ -248,7 +249,7 @@ FAULTS = (
     Fault(
         "the reference's first step taken for the truth",
         "truth",
-        _in_module("_settled", lambda _: _first_rung, "truth"),
+        _in_module("_settled_answer", lambda _: _first_rung, "truth"),
     ),
     Fault(
         "a tolerance three times too wide",
