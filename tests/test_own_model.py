@@ -488,6 +488,44 @@ def test_what_must_not_reach_the_parser_does_not(tmp_path, text, said):
     assert said in str(error.value) and "a.xml" in str(error.value)
 
 
+def _nested(folder: Path, **texts: str) -> Path:
+    """A model in ``in``, with files in and beside it; keys: folders joined by two underscores, and the file."""
+    for name, text in texts.items():
+        path = folder / f"{name.replace('__', '/')}.xml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder / "in" / "main.xml"
+
+
+@pytest.mark.parametrize("kind", ["include", "model"])
+def test_nothing_outside_is_read_by_an_include_within_an_include(tmp_path, kind):
+    """MuJoCo looks in the folder of the model, not of the file that includes; the sound file that a reader from the
+    other folder would take is there, too."""
+    asks = {"include": '<include file="../x.xml"/>', "model": '<asset><model name="x" file="../x.xml"/></asset>'}[kind]
+    sound = "<mujoco><worldbody/></mujoco>"
+    main = _nested(
+        tmp_path,
+        in__main='<mujoco><include file="sub/a.xml"/></mujoco>',
+        in__sub__a=f"<mujoco>{asks}</mujoco>",
+        in__x=sound,
+        x='<mujoco><extension><plugin plugin="mujoco.elasticity.cable"/></extension></mujoco>',
+    )
+    with pytest.raises(InputError, match=r"a\.xml.*\.\./x\.xml.*must name a file in the folder"):
+        read(main)
+
+
+def test_includes_are_looked_for_where_mujoco_does(tmp_path):
+    """Those of a model in its folder, those of an attached model in that one's: the plugin of either is seen."""
+    plugin, sound = '<mujoco><extension><plugin plugin="x"/></extension></mujoco>', "<mujoco/>"
+    nested = {"in__main": '<mujoco><include file="sub/a.xml"/></mujoco>'}
+    nested |= {"in__sub__a": '<mujoco><include file="b.xml"/></mujoco>', "in__b": plugin, "in__sub__b": sound}
+    attached = nested | {"in__main": '<mujoco><asset><model name="a" file="sub/a.xml"/></asset></mujoco>'}
+    attached |= {"in__b": sound, "in__sub__b": plugin}
+    for texts in (nested, attached):
+        with pytest.raises(InputError, match="plugins are code"):
+            read(_nested(tmp_path, **texts))
+
+
 @pytest.mark.parametrize(
     "text,old,new,said",
     [

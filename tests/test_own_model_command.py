@@ -68,6 +68,7 @@ def test_the_price_names_a_setting_of_every_engine_and_what_its_default_loses(as
         (("cart.xml", "--quantity", "tilt"), "give both, or neither"),
         (("cart.xml", "--controls", "c.csv"), "the model has no actuators"),
         (("cart.xml", "--controls", "c.csv", "--no-paths"), "leave out --no-paths"),
+        (("cart.xml", "other.xml", "--controls", "c.csv"), "paths of one file alone"),
         (("cart.xml", "--tolerance", "-1", "--states", "1", "--no-paths"), "--tolerance = -1.0: must be a finite"),
         (("cart.xml", "--tolerance", "1", "--quantity", "tild", "--states", "1", "--no-paths"), "did you mean 'tilt'"),
     ],

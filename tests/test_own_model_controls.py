@@ -106,6 +106,13 @@ def test_a_row_between_two_steps_is_refused(twin, tmp_path):
         paths(twin, table=read_controls(path, twin.model))
 
 
+@pytest.mark.parametrize("name", ["time", "actuator 3"])
+def test_columns_of_one_name_are_refused(tmp_path, name):
+    (tmp_path / "cart.xml").write_text(DRIVEN.replace('name="push"', f'name="{name}"'))
+    with pytest.raises(InputError, match="rename the model's actuators"):
+        read_controls(tmp_path / "controls.csv", read(tmp_path / "cart.xml").twin.model)
+
+
 def test_a_model_without_actuators_has_no_controls(tmp_path):
     (tmp_path / "cart.xml").write_text(CART)
     with pytest.raises(InputError, match="no actuators"):

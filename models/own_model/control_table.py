@@ -63,6 +63,8 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
     names = [model.actuator(i).name or f"actuator {i}" for i in range(model.nu)]
     if not names:
         raise InputError("--controls", "", str(path), "the model has no actuators")
+    if len({"time", *names}) <= len(names):
+        raise InputError("--controls", "", str(path), "columns would share a name: rename the model's actuators")
     table = read_table(path, {"time": SECONDS, **dict.fromkeys(names, UNITS)}, increasing="time")
     if table["time"][0] != 0.0:
         raise InputError(path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")

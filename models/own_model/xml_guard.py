@@ -6,7 +6,7 @@ file's folder, and counts that no machine could hold.
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.parsers import expat
 
 from models.core.errors import InputError
@@ -80,10 +80,18 @@ class _Reader:
         raise InputError(self.path.name, place, "DOCTYPE", "document types and entities are not read")
 
 
+class _Folders(NamedTuple):
+    """allowed : nothing may lie outside of it; base : where MuJoCo looks for what is included: the folder of the model
+    file, not of the file that includes; an attached model has its own."""
+
+    allowed: Path
+    base: Path
+
+
 def guarded(path: Path) -> Document:
     """The file's elements; InputError for what must not reach the parser."""
     folder, elements = path.resolve().parent, list[XmlElement]()
-    _read(path, folder, elements, 0)
+    _read(path, _Folders(folder, folder), elements, 0)
     root = elements[0].tag
     if root not in ROOTS:
         allowed = "must be <mujoco> (MJCF) or <robot> (URDF)"
@@ -100,26 +108,27 @@ def _content(path: Path) -> bytes:
         raise InputError(str(path), "", None, f"cannot be read: {error.strerror or error}") from None
 
 
-def _read(path: Path, folder: Path, elements: list[XmlElement], depth: int) -> None:
+def _read(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
     for element in _Reader(path).read(_content(path)):
         elements.append(element)
         place = f"line {element.line}"
         if element.tag in PLUGINS or "plugin" in element.attributes:
             raise InputError(path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
         if element.tag in ("include", "model") and "file" in element.attributes:
-            _include(path, folder, element, elements, depth)
+            _include(path, folders, element, elements, depth)
         _check_counts(path, element, place)
 
 
-def _include(path: Path, folder: Path, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
-    """Read what an element includes, unless it lies outside."""
+def _include(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
+    """Read what an element includes or attaches, unless it lies outside."""
     name, place = element.attributes["file"], f"line {element.line}"
-    target = (path.resolve().parent / name).resolve()
-    if not target.is_relative_to(folder):
+    target = (folders.base / name).resolve()
+    if not target.is_relative_to(folders.allowed):
         raise InputError(path.name, place, name, f"<{element.tag}> must name a file in the folder of the model")
     if depth >= DEEPEST:
         raise InputError(path.name, place, name, f"includes go {DEEPEST} deep at the most")
-    _read(target, folder, elements, depth + 1)
+    base = target.parent if element.tag == "model" else folders.base
+    _read(target, _Folders(folders.allowed, base), elements, depth + 1)
 
 
 def _check_counts(path: Path, element: XmlElement, place: str) -> None:

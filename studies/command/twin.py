@@ -106,8 +106,8 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
         raise InputError("--states", "", wanted.states, "must be 1 or more")
     if wanted.quantity is not None and wanted.tolerance is None:
         raise InputError("--quantity", "", wanted.quantity, "is what --tolerance is of: give both, or neither")
-    if wanted.controls and (not wanted.paths or wanted.tolerance is not None):
-        allowed = "acts on paths alone: leave out --no-paths and --tolerance"
+    if wanted.controls and (not wanted.paths or wanted.tolerance is not None or len(files) > 1):
+        allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(wanted.controls), allowed)
     read_files = [read(path, without) for path in files]
     tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
