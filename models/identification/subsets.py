@@ -111,7 +111,8 @@ class Choice:
         return mean, np.sqrt(self.weights @ (self.inflation * variances + (means - mean) ** 2))
 
     def hard_to_tell_apart(self) -> list[tuple[str, str, float]]:
-        """Pairs of parameters whose estimates in the fullest subset are HIGH_CORRELATION, and their correlation."""
+        """Pairs of parameters whose estimates in the fullest subset correlate by more than HIGH_CORRELATION, and by how
+        much."""
         fullest = max(self.fits, key=lambda fit: len(fit.names))
         size = np.sqrt(np.diag(fullest.covariance))
         pairs = combinations(range(len(size)), 2)

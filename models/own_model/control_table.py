@@ -14,7 +14,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table
-from models.own_model.reading import TwinModel, controls, described
+from models.own_model.reading import TwinModel, affine_law, controls, described
 
 UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
 """Units that a control may have: SI, as MuJoCo takes it."""
@@ -78,12 +78,10 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
 
 
 def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
-    """The model whose actuators do at its own constant controls what they do at others (nu,): in their bias."""
-    model, change = copy.copy(twin.model), constant - controls(twin.model)
+    """The model whose actuators do, at any control, what the given ones do at constant controls (nu,)."""
+    model = copy.copy(twin.model)
     for i in range(model.nu):
-        gain = np.array(model.actuator_gainprm[i, :3])
-        gain[1:] *= model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_AFFINE
-        model.actuator_biasprm[i, :3] *= model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
-        model.actuator_biasprm[i, :3] += gain * change[i]
+        model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(constant[i]))
+        model.actuator_gainprm[i, :3] = 0.0
         model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
     return described(model, twin.name)
