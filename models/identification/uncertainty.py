@@ -143,12 +143,12 @@ def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.nd
     return total
 
 
-def _larger_covariance(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
-    values, vectors = np.linalg.eigh(two)
+    values, vectors = np.linalg.eigh(second)
     values = np.maximum(values, SINGULAR * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
-    ratios, turned = np.linalg.eigh(back @ one @ back)
+    ratios, turned = np.linalg.eigh(back @ first @ back)
     return root @ (turned * np.maximum(ratios, 1.0)) @ turned.T @ root
 
 
