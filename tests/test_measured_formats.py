@@ -286,12 +286,6 @@ def test_no_cut_at_any_byte_is_silent(tmp_path, extension):
     assert sweep.silent(tmp_path) == 0
 
 
-@pytest.mark.full
-def test_every_row_of_the_full_case_passes(tmp_path):
-    rows, _ = case.measure(False, tmp_path)
-    assert [row.id for row in rows if row.status in ("failed", "not run")] == []
-
-
 @pytest.mark.parametrize("unit, factor", [("ms", 1e3), ("s", 1.0), ("us", 1e6), ("", 1.0)])
 def test_a_master_channel_in_another_unit_is_read_in_seconds(tmp_path, unit, factor):
     asammdf = pytest.importorskip("asammdf")
