@@ -14,8 +14,8 @@ from models.advice.own_model_price import priced
 from models.core.errors import InputError, RunFailed
 from models.engines.free_vehicle import free_model
 from models.own_model import certificate as certifying
-from models.own_model.builds import BUILDS, as_parsed, equations, largest_gap, sliding
-from models.own_model.certificate import agreement, certificate, moved_at, softness, states_of
+from models.own_model.builds import BUILDS, SOFT, as_parsed, equations, largest_gap, sliding
+from models.own_model.certificate import agreement, certificate, moved_at, reference, softness, states_of
 from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
@@ -95,11 +95,56 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     """Far from rigid, and the law all the same: to 1e-8, MuJoCo's tolerance; the fault: another impedance."""
     states = states_of(geared, 10)
     assert softness(geared, 10) > 1e-3
-    soft = moved_at(as_parsed(geared), states)
-    assert agreement("", moved_at(softly_coupled(geared), states), soft, geared).acceleration < 1e-8
+    soft = reference(geared, states, SOFT)
+    assert agreement("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement("", moved_at(softly_coupled(other), states), soft, geared).acceleration > 1e-4
+    assert agreement("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
+
+
+def _beside(stiffness: float, spring: float = 1000.0) -> str:
+    """A slide of 1 kg, and beside it a hinge that accelerates 1e9 times as much."""
+    return f"""<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0" stiffness="{stiffness!r}"/>
+    <inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body><body pos="0 1 0"><joint name="t" axis="0 0 1"
+    stiffness="{spring!r}"/><inertial pos="0 0 0" mass="1e-4" diaginertia="1e-9 1e-9 1e-9"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("stiffness", [20.0, 10.0 * (1.0 + 1e-9)])
+def test_no_coordinate_hides_behind_one_that_accelerates_more(tmp_path, monkeypatch, stiffness):
+    """Of two files, and of a build that lacks what the other file has; rounding of the light hinge does no harm."""
+    first, second = (_read(tmp_path, _beside(k), f"{k}.xml").twin for k in (10.0, stiffness))
+    comparison = compare(first, second, 3)
+    (difference,) = comparison.influential
+    assert not comparison.alike and difference.owner == "joint 'x'" and comparison.apart.worst == "joint 'x'"
+    assert all(row.alike for row in certificate(first, 20))
+    honest = equations
+    monkeypatch.setattr(certifying, "equations", lambda twin, build: honest(second, build))
+    assert not any(row.alike for row in certificate(first, 20))
+
+
+@pytest.mark.parametrize("kind", ["ball", "free"])
+def test_rounding_is_no_difference(tmp_path, kind):
+    """Where weights are borne, accelerations are near 0, axes mix, the world is far away, and bodies differ in mass by
+    1e9: every build is alike, and 1e-9 of a small mass is seen all the same."""
+    joints = {"ball": '<joint name="b" type="ball" pos="0 0 .1"/>', "free": '<freejoint name="b"/>'}[kind]
+    text = f"""<mujoco><worldbody><body pos="40 -70 30"><joint name="y" type="slide" axis="0 1 0" damping="3"/>
+    <inertial pos="0 0 0" mass="900" diaginertia="1 1 1"/><body euler="0 90 0"><joint name="spin" axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="20" diaginertia="1 1 .4"/><body pos=".2 0 0"><joint name="t" axis="0 1 0"
+    stiffness="1"/><inertial pos="0 0 .01" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/></body></body></body>
+    <body pos="3 40 -20">{joints}<inertial pos=".1 0 .2" mass="3" diaginertia=".1 .2 .25"/></body></worldbody></mujoco>"""
+    first = _read(tmp_path, text).twin
+    assert all(row.alike for row in certificate(first, 30))
+    second = _read(tmp_path, text.replace('mass="1e-6"', 'mass="1.000000001e-6"'), "b.xml").twin
+    assert [each.kind for each in compare(first, second, 5).differences] == ["mass"]
+
+
+def test_rounding_of_a_stiff_constraint_is_no_difference(tmp_path):
+    """As stiff as 20 times shorter than its step: its rounding is 1e-10 of the largest acceleration."""
+    text = GEARED.replace("<worldbody>", '<option timestep=".02"/><worldbody>').replace("<equality>", "<equality>")
+    twin = _read(tmp_path, text).twin
+    twin.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
+    twin.model.eq_solref[:] = 1e-3, 1.0
+    assert all(row.alike for row in certificate(described(twin.model, "stiff"), 20))
 
 
 SPRUNG = changed(
@@ -172,9 +217,9 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     states = states_of(twin, 5)
     for row in certificate(twin, 5):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
-    soft = moved_at(as_parsed(twin), states)
+    soft = reference(twin, states, SOFT)
     assert softness(twin, 5) > 1e-3
-    assert agreement("", moved_at(softly_coupled(twin), states), soft, twin).acceleration < 1e-8
+    assert agreement("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -183,7 +228,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement("", moved_at(softly_coupled(yielding), states), soft, twin).acceleration > 1e-5
+        assert agreement("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
@@ -399,8 +444,8 @@ def test_inside_their_ranges_limits_do_nothing(tmp_path):
     with_limits.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 
     def apart(states):
-        moved = [moved_at(as_parsed(replace(twin, model=model)), states) for model in (twin.model, with_limits)]
-        return agreement("", *moved, twin).acceleration
+        moved = moved_at(as_parsed(replace(twin, model=with_limits)), states)
+        return agreement("", reference(twin, states, SOFT), moved).acceleration
 
     assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
     beyond = [(1.2 * q, v) for q, v in states]

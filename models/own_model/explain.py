@@ -7,14 +7,14 @@ influence, and elements that change nothing are listed as without influence.
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import PLAIN, Moved, equations, expected
-from models.own_model.certificate import Agreement, agreement, moved_at, states_of
+from models.own_model.builds import PLAIN, Moved, equations
+from models.own_model.certificate import Agreement, Reference, agreement, moved_at, reference, states_of
 from models.own_model.elements import Element, drop, elements, put, tensor_of
 from models.own_model.reading import TwinModel, described
 
@@ -22,7 +22,7 @@ STATES = 20
 """States at which elements are tried."""
 OFF = ("range", "softness")
 """Kinds of elements that are off, or that MuJoCo alone has: a difference in them is listed, and not compared."""
-STILL = 1e-13
+STILL = 1e-11
 """Relative change of accelerations and of the mass matrix below which an element has no influence."""
 Key = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
@@ -89,17 +89,16 @@ def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Compari
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
     order = [second.names.index(name) for name in first.names]
     states = states_of(first, count)
-    twin = moved_at(expected(first, PLAIN), states)
-    other = [_permuted(each, order) for each in moved_at(expected(second, PLAIN), _in_order(states, order))]
-    apart = agreement("the second file", twin, other, first)
-    base = moved_at(equations(first, PLAIN), states)
-    trial = _Trial(first, states, base)
-    back = _Trial(second, _in_order(states, order), moved_at(equations(second, PLAIN), _in_order(states, order)))
+    places = _in_order(states, order)
+    here, there = reference(first, states, PLAIN), reference(second, places, PLAIN)
+    apart = agreement("the second file", _rounded_as_both(here, there, order), _permuted(there.moved, order))
+    trial = _Trial(first, states, replace(here, moved=moved_at(equations(first, PLAIN), states)))
+    back = _Trial(second, places, replace(there, moved=moved_at(equations(second, PLAIN), places)))
     differences = sorted(_differences(first, second, (trial, back)), key=_importance)
     moved = trial.moved(trial.with_all(elements(second.model), differences))
     alone = [(each.kind, each.owner) for each in differences if each.first is None]
     rest = back.moved(back.without(alone))
-    left = agreement("", [_permuted(each, order) for each in rest], moved, first)
+    left = agreement("", replace(_rounded_as_both(here, there, order), moved=moved), _permuted(rest, order))
     return Comparison(apart, tuple(differences), left.acceleration, ())
 
 
@@ -114,13 +113,13 @@ class _Trial:
 
     twin: TwinModel
     states: States
-    base: list[Moved]
+    base: Reference
 
     def influence(self, model: mujoco.MjModel) -> float | None:
         """Largest relative change by a changed model: of accelerations, or of the mass matrix where these stay; None
         where it cannot be built."""
         try:
-            change = agreement("", self.base, self.moved(model), self.twin)
+            change = agreement("", self.base, self.moved(model))
             return change.acceleration if change.acceleration > STILL else change.mass
         except RunFailed:
             return None
@@ -158,9 +157,15 @@ def _in_order(states: States, order: list[int]) -> States:
     return [(q[places], v[places]) for q, v in states]
 
 
-def _permuted(moved: Moved, order: list[int]) -> Moved:
+def _permuted(moved: Sequence[Moved], order: list[int]) -> list[Moved]:
     """What the second file does, in the order of the first."""
-    return Moved(moved.mass[np.ix_(order, order)], moved.force[order], moved.acceleration[order])
+    return [Moved(each.mass[np.ix_(order, order)], each.force[order], each.acceleration[order]) for each in moved]
+
+
+def _rounded_as_both(here: Reference, there: Reference, order: list[int]) -> Reference:
+    """The first file, with the rounding of that one of both that has more."""
+    pairs = zip(here.sensitive, _permuted(there.sensitive, order), strict=True)
+    return replace(here, sensitive=[Moved(*map(np.maximum, first, second)) for first, second in pairs])
 
 
 def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
@@ -234,7 +239,7 @@ def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Ele
         if not element.value.any() or not drop(model, key):
             continue
         less = described(model, twin.name)
-        seen = agreement(build, moved_at(expected(less, build), states), moved_at(equations(less, build), states), twin)
+        seen = agreement(build, reference(less, states, build), moved_at(equations(less, build), states))
         if seen.alike:
             rows.append((element, seen.acceleration))
     return sorted(rows, key=lambda row: row[1])

@@ -184,7 +184,7 @@ def verdict(each: Examined) -> str:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
     if each.certified:
         bound = max(row.bound for row in each.agreements)
-        said = f"; up to {bound:.0e} is rounding, by the condition of its mass matrix" if bound > ALIKE else ""
+        said = f"; up to {bound:.0e} may be rounding" if bound > ALIKE else ""
         return f"every build moves as the file does: accelerations differ by {worst:.1e} at the most{said}"
     builds = ", ".join(row.build for row in each.agreements if not row.alike)
     return f"differs in {builds}: accelerations by {worst:.1e}"
@@ -202,7 +202,7 @@ def _file_lines(each: Examined) -> list[str]:
         apart = f"  its constraints are {row.gap:.1e} (m, rad) apart where those of the file meet"
         rows.append(
             f"    {row.build:7s} mass {row.mass:.1e}  forces {row.force:.1e}  accelerations {row.acceleration:.1e}"
-            f"{apart if row.gap > MET else ''}{off if max(row.acceleration, row.mass) > row.bound else ''}"
+            f"{apart if row.gap > MET else ''}{'' if row.same_motion else off}"
         )
     for build, elements in each.explained.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
