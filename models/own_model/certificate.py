@@ -1,9 +1,9 @@
 """Whether builds move alike: mass matrix, forces and accelerations at random states.
 
 Every coordinate is judged for itself, in the coordinates of the description: the difference of its acceleration by its
-acceleration at that state (the largest of three where a body turns or shifts along three axes at once), that of an entry
-of the mass matrix by the root of both entries of the diagonal. Where a change of all numbers by 1000 roundings changes
-it by more than 1e-10 of that (``rounding``), its difference is counted by this change: 1e-10 is then the whole of it.
+acceleration at that state (the largest of three where a body turns or shifts along three axes at once), that of an
+entry of the mass matrix by the root of both entries of the diagonal. Where a change of all numbers by 1000 roundings
+changes it by more than 1e-10 of that (``rounding``), its difference is counted by this change: 1e-10 is then the whole.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -64,8 +64,8 @@ class Agreement:
     """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
-    rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more; gap : how far
-    states are from satisfying the build's own constraints (m, rad).
+    rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more;
+    gap : how far states are from satisfying the build's own constraints (m, rad).
     """
 
     build: str

@@ -12,7 +12,9 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import affine_law, is_fixed, is_line, is_tie, joins, label, pushes_site, rubs
+from models.own_model.equalities import is_tie, joins
+from models.own_model.names import disabled, label
+from models.own_model.reading import affine_law, is_fixed, is_line, pushes_site, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -95,6 +97,9 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
     model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
     model.opt.tolerance = min(1e-8, model.opt.tolerance)
+    if not disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
+        times = model.eq_solref[:, 0]
+        times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
     return left_out
 
 

@@ -11,7 +11,9 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import CONNECT, by_sites, is_line, is_tie, joins, label, pushes_site, sites_of
+from models.own_model.equalities import CONNECT, by_sites, is_tie, joins
+from models.own_model.names import label
+from models.own_model.reading import is_line, pushes_site, sites_of
 
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""

@@ -5,8 +5,8 @@ stability). So the model is computed again with every number of it, and the stat
 of itself: lengths by this share of the model's reach, since places are sums of lengths, directions by this angle. The
 change of an answer divided by the share, times the rounding of a number, is what rounding may make of that answer. Each
 coordinate has its own: a light wheel that spins up fast says nothing about a heavy slide beside it, unless the mass
-matrix couples them; a stiff constraint magnifies the rounding of places; weights that a joint bears leave rounding where
-the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it as well.
+matrix couples them; a stiff constraint magnifies the rounding of places; weights that a joint bears leave rounding
+where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,7 +18,8 @@ import numpy as np
 
 from models.own_model.builds import Equations, Moved, State, as_parsed, forward
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import TwinModel, joins
+from models.own_model.equalities import joins
+from models.own_model.reading import TwinModel
 
 SHARE = 1e-9
 """Changes of numbers: far above their rounding, and small enough for the answer to change in proportion."""

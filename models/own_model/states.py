@@ -6,7 +6,8 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.own_model.constraints import plain_constraints, satisfying
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import TwinModel, tie_rows
+from models.own_model.equalities import tie_rows
+from models.own_model.reading import TwinModel
 
 COUNT = 100
 SEED = 26
