@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
 from models.own_model.equalities import is_tie, joins
 from models.own_model.names import disabled, label
-from models.own_model.reading import affine_law, is_fixed, is_line, pushes_site, rubs
+from models.own_model.reading import JOINT_TARGETS, affine_law, is_fixed, is_line, pushes_site, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -29,7 +29,6 @@ TAGS = {
     "equality": ("connect", "weld", "joint", "tendon", "flex"),
 }
 """Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
-JOINT_TARGETS = (int(TRN.mjTRN_JOINT), int(TRN.mjTRN_JOINTINPARENT))
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 SHOWN = 3
@@ -118,7 +117,7 @@ NAMELESS = -1
 
 def _touching(model: mujoco.MjModel) -> Listed:
     """Geoms that could touch another one, and pairs."""
-    if model.opt.disableflags & int(DSBL.mjDSBL_CONTACT):
+    if disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
     of = weld[model.geom_bodyid]
@@ -133,7 +132,7 @@ def _touching(model: mujoco.MjModel) -> Listed:
 
 
 def _rubbing(model: mujoco.MjModel) -> Listed:
-    if model.opt.disableflags & int(DSBL.mjDSBL_FRICTIONLOSS):
+    if disabled(model, "FRICTIONLOSS"):
         return
     for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
         yield "joint", int(j)
@@ -142,7 +141,7 @@ def _rubbing(model: mujoco.MjModel) -> Listed:
 
 
 def _equalities(model: mujoco.MjModel) -> Listed:
-    if not model.opt.disableflags & int(DSBL.mjDSBL_EQUALITY):
+    if not disabled(model, "EQUALITY"):
         for e in np.flatnonzero(model.eq_active0):
             yield "equality", int(e)
 

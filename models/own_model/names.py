@@ -9,6 +9,7 @@ from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 TURNS: tuple[Freedom, ...] = ("rx", "ry", "rz")
 OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL: TURNS, FREE: FREEDOMS}
 """Freedoms of joints that have several."""
+CONSTRAINTS = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
@@ -41,8 +42,9 @@ def moving(model: mujoco.MjModel) -> dict[int, None]:
 
 
 def disabled(model: mujoco.MjModel, what: str) -> bool:
-    """Whether a file switches something off, as "GRAVITY"."""
-    return bool(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{what}"))
+    """Whether a file switches something off, as "GRAVITY"; all constraints at once, too."""
+    kinds = (what, "CONSTRAINT") if what in CONSTRAINTS else (what,)
+    return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
 def moved_by(joint: int) -> str:

@@ -29,6 +29,10 @@ from models.own_model.names import (
 )
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
+JOINT_TARGETS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+"""Kinds of targets of actuators that are the same for a hinge or slide."""
+LAST_GROUP = 30
+
 
 @dataclass(frozen=True, eq=False)
 class TwinModel:
@@ -245,10 +249,15 @@ def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarr
     return law
 
 
+def acts(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator is in no group that is switched off; MuJoCo has such switches for groups 0 to 30."""
+    group = int(model.actuator_group[actuator])
+    return not (0 <= group <= LAST_GROUP and model.opt.disableactuator & (1 << group))
+
+
 def _acting(model: mujoco.MjModel) -> list[int]:
     """Actuators that are not switched off."""
-    all_off, groups = disabled(model, "ACTUATION"), model.opt.disableactuator
-    return [i for i in range(model.nu) if not (all_off or groups & (1 << int(model.actuator_group[i])))]
+    return [i for i in range(model.nu) if acts(model, i) and not disabled(model, "ACTUATION")]
 
 
 def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoad]:

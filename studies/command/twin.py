@@ -232,7 +232,7 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         )
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
-        rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
+        rows.append(f"  {comparison.rest()}")
     rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
     return rows + [
         f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared
