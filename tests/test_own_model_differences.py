@@ -10,7 +10,8 @@ FLAGS = '<option><flag gravity="enable"/></option>'
 MODEL = f"""<mujoco>{FLAGS}<worldbody>
 <body name="a"><joint name="a" axis="0 1 0" stiffness="3" damping=".2"/>
  <inertial pos="0 0 .3" mass="1" diaginertia=".1 .08 .05"/>
- <site name="tip" pos="0 0 1"/><body name="lug"><inertial pos="0 .1 0" mass=".1" diaginertia=".01 .01 .01"/></body></body>
+ <site name="tip" pos="0 0 1"/><body name="lug"><inertial pos="0 .1 0" mass=".1" diaginertia=".01 .01 .01"/></body>
+</body>
 <body name="b" pos="0 1 0"><joint name="b" type="slide" axis="1 0 0"/>
  <inertial pos="0 .1 .3" mass="2" diaginertia=".1 .08 .05"/></body></worldbody>
 <tendon><fixed name="rope"><joint joint="a" coef="2"/></fixed></tendon>

@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
 from models.own_model.equalities import is_tie, joins
 from models.own_model.names import disabled, label
-from models.own_model.reading import JOINT_TARGETS, affine_law, is_fixed, is_line, pushes_site, rubs
+from models.own_model.reading import JOINT_TARGETS, affine_law, compensation, is_fixed, is_line, pushes_site, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -121,11 +121,11 @@ def _touching(model: mujoco.MjModel) -> Listed:
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
     of = weld[model.geom_bodyid]
-    parents = above[of]
+    parents, filtered = above[of], not disabled(model, "FILTERPARENT")
     for g in range(model.ngeom):
         fits = (model.geom_contype[g] & model.geom_conaffinity) | (model.geom_conaffinity[g] & model.geom_contype)
         kin = (of != 0) & (of[g] != 0) & ((parents == of[g]) | (parents[g] == of))
-        if (fits.astype(bool) & (of != of[g]) & ~kin).any():
+        if (fits.astype(bool) & (of != of[g]) & ~(kin & filtered)).any():
             yield "geom", g
     for p in range(model.npair):
         yield "pair", p
@@ -205,6 +205,12 @@ def _bent_laws(model: mujoco.MjModel) -> Listed:
             yield "tendon", t
 
 
+def _half_lifted(model: mujoco.MjModel) -> Listed:
+    for b in range(1, model.nbody):
+        if 0.0 < compensation(model, b) < 1.0:
+            yield "body", b
+
+
 def _medium(model: mujoco.MjModel) -> Listed:
     if model.opt.density or model.opt.viscosity:
         yield "density and viscosity", NAMELESS
@@ -259,6 +265,11 @@ def _forget_bends(model: mujoco.MjModel) -> None:
     model.jnt_springyield[:] = model.tendon_springyield[:] = 0.0
 
 
+def _forget_lifting(model: mujoco.MjModel) -> None:
+    for b in [b for _, b in _half_lifted(model)]:
+        model.body_gravcomp[b] = 0.0
+
+
 def _forget_medium(model: mujoco.MjModel) -> None:
     model.opt.density = model.opt.viscosity = 0.0
 
@@ -294,6 +305,11 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
     ),
     "turning_law": (_turning_laws, "a rotor of a ball joint, or what turns it or a free one back", _forget_turning),
     "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
+    "gravity_compensation": (
+        _half_lifted,
+        "weight that is compensated at some joints alone, since others leave that to actuators, which are off",
+        _forget_lifting,
+    ),
     "fluid": (_medium, "forces of a medium", _forget_medium),
     "flex": (_flexes, "a deformable body", _keep_flexes),
 }

@@ -41,6 +41,16 @@ def moving(model: mujoco.MjModel) -> dict[int, None]:
     return numbers
 
 
+def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+    """All joints that move a body."""
+    joints = list[int]()
+    while body:
+        first = int(model.body_jntadr[body])
+        joints += range(first, first + int(model.body_jntnum[body]))
+        body = int(model.body_parentid[body])
+    return joints
+
+
 def disabled(model: mujoco.MjModel, what: str) -> bool:
     """Whether a file switches something off, as "GRAVITY"; all constraints at once, too."""
     kinds = (what, "CONSTRAINT") if what in CONSTRAINTS else (what,)

@@ -18,6 +18,7 @@ from models.own_model.names import (
     OF_KIND,
     coordinate_names,
     disabled,
+    joints_above,
     label,
     massive,
     matrix_rows,
@@ -288,10 +289,24 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             yield JointElement(label(model, "actuator", i), places, tuple(gear * k for k in factors), *numbers)
 
 
+def compensation(model: mujoco.MjModel, body: int) -> float:
+    """Share of the joints that move a body through which its weight is compensated: 0 where nothing of it is.
+
+    MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
+    actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.
+    """
+    passive = not (disabled(model, "SPRING") and disabled(model, "DAMPER"))
+    joints = joints_above(model, body)
+    if not (model.body_gravcomp[body] and passive and joints):
+        return 0.0
+    actuated = model.nu > 0 and not disabled(model, "ACTUATION")
+    return sum(actuated or not model.jnt_actgravcomp[j] for j in joints) / len(joints)
+
+
 def _lifted(model: mujoco.MjModel, design: mujoco.MjData, gravity: np.ndarray) -> Iterator[GroundSpring]:
     """Loads at the centres of bodies whose weight is compensated."""
     for b in moving(model):
-        if model.body_gravcomp[b] and model.body_mass[b] and gravity.any():
+        if model.body_mass[b] and gravity.any() and compensation(model, b) == 1.0:
             load, still = -gravity * float(model.body_gravcomp[b] * model.body_mass[b]), np.zeros(3)
             point = vector(design.xipos[b])
             yield GroundSpring(massive(b), point, point, still, still, load)  # type: ignore[arg-type]
