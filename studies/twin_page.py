@@ -9,7 +9,7 @@ from typing import Any
 
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from models.own_model.elements import Element, elements, is_word, shown
+from models.own_model.elements import Element, elements, is_word, short, shown
 from studies.command.twin import Twins, verdict
 
 TEMPLATE = "twin.html.jinja"
@@ -24,7 +24,7 @@ def write(twins: Twins, path: Path) -> Path:
 def page(twins: Twins) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
-    environment.filters |= {"short": lambda number: f"{number:.1e}", "g": lambda number: f"{number:.6g}"}
+    environment.filters |= {"short": short, "g": lambda number: f"{number:.6g}"}
     return environment.get_template(TEMPLATE).render(
         twins=twins,
         title=" and ".join(twins.names),

@@ -227,6 +227,13 @@ def test_constraints_that_contradict_each_other_are_told(tmp_path):
         certificate(twin, 2)
 
 
+def test_couplings_that_contradict_each_other_are_told_by_name(tmp_path):
+    other = '<joint name="other" joint1="slide" joint2="turn" polycoef=".2 .25 0 0 0"/></equality>'
+    twin = _read(tmp_path, GEARED.replace("</equality>", other)).twin
+    with pytest.raises(RunFailed, match="equality 'gear' and equality 'other' contradict each other"):
+        certificate(twin, 2)
+
+
 def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
     first = _read(tmp_path, LINKED).twin
     second = _read(tmp_path, changed(LINKED, "loop", '"rod"', '"crank"'), "b.xml").twin
@@ -544,6 +551,7 @@ def test_includes_are_looked_for_where_mujoco_does(tmp_path):
         (JOINTED, 'gear="3"', 'gear="nan"', "actuator_gear: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'gravity="nan 2 -9"', "gravity: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'timestep="0"', "timestep = 0.0: must be a finite number above 0"),
+        (JOINTED, 'stiffness="2"', 'stiffness="1e308"', "jnt_stiffness = 1e+308: must be 1e+30 or less"),
         (GEARED, 'frictionloss=".4"', 'frictionloss="-1"', "frictionloss = -1.0: must be 0 or more"),
     ],
 )

@@ -131,11 +131,15 @@ def reference(twin: TwinModel, states: Sequence[State], build: str) -> Reference
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
-    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any."""
+    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any, or an
+    acceleration is not finite."""
     try:
-        return [move(q, v) for q, v in states]
+        moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
         raise RunFailed("twin", SINGULAR) from None
+    if not all(np.isfinite(each.acceleration).all() for each in moved):
+        raise RunFailed("twin", "an acceleration is not finite: a number of the file is too large, or a mass too small")
+    return moved
 
 
 def agreement(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:

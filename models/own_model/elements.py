@@ -77,6 +77,11 @@ def shown(value: np.ndarray, unit: str = "") -> str:
     return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
 
 
+def short(number: float) -> str:
+    """A relative difference in two digits, "0" for none at all."""
+    return f"{number:.1e}" if number else "0"
+
+
 @dataclass(frozen=True)
 class _Kind:
     """A property of all things of one sort: how it is read and written."""

@@ -16,7 +16,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.own_model.builds import PLAIN, Moved, equations
 from models.own_model.certificate import ALIKE, Agreement, Reference, agreement, moved_at, reference, states_of
-from models.own_model.elements import Element, drop, elements, is_word, put, shown, tensor_of
+from models.own_model.elements import Element, drop, elements, is_word, put, short, shown, tensor_of
 from models.own_model.reading import TwinModel, described
 
 STATES = 20
@@ -90,10 +90,12 @@ class Comparison:
     def rest(self) -> str:
         """What is left when all elements are taken over that can be."""
         if self.unexplained <= ALIKE:
-            return f"with these taken over, both move alike: {self.unexplained:.1e} is left"
+            return f"with these taken over, both move alike: {short(self.unexplained)} is left"
         untried = any(each.influence is None for each in self.influential)
         why = "what cannot be tried" if untried else "something that is no element here, or that these change together"
-        return f"with these taken over where they can be, accelerations still differ by {self.unexplained:.1e}: {why}"
+        return (
+            f"with these taken over where they can be, accelerations still differ by {short(self.unexplained)}: {why}"
+        )
 
 
 def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Comparison:
