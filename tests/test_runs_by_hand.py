@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 
 from models.core.systems import of_table
-from models.road.iso8608 import random_phases
+from models.core.time_series import write_time_series
+from models.road.iso8608 import iso8608_road, random_phases
 from models.road.profile import SineProfile
 from models.road.study import study_road
 from models.systems import run
+from models.systems.hub_forces.measurement import recorded, two_tracks
+from models.systems.hub_forces.run import measure
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
+from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, PERIOD, STEP, STEPS, write
+from validation.spatial.cars import r19
+from validation.spatial.hub_inputs import centres
 
 pytestmark = pytest.mark.grounds("closed form")
 P = asymmetric_twin.PARAMETERS
@@ -114,3 +120,82 @@ def test_a_scene_of_handling_reads_controls_and_ratios_as_they_are_written():
     assert (controls.front_brake, controls.front_drive) == (0.7, 0.25)
     car = asdict(scene.handling("turn").tyres)
     assert (car["friction"], car["half_width"], car["spin_inertia"]) == (0.9, 0.09, 1.7)
+
+
+CUT = r19()
+CUT_MASS = sum(body.mass for body in CUT.tree.bodies)
+CUT_ENGINES = ("reference", "exudyn", "mujoco")
+GRAVITY = 9.81
+
+
+@pytest.mark.parametrize("engine", CUT_ENGINES)
+def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engine, tmp_path):
+    """Four forces up, 4 kN and 500 N u^2 by the time u (1 at the end) at the samples, lines between them."""
+    write(tmp_path)
+    result = run(of_table(BARE_SCENE, "s.toml", tmp_path), engine, method="none")
+    samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2)
+    time, dense = STEP * STEPS, 4001
+    fine = np.linspace(0.0, time, dense)
+    acceleration = np.interp(fine, PERIOD * np.arange(len(samples)), samples) / CUT_MASS - GRAVITY
+    rise = np.trapezoid((time - fine) * acceleration, fine)
+    path = centres(CUT, result.detail.positions[[0, -1]])
+    assert path[1] - path[0] == pytest.approx([0.0, 0.0, rise], abs=1e-6 * abs(rise))
+    assert result.times == pytest.approx(STEP * np.arange(STEPS + 1), abs=1e-12)
+    assert result["z"].tolist() == result.detail.positions[:, 2].tolist()
+
+
+def test_angles_of_a_file_are_those_of_the_run_that_is_held_to_them(tmp_path):
+    """Roll and pitch that stay: a low-pass leaves them as they are."""
+    write(tmp_path)
+    still = np.ones(round(STEPS * STEP / PERIOD) + 1)
+    units = {"roll": "rad", "pitch": "rad", "roll_rate": "rad/s", "pitch_rate": "rad/s"}
+    held = {"roll": 0.02, "pitch": -0.01, "roll_rate": 0.0, "pitch_rate": 0.0}
+    columns = {name: (unit, held[name] * still) for name, unit in units.items()}
+    write_time_series(tmp_path / "angles.csv", columns, PERIOD)
+    result = run(of_table(BARE_SCENE, "s.toml", tmp_path), "reference", method="prescribed")
+    assert result["roll"] == pytest.approx(0.02, rel=1e-9) and result["pitch"] == pytest.approx(-0.01, rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", CUT_ENGINES)
+def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(engine):
+    scene = of_table({**BARE_SCENE, **ON_ROAD}, "s.toml", Path())
+    measured = measure(scene, engine)
+    first = measured.forces.samples[0].reshape(len(HUBS), 6)
+    assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
+    assert np.abs(measured.angles.samples[0]).max() < 1e-12
+    assert measured.forces.period == pytest.approx(1.0 / scene.forces.sampling_rate, rel=1e-12)
+    result = run(scene, engine, method="none", measurement=measured)
+    forces = dict(zip(result.data["element"].values.tolist(), result["section_force"][0], strict=True))
+    engine_weight = sum(forces[f"{name} mount.z"] for name in ("left", "right", "rear"))
+    assert engine_weight == pytest.approx(CUT.tree.body("engine").mass * GRAVITY, rel=1e-9)
+    assert forces["left seat"] == pytest.approx(CUT.tree.body("left seat").mass * GRAVITY, rel=1e-9)
+    # lines between samples of 2 ms beside the smooth forces of the road, which begins gently: 1e-6 m in 20 ms
+    assert result.detail.states == pytest.approx(measured.truth.states, abs=1e-5)
+
+
+def test_noise_of_hub_forces_and_angles_has_the_deviations_of_its_scene():
+    table = {**BARE_SCENE, "road": {}, "run": {"duration": 1.0, "step": 1e-3}}
+    noisy = {"frame": "inertial", "sampling_rate": 1000.0, "force_deviation": 80.0, "moment_deviation": 20.0}
+    table["angles"] = {"angle_deviation": 0.02, "rate_deviation": 0.3}
+    measured = measure(of_table({**table, "forces": noisy}, "s.toml", Path()), "reference")
+    forces, angles = recorded(measured.truth, "inertial", 1)
+    noise = (measured.forces.samples - forces.samples).reshape(-1, len(HUBS), 2, 3)
+    angles = (measured.angles.samples - angles.samples).reshape(-1, 2, 2)
+    # 4 deviations of the deviation of 12,000 and of 2,000 samples: 2.6 % and 6.3 %
+    assert noise.std(axis=(0, 1, 3)) == pytest.approx([80.0, 20.0], rel=0.026)
+    assert angles.std(axis=(0, 2)) == pytest.approx([0.02, 0.3], rel=0.063)
+    assert measured.scene.deviations(CUT).tolist() == 4 * [80.0, 80.0, 80.0, 20.0, 20.0, 20.0]
+    assert measured.scene.angles.deviations == (0.02, 0.3)
+
+
+def test_wheels_pass_their_tracks_at_the_speed_one_after_the_other():
+    speed, step, steps = 15.0, 2e-3, 40
+    tracks = [iso8608_road("C", seed) for seed in (1, 2)]
+    given = two_tracks(CUT, *tracks, speed, step, steps)
+    count, front = len(CUT.uncut.tyres), max(tyre.point[0] for tyre in CUT.uncut.tyres)
+    assert given.hubs.shape == (2 * steps + 1, 2 * count) and given.speed == speed
+    for row in (0, 37, 2 * steps):
+        for i, tyre in enumerate(CUT.uncut.tyres):
+            place = speed * (0.5 * step * row) - (front - tyre.point[0])
+            height, slope = tracks[0 if tyre.point[1] > 0.0 else 1].height_slope_at(place)
+            assert given.hubs[row, [i, count + i]] == pytest.approx([-height, -speed * slope], abs=1e-12)
