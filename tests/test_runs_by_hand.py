@@ -2,7 +2,7 @@
 road that is written out."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 
 from models.core.systems import of_table
 from models.core.time_series import write_time_series
+from models.engines.cut_vehicle import HubModel
 from models.road.iso8608 import iso8608_road, random_phases
 from models.road.profile import SineProfile
 from models.road.study import study_road
@@ -26,6 +27,10 @@ pytestmark = pytest.mark.grounds("closed form")
 P = asymmetric_twin.PARAMETERS
 FRONT, REAR = P.m3 * P.g * P.a / (P.a + P.b), P.m3 * P.g * P.b / (P.a + P.b)
 """N: weight of the chassis on each suspension, by the moment about the other."""
+Z1, Z2 = (FRONT + P.m1 * P.g) / P.k1, (REAR + P.m2 * P.g) / P.k2
+SINE = (Z2 + REAR / P.k4 - Z1 - FRONT / P.k3) / (P.a + P.b)
+REST = {"z1": Z1, "z2": Z2, "z3": Z1 + FRONT / P.k3 + P.b * SINE, "pitch": math.asin(SINE)}
+"""m, rad: positions at rest, by the springs in a row."""
 PLANE_ENGINES = ("reference", "exudyn", "mujoco")
 R19 = load_vehicle("r19_free")
 
@@ -39,11 +44,8 @@ def plane_run(engine, start=None, effects=None, duration=0.02):
 @pytest.mark.parametrize("engine", PLANE_ENGINES)
 def test_a_vehicle_at_rest_stays_on_springs_that_bear_its_weight(engine):
     result = plane_run(engine)
-    z1, z2 = (FRONT + P.m1 * P.g) / P.k1, (REAR + P.m2 * P.g) / P.k2
-    sine = (z2 + REAR / P.k4 - z1 - FRONT / P.k3) / (P.a + P.b)
-    rest = {"z1": z1, "z2": z2, "z3": z1 + FRONT / P.k3 + P.b * sine, "pitch": math.asin(sine)}
     forces = {"f1": FRONT + P.m1 * P.g, "f2": REAR + P.m2 * P.g, "f3": FRONT, "f4": REAR}
-    for name, value in (rest | forces).items():
+    for name, value in (REST | forces).items():
         assert result[name] == pytest.approx(value, rel=1e-9), name
     assert np.abs(result["suspension_moment"]).max() < 1e-7 * FRONT
     assert result.times == pytest.approx(1e-3 * np.arange(21), abs=1e-12)
@@ -63,10 +65,23 @@ def test_a_run_begins_where_its_scene_says_with_the_forces_of_its_springs_there(
         assert result[name][0] == pytest.approx(value, rel=1e-12), name
 
 
+SENSED = {"gyro": {"sampling_rate": 1000.0, "deviation": 0.0}}
+ACCELERATIONS = {"accelerometers": {"sampling_rate": 1000.0, "sensors": {"one": {"x": 1.3, "z": 0.21}}}}
+BIASED = SENSED | {"gyro_bias": {"turn_on": 10.0, "instability": 3.0, "correlation_time": 0.1}}
+EFFECTS = [SENSED, BIASED, {"lift_off": {}}, ACCELERATIONS, {"pitch_spring": {"stiffness": 300.0}}]
+
+
+@pytest.mark.parametrize("effects", EFFECTS, ids=[list(effects)[-1] for effects in EFFECTS])
+def test_what_a_scene_adds_leaves_the_vehicle_where_it_rests(effects):
+    result = plane_run("reference", None, effects)
+    assert {name: result[name][0] for name in REST} == pytest.approx(REST, rel=1e-12)
+
+
 @pytest.mark.parametrize("engine", PLANE_ENGINES)
 def test_wheels_pass_the_road_at_the_speed_of_the_scene_one_wheelbase_apart(engine):
     speed, duration = 20.0, 0.3
     result = plane_run(engine, None, {"road": {"source": "study", "speed": speed}}, duration)
+    assert {name: result[name][0] for name in REST} == pytest.approx(REST, rel=1e-12)
     road, states = study_road(), {name: result[name] for name in ("z1", "z2", "z1_rate", "z2_rate")}
     for wheel, behind, k, d in (("1", 0.0, P.k1, P.d1), ("2", P.a + P.b, P.k2, P.d2)):
         height, slope = np.array([road.height_slope_at(speed * time - behind) for time in result.times]).T
@@ -90,7 +105,7 @@ def test_random_phases_are_even_over_one_turn_and_never_beyond_it():
 
 def turn(**changes):
     """A car on a flat road, 20 ms, its front wheels and all brakes at once at their values."""
-    manoeuvre = {"speed": 20.0, "duration": 0.02, "steer": [[0.0, 0.02]], "brake": [[0.0, 1000.0]], "front_brake": 0.7}
+    manoeuvre = {"speed": 20.5, "duration": 0.02, "steer": [[0.0, 0.02]], "brake": [[0.0, 1000.0]], "front_brake": 0.7}
     table = {"title": "t", "system": "handling", "tyres": {"cells": 5, "cornering": [1.25, 0.75]}}
     return of_table({**table, "manoeuvres": {"turn": {**manoeuvre, **changes}}}, "s.toml", Path())
 
@@ -102,10 +117,10 @@ def test_a_manoeuvre_begins_with_the_speed_the_steering_and_the_weight_of_its_ca
     weight = 9.81 * sum(body.mass for body in R19.bodies)
     assert loads.sum() == pytest.approx(weight, rel=1e-9)
     assert steer == pytest.approx([0.02 if tyre.name.startswith("f") else 0.0 for tyre in R19.tyres], rel=1e-12)
-    assert result["forward speed"][0] == pytest.approx(20.0, rel=1e-12)
+    assert result["forward speed"][0] == pytest.approx(20.5, rel=1e-12)
     assert result.times == pytest.approx(1e-3 * np.arange(21), abs=1e-12)
     # braking and the tyres' forces take less than 10 m/s^2
-    assert result["positions"][-1, 0] == pytest.approx(20.0 * 0.02, abs=0.5 * 10.0 * 0.02**2)
+    assert result["positions"][-1, 0] == pytest.approx(20.5 * 0.02, abs=0.5 * 10.0 * 0.02**2)
     assert result["side slip"][0] == 0.0
 
 
@@ -164,6 +179,9 @@ def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(en
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
     assert np.abs(measured.angles.samples[0]).max() < 1e-12
     assert measured.forces.period == pytest.approx(1.0 / scene.forces.sampling_rate, rel=1e-12)
+    tracks = two_tracks(CUT, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, STEP, STEPS)
+    direct = HubModel(engine, CUT, replace(tracks, frame="inertial"), scene.settings(engine), scene.run.forces).run()
+    assert measured.truth.states == pytest.approx(direct.states, abs=1e-13)
     result = run(scene, engine, method="none", measurement=measured)
     forces = dict(zip(result.data["element"].values.tolist(), result["section_force"][0], strict=True))
     engine_weight = sum(forces[f"{name} mount.z"] for name in ("left", "right", "rear"))
