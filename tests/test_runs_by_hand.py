@@ -17,6 +17,7 @@ from models.road.study import study_road
 from models.systems import run
 from models.systems.hub_forces.measurement import recorded, two_tracks
 from models.systems.hub_forces.run import measure
+from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, PERIOD, STEP, STEPS, write
@@ -75,6 +76,13 @@ EFFECTS = [SENSED, BIASED, {"lift_off": {}}, ACCELERATIONS, {"pitch_spring": {"s
 def test_what_a_scene_adds_leaves_the_vehicle_where_it_rests(effects):
     result = plane_run("reference", None, effects)
     assert {name: result[name][0] for name in REST} == pytest.approx(REST, rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", PLANE_ENGINES)
+def test_an_accelerometer_at_rest_reads_gravity_along_the_axes_of_the_chassis(engine):
+    result = plane_run(engine, None, ACCELERATIONS)
+    assert np.hypot(result["ax1"], result["az1"]) == pytest.approx(P.g, rel=1e-9)
+    assert np.abs(result["ax1"]) == pytest.approx(P.g * abs(SINE), rel=1e-6)
 
 
 @pytest.mark.parametrize("engine", PLANE_ENGINES)
@@ -189,6 +197,20 @@ def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(en
     assert forces["left seat"] == pytest.approx(CUT.tree.body("left seat").mass * GRAVITY, rel=1e-9)
     # lines between samples of 2 ms beside the smooth forces of the road, which begins gently: 1e-6 m in 20 ms
     assert result.detail.states == pytest.approx(measured.truth.states, abs=1e-5)
+
+
+def test_the_filter_of_a_scene_is_told_the_deviations_of_its_scene_and_forces_that_may_lift_bear_the_same():
+    table = {**BARE_SCENE, **ON_ROAD, "effects": {"lift_off": {}}}
+    table["forces"] = {"frame": "inertial", "noise": "none", "force_deviation": 8.5, "moment_deviation": 1.5}
+    table["angles"] = {"noise": "none", "angle_deviation": 2.5e-3, "rate_deviation": 4.5e-3}
+    scene = of_table(table, "s.toml", Path())
+    measured = measure(scene, "reference")
+    first = measured.forces.samples[0].reshape(len(HUBS), 6)
+    assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
+    deviations = Deviations(np.tile([8.5] * 3 + [1.5] * 3, 4), (2.5e-3, 4.5e-3), scene.stabilise.model)
+    told = estimate(CUT, measured.forces, measured.angles, deviations)
+    assert measured.tilt.states == pytest.approx(told.states, rel=1e-12, abs=1e-15)
+    assert measured.tilt.deviations == pytest.approx(told.deviations, rel=1e-12)
 
 
 def test_noise_of_hub_forces_and_angles_has_the_deviations_of_its_scene():

@@ -100,6 +100,20 @@ def test_a_free_run_has_no_artificial_moment(frame, place):
 
 
 @pytest.mark.grounds("closed form")
+def test_figures_of_a_run_are_shares_of_its_chassis_inertia(place):
+    """The moment by a chassis stated twice as heavy to turn: half of its own inertia term, to the balance's order."""
+    folder, _ = place
+    found, p = run(folder)
+    figures = figures_of_run(found, p.model_copy(update={"I": 2.0 * p.I}))
+    inertia = 2.0 * p.I * np.diff(found["pitch_rate"]) / (found.times[1] - found.times[0])
+    assert figures.moment_rms == pytest.approx(0.5 * np.sqrt(np.mean(inertia**2)), rel=2e-3)
+    assert figures.moment_share == pytest.approx(0.5, rel=2e-3)
+    assert figures.moment_share_band == pytest.approx(0.5, rel=2e-3)
+    assert figures.moment_max == pytest.approx(0.5 * np.abs(inertia).max(), rel=5e-3)
+    assert figures.pitch_max == np.abs(found["pitch"]).max()
+
+
+@pytest.mark.grounds("closed form")
 def test_the_band_ends_at_15_hz():
     t = 1e-3 * np.arange(20_000)
     ratios = [rms(low_pass(np.sin(2 * np.pi * f * t), 1e-3)[5000:-5000]) * 2**0.5 for f in (5.0, 15.0, 30.0)]
