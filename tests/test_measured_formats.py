@@ -272,6 +272,7 @@ def test_without_the_announced_rows_a_cut_at_a_line_end_is_silent(tmp_path, monk
     assert odd(csv_files, "CSV cut at a line end").error(tmp_path) == np.inf
 
 
+@pytest.mark.grounds("closed form")
 def test_the_usual_file_is_what_the_truth_says(tmp_path):
     for extension in EXTENSIONS:
         found = read(open_source(written(tmp_path / f"a{extension}")))
