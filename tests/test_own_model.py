@@ -17,7 +17,7 @@ from models.own_model import certificate as certifying
 from models.own_model.builds import BUILDS, SOFT, as_parsed, equations, largest_gap, sliding
 from models.own_model.certificate import agreement, certificate, moved_at, reference, softness, states_of
 from models.own_model.coordinates import turned
-from models.own_model.elements import elements
+from models.own_model.elements import elements, told_apart
 from models.own_model.explain import compare, culprits
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
@@ -617,3 +617,9 @@ def test_a_mass_that_no_force_moves_is_no_silent_difference(tmp_path):
     first, second = (_read(tmp_path, wheel.replace("0.1'/><g", f"{size}'/><g"), f"{size}.xml") for size in (0.1, 0.12))
     comparison = compare(first.twin, second.twin, 3)
     assert not comparison.alike and [each.kind for each in comparison.influential] == ["armature"]
+
+
+def test_two_values_are_shown_in_digits_that_tell_them_apart():
+    first, second = (np.array([value]) for value in (10.0, 10.00000001))
+    assert told_apart(first, second, "N/m") == ("10 N/m", "10.00000001 N/m")
+    assert told_apart(first, np.zeros(0), "N/m") == ("10 N/m", "none")

@@ -28,12 +28,12 @@ def installed(law: Any) -> Iterator[None]:
     """
     if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
         raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
-    if law is None:
-        yield
-        return
-    mujoco.set_mjcb_passive(law.ctypes)
-    try:
-        with without_warnings():
+    with without_warnings():
+        if law is None:
             yield
-    finally:
-        mujoco.set_mjcb_passive(None)
+            return
+        mujoco.set_mjcb_passive(law.ctypes)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_passive(None)

@@ -20,6 +20,8 @@ AFFINE, PLAIN = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIX
 """Laws of actuators, whose numbers are the same for gain and bias."""
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
+DIGITS, EXACT = 6, 17
+"""Digits in which values are shown, and those in which every two numbers differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +68,25 @@ def says(value: np.ndarray) -> bool:
     return is_word(value) or bool(value.any())
 
 
-def shown(value: np.ndarray, unit: str = "") -> str:
+def shown(value: np.ndarray, unit: str = "", digits: int = DIGITS) -> str:
     """A value with its unit, "none" for zeros or nothing."""
     if not says(value):
         return "none"
     if is_word(value):
         return ", ".join(value)
     numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
-    text = ", ".join(f"{number:.6g}" for number in numbers)
+    text = ", ".join(f"{number:.{digits}g}" for number in numbers)
     return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
+
+
+def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
+    """Two values that differ, in as few digits as show it."""
+    texts = shown(first, unit), shown(second, unit)
+    for digits in range(DIGITS + 1, EXACT + 1):
+        if texts[0] != texts[1]:
+            break
+        texts = shown(first, unit, digits), shown(second, unit, digits)
+    return texts
 
 
 def short(number: float) -> str:

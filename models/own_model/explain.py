@@ -16,7 +16,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.own_model.builds import PLAIN, Moved, equations
 from models.own_model.certificate import ALIKE, Agreement, Reference, agreement, moved_at, reference, states_of
-from models.own_model.elements import Element, drop, elements, is_word, put, short, shown, tensor_of
+from models.own_model.elements import Element, drop, elements, is_word, put, short, tensor_of, told_apart
 from models.own_model.reading import TwinModel, described
 
 STATES = 20
@@ -52,7 +52,8 @@ class Difference:
 
     def sentence(self, files: Sequence[str]) -> str:
         """ "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
-        first, second = ("none" if value is None else shown(value, self.unit) for value in (self.first, self.second))
+        values = [np.zeros(0) if value is None else value for value in (self.first, self.second)]
+        first, second = told_apart(values[0], values[1], self.unit)
         return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
 
 

@@ -73,6 +73,8 @@ class PathReport:
             rows.append(
                 f"  compared up to {self.horizon:.3g} s, where {self.struck} strikes its limit, which is not built"
             )
+        elif not self.horizon:
+            rows.append("  not compared: this step is too long for the motion; give the file a shorter one")
         elif self.horizon < DURATION:
             rows.append(
                 f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBED:g} reaches {ALIKE:g}"
