@@ -104,7 +104,7 @@ def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
 
 
 def present_numbers(column: list[Any]) -> list[Any]:
-    """Numbers of a column without those that are missing."""
+    """Numbers of a column of the sweep, without missing values."""
     return [value for value in column if value is not None]
 
 

@@ -110,7 +110,7 @@ def _alone_rows() -> list[Row]:
 
 
 def _control_rows() -> list[Row]:
-    """The slip controller of all six wheels on ice, beside wheels that lock."""
+    """Rows: slip control of all six wheels on ice, compared with locked wheels."""
     ice, speed = surface("ice"), 11.11
     vehicle = braked(whole.towing(), ice, substeps=4, gradient=150.0)
     controlled, locked = (

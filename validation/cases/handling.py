@@ -1,4 +1,4 @@
-"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and what it costs."""
+"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and computing cost."""
 
 import time
 from collections.abc import Callable

@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
-    """Mean NEES and NIS per degree of freedom; the filters that are told a wrong noise get a quarter of the runs."""
+    """Mean NEES and NIS per degree of freedom; filters with a wrong noise level get a quarter of the runs."""
     by_filter: dict[str, list[Any]] = {name: [] for name in filters}
     for i in range(count):
         scales = {name: FILTERS[name] for name in filters if name == "right" or i < count // 4}

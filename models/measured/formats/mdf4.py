@@ -49,13 +49,13 @@ class MdfFile(Opened):
 
     places: tuple[tuple[int, int], ...]
 
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Load the records of each span once, and take every channel from them."""
         with opened(self.path) as mdf:
-            group = self.places[chosen[0]][0]
+            group = self.places[channel_indices[0]][0]
             for first, count in spans:
                 with unheard():
-                    block = _block(mdf, group, [self.places[i][1] for i in chosen], first, count)
+                    block = _block(mdf, group, [self.places[i][1] for i in channel_indices], first, count)
                 yield block
 
 

@@ -85,7 +85,7 @@ class BrakeTable(Strict):
 
 
 class BrakesTable(Strict):
-    """[brakes]: of each axle, of all wheels of what is towed, and the pressure that the pedal lets through."""
+    """[brakes]: brakes of each axle and of the towed vehicle's wheels, and the supply pressure."""
 
     front: BrakeTable = BrakeTable(gradient=1500.0)
     rear: BrakeTable = BrakeTable(gradient=1200.0)
