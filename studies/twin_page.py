@@ -7,11 +7,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from models.own_model.elements import Element, elements
+from models.own_model.elements import Element, elements, is_word, short, shown
 from studies.command.twin import Twins, verdict
 
 TEMPLATE = "twin.html.jinja"
@@ -26,7 +24,7 @@ def write(twins: Twins, path: Path) -> Path:
 def page(twins: Twins) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
-    environment.filters |= {"short": lambda number: f"{number:.1e}", "g": lambda number: f"{number:.6g}"}
+    environment.filters |= {"short": short, "g": lambda number: f"{number:.6g}"}
     return environment.get_template(TEMPLATE).render(
         twins=twins,
         title=" and ".join(twins.names),
@@ -42,12 +40,7 @@ def page(twins: Twins) -> str:
 def _rows(listed: list[Element]) -> list[dict[str, Any]]:
     """Elements that are not zero, with their values as text."""
     return [
-        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": _text(each.value)}
+        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": shown(each.value)}
         for each in listed
-        if each.value.any()
+        if each.says and not (is_word(each.value) and each.value[0] == "on")
     ]
-
-
-def _text(value: np.ndarray) -> str:
-    numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
-    return ", ".join(f"{number:.6g}" for number in numbers)

@@ -1,12 +1,59 @@
-"""What several test files share: an empty folder to work in, the command, and a new file among a system's effects."""
+"""What several test files share: an empty folder to work in, the command, a new file among a system's effects, a slow
+machine; and the order in which the long tests begin.
+"""
 
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from functools import wraps
 from importlib import import_module
+from multiprocessing import get_context
 
 import pytest
 
 import models  # noqa: F401  before any test imports numpy: it sets the threads of linear algebra
+
+SEPARATE_FILES = ("test_cases", "test_saved_results")
+"""Files whose tests share nothing that takes long to make: each of their tests may be run by another process."""
+LONGEST_FIRST = (
+    "stated_errors",
+    "price",
+    "kalman",
+    "measured_drive",
+    "test_told_ride",
+    "recommendation",
+    "ensemble",
+    "written_equations",
+    "test_planted_faults",
+    "adams_joints",
+    "test_cluster",
+    "choice_linear",
+    "effect_prices",
+    "hard_cases",
+    "test_robust_runs",
+    "braking_limits",
+    "absent",
+    "drift_solvers",
+    "braking_port",
+    "contact_exact",
+    "fastsim",
+)
+"""Cases and files that take a minute and more in full, the longest first."""
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(config, items):
+    """Keep the tests of a file together where processes share them (``--dist loadgroup``), and begin with the longest
+    ones, so that no process works alone at the end."""
+
+    def rank(item):
+        name = item.callspec.id if item.path.stem == "test_cases" and hasattr(item, "callspec") else item.path.stem
+        return LONGEST_FIRST.index(name) if name in LONGEST_FIRST else len(LONGEST_FIRST)
+
+    for item in items:
+        if item.path.stem not in SEPARATE_FILES:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+    if config.option.markexpr == "full":
+        items.sort(key=rank)
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -33,6 +80,15 @@ def figure_rules():
         for canvas_type, method in ((FigureCanvasAgg, "print_png"), (FigureCanvasSVG, "print_svg")):
             patch.setattr(canvas_type, method, held(canvas_type, method))
         yield
+
+
+@pytest.fixture(scope="session")
+def elsewhere():
+    """Function that calls another one on another machine, slow and busy by its clocks."""
+    from slow_machine import begin
+
+    with ProcessPoolExecutor(1, get_context("spawn"), begin) as machine:
+        yield lambda *asked: machine.submit(*asked).result()
 
 
 @pytest.fixture

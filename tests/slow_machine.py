@@ -28,10 +28,15 @@ def begin():
 
 def rows(case, quick, folder):
     """Id, status and reason of all rows of a case."""
+    return answer(case, quick, folder)[0]
+
+
+def answer(case, quick, folder):
+    """Id, status and reason of all rows of a case, and the case's data."""
     from importlib import import_module
 
-    found, _ = import_module(f"validation.cases.{case}").measure(quick, folder)
-    return [(row.id, row.status, row.reason) for row in found]
+    judged_rows, data = import_module(f"validation.cases.{case}").measure(quick, folder)
+    return [(row.id, row.status, row.reason) for row in judged_rows], data
 
 
 def judged(kind):

@@ -11,18 +11,21 @@ BENCHMARK = load_bicycle("benchmark")
 DELFT = load_bicycle("steer_by_wire")
 
 
+@pytest.mark.grounds("published")
 def test_matrices_are_the_published_ones():
     M, C1, K0, K2 = BENCHMARK.linear
     for here, there in zip((M, C1, BENCHMARK.gravity * K0, K2), MATRICES.values(), strict=True):
         assert here == pytest.approx(np.array(there), abs=1e-12)
 
 
+@pytest.mark.grounds("published")
 @pytest.mark.parametrize("speed", PUBLISHED)
 def test_eigenvalues_are_the_published_ones(speed):
     # printed to 14 digits; castering, the largest, is 25 1/s
     assert np.abs(BENCHMARK.eigenvalues(speed) - PUBLISHED[speed]).max() < 1e-12
 
 
+@pytest.mark.grounds("published")
 def test_weave_and_capsize_speed_are_the_published_ones():
     assert BENCHMARK.weave_speed == pytest.approx(WEAVE_SPEED, abs=1e-12)
     assert BENCHMARK.capsize_speed == pytest.approx(CAPSIZE_SPEED, abs=1e-12)

@@ -31,6 +31,7 @@ def linearised(model, speed):
     return np.transpose(columns)
 
 
+@pytest.mark.grounds("plain counterpart")
 @pytest.mark.parametrize("bicycle", [BENCHMARK, DELFT], ids=["benchmark", "steer_by_wire"])
 def test_its_linearisation_is_the_linear_model(bicycle):
     # differences over 1e-5 of accelerations of up to 1e2 leave 1e-9

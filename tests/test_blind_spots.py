@@ -4,6 +4,8 @@ import ast
 import json
 import subprocess
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from numba import njit
 import validation.blind_spots.compiled_spoiling  # noqa: F401  makes numba know what is spoiled
 from docs import not_covered
 from models.core.errors import InputError, RunFailed
+from models.core.result import Channel, result
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.machine.records import record
 from studies.command_line import validate
@@ -86,6 +89,33 @@ def test_a_function_without_a_fault_gives_what_it_is_given_itself_and_is_marked(
     assert memory.places(memory.RAN) == [PLACE, PLACE + 1] and memory.places(memory.NUMBERS) == [PLACE]
     memory.forget()
     assert not memory.places(memory.RAN) and not memory.places(memory.NUMBERS)
+
+
+def test_a_labelled_result_is_off_in_its_channels_and_keeps_its_labels_and_what_it_hands_on(fault):
+    path = np.array([2.5])
+    given = result(
+        SimpleNamespace(title="t", file="", system="handling", table=dict, provenance=dict),
+        {"x": Channel("time", np.array([0.5, 1.5]), "m", "place")},
+        {"time": Channel("time", np.array([0.25, 0.75]), "s", "time")},
+        engine="none",
+        counts={},
+        seconds=0.0,
+        detail=SimpleNamespace(path=path),
+    )
+    fault(0.01)
+    off = made({"other": PLACE})["other"](given)
+    assert off["x"].tolist() == [1.01 * 0.5, 1.01 * 1.5] and off.times.tolist() == [0.25, 0.75]
+    assert off.data["x"].attrs == given.data["x"].attrs and off.data.attrs == given.data.attrs
+    assert off.detail.path is path and given["x"].tolist() == [0.5, 1.5]
+    assert made({"other": PLACE})["other"]({"a": 0.5, "b": 2}) == {"a": 1.01 * 0.5, "b": 2}
+    assert memory.places(memory.NUMBERS) == [PLACE]
+
+
+def test_an_object_that_only_hands_on_others_has_no_number_of_its_own():
+    handed = replace(line(), function=line())
+    assert made({"other": PLACE})["other"](handed) is handed
+    assert memory.places(memory.RAN) == [PLACE] and not memory.places(memory.NUMBERS)
+    memory.forget()
 
 
 def test_an_unknown_function_is_an_error():

@@ -21,6 +21,7 @@ TABLE = {
 }
 
 
+@pytest.mark.grounds("closed form")
 def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     states = np.zeros((3, 2, 5))
     states[:, 0, 2:4] = [[0.0, 0.0], [0.1, -0.2], [0.3, 0.2]]
@@ -34,6 +35,7 @@ def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     )
 
 
+@pytest.mark.grounds("closed form")
 def test_the_train_is_drawn_where_its_hinges_are():
     scene = build(TABLE)
     (_, truck), (drawbar, line), (body, box) = outlines(scene)

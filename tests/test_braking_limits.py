@@ -53,12 +53,6 @@ def test_a_stop_at_the_edge_of_locking_finishes():
     assert path.stands and path.times[-1] == pytest.approx(2.301, abs=0.01)
 
 
-@pytest.mark.full
-def test_random_legal_stops_finish():
-    ends = [rows.ending_text(number) for number in range(rows.STOPS[False])]
-    assert [end for end in ends if end and not any(limit in end for limit in rows.LIMITS)] == []
-
-
 def test_random_stops_are_the_same_for_the_same_numbers_and_are_built():
     assert random_stop(1, 2) == random_stop(1, 2) != random_stop(1, 3)
     for number in range(20):

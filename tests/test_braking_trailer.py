@@ -59,6 +59,7 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
     assert way == pytest.approx(wanted, rel=1e-3)  # the car leans ahead by less than a millimetre
 
 
+@pytest.mark.grounds("closed form")
 def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hold_on_to_the_car_are_seen():
     errors = closed.errors()
     assert max(abs(error) for error in (errors.deceleration, errors.load, errors.pull)) < 1e-3
@@ -77,6 +78,7 @@ def test_accelerations_are_those_of_plain_code_and_wheels_that_keep_to_the_car_a
     assert whole.relative_difference(whole.accelerations(wrong, "exudyn", 5), plain) > 1e-6
 
 
+@pytest.mark.grounds("plain counterpart")
 @pytest.mark.parametrize(("name", "lags"), [("train", False), ("caravan", True)])
 def test_a_piece_of_a_stop_is_that_of_plain_code(name, lags):
     compiled = whole.run(whole.TRAINS[name](), "mujoco", 0.03, lags=lags)

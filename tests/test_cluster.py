@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -121,6 +122,28 @@ def test_a_cluster_with_tls_gives_the_same_bits_and_outlives_a_killed_worker(sec
     assert killed and np.array_equal(found, expected)
     names = {path.name.partition("-")[2] for path in (tmp_path / "a").iterdir()}
     assert len(names) >= 3
+
+
+class FreshPages:
+    """A job whose arrays of 4 MB come and go; it tells how many fresh pages they took from the system."""
+
+    def __call__(self, paths):
+        np.ones(500_000)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for _ in range(50):
+            np.ones(500_000)
+        return {"pages": np.full(len(paths), float(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before))}
+
+    def facts(self):
+        return {}
+
+
+@pytest.mark.full
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's mallopt alone keeps freed memory")
+def test_workers_of_a_cluster_keep_freed_memory(secure, tmp_path):
+    """Dask has its workers return memory, after which 50 arrays of 4 MB take 49,000 fresh pages."""
+    with Crew(1, secure[0]).at_work(3, tmp_path) as pool:
+        assert run_paths(FreshPages(), 6, executor=pool, blocks=Blocks(1))["pages"].max() < 2_000
 
 
 @pytest.mark.full

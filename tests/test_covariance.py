@@ -38,6 +38,7 @@ def system(A, B, delays=(0.0,), C=None, D=None, independent=False):
     return DelayedSystem(A, tuple(B), delays, C, D, tuple(map(str, range(len(C)))), independent)
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("corner", [0.0, 1e-6, 1e-3, 0.3, 3.0])
 def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
     found = stationary(excited(corners([(0.0, CORNER)]), walk(corner), 20.0))
@@ -59,6 +60,7 @@ def test_half_car_splits_into_quarter_cars():
     assert found == pytest.approx(half_car_acceleration(CORNER, v * Q, a, b, v), rel=1e-10)
 
 
+@pytest.mark.grounds("closed form")
 def test_scalar_delay_of_the_notes():
     a, tau = 0.7, 1.3
     found = stationary(system(np.array([[-a]]), [np.ones((1, 1))] * 2, (0.0, tau)))
@@ -84,6 +86,7 @@ def test_delay_of_zero_is_one_input_and_a_very_long_one_is_independence(truck):
     assert abs(at_once.variance / apart.variance - 1).max() > 0.1  # the limits differ, or the test says nothing
 
 
+@pytest.mark.grounds("plain counterpart")
 @pytest.mark.parametrize("case", ["1", "2", "3", "4", "5"])
 def test_frequency_quadrature_agrees(truck, case):
     vehicle, roads = truck
@@ -102,6 +105,7 @@ def test_spectra_hold_the_delays(truck):
     assert dense == pytest.approx(quadrature(vehicle, roads["3"], 13.0).variance[0], rel=1e-3)
 
 
+@pytest.mark.grounds("closed form")
 def test_the_five_covariances_of_the_road_itself(truck):
     vehicle, roads = truck
     rows = np.eye(len(vehicle.wheels))

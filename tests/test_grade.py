@@ -19,6 +19,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("grade", [0.1, -0.3])
 def test_height_is_that_of_its_definition(grade):
     road, slope = Graded(FLAT, grade, 40.0), math.tan(grade)
@@ -48,6 +49,7 @@ def test_three_ways_to_ask_agree():
     np.testing.assert_allclose(uniform, every, atol=1e-12)
 
 
+@pytest.mark.grounds("closed form")
 def test_its_extent_and_finest_detail_are_the_profiles():
     spline = SplineProfile.through(np.arange(9.0), np.zeros(9))
     assert Graded(spline, 0.1, 1.0).extent == (0.0, 8.0)
@@ -55,6 +57,7 @@ def test_its_extent_and_finest_detail_are_the_profiles():
     assert Graded(FLAT, 0.1, 0.0).finest == math.pi / 2
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
 @pytest.mark.parametrize(
     ("parameters", "geometry"), [("itwm_drift", "exact"), ("asymmetric_twin", "exact"), ("itwm_drift", "linear")]
@@ -87,6 +90,7 @@ def scene(source, **keys):
     )
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(("source", "keys"), [("study", {}), ("hills", {}), ("iso8608", {"road_class": "C"})])
 def test_grade_of_a_scene_is_added_after_the_fade_in(source, keys):
     plain, graded = (assemble(scene(source, **keys, **more)).input for more in ({}, {"grade": 0.1}))

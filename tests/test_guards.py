@@ -42,6 +42,7 @@ def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bo
     return np.array(columns).T
 
 
+@pytest.mark.grounds("native")
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
 @pytest.mark.parametrize(("engine", "integrator"), LIMITED)
 def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
@@ -54,6 +55,7 @@ def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
     assert np.abs(power[:8] - found).max() < 1e-10 * max(1.0, np.abs(found).max())
 
 
+@pytest.mark.grounds("native")
 @pytest.mark.parametrize(("engine", "integrator"), [("reference", "RK4"), ("mujoco", "RK4"), ("mujoco", "Euler")])
 def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     base = setups.vehicle("asymmetric_twin").without_tyres()
@@ -62,6 +64,7 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     assert np.abs(np.linalg.matrix_power(matrix, 5) - found).max() < 1e-10
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(
     ("integrator", "limit"),
     [

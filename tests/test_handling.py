@@ -164,6 +164,7 @@ def braked_turn() -> Drive:
     return drive_run("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
 
 
+@pytest.mark.grounds("closed form")
 def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
     """At spins of 60 rad/s the torque is whole: tanh(60) is 1 to rounding."""
     front = np.array([at.name.startswith("f") for at in braked_turn.handling.vehicle.tyres])
@@ -171,6 +172,7 @@ def test_brakes_of_each_axle_have_their_share(braked_turn: Drive) -> None:
     assert front.sum() == 2 and np.allclose(torque, np.where(front, -280.0, -120.0), rtol=1e-9)
 
 
+@pytest.mark.grounds("closed form")
 def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn: Drive) -> None:
     """Twice the difference of its path in the axes of the road, turned to the left: 1 ms of a manoeuvre of 0.1 s."""
     x, y, yaw = braked_turn.path.T
@@ -182,7 +184,7 @@ def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn
     along, across = np.gradient(np.gradient(path, times, axis=1), times, axis=1)
     found, expected = braked_turn.lateral_acceleration(), np.cos(yaw) * across - np.sin(yaw) * along
     assert found[-10] > 0.5
-    assert np.allclose(found[5:-5], expected[5:-5], rtol=0, atol=1e-2 * found.max())
+    assert np.allclose(found[5:-5], expected[5:-5], rtol=0, atol=3e-3 * found.max())
 
 
 @pytest.mark.full

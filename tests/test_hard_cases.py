@@ -36,11 +36,9 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
 ALL = tuple(case for _, case in cases_by_family())
 QUICK = {case.name for _, case in hard_cases.quick_cases(cases_by_family())}
 JUDGED = [
-    pytest.param(case, name, id=f"{case.name}-{name}", marks=[] if case.name in QUICK else [pytest.mark.full])
-    for case in ALL
-    for name in case.judged()
+    pytest.param(case, name, id=f"{case.name}-{name}") for case in ALL if case.name in QUICK for name in case.judged()
 ]
-"""All of them are a case of the report: the quick share of that is judged in every run of the tests."""
+"""The quick share; all of them are rows of the full case ``hard_cases`` of tests/test_cases.py."""
 
 
 @pytest.mark.parametrize(("case", "implementation"), JUDGED)

@@ -19,6 +19,7 @@ def test_every_row_of_the_case_passes(tmp_path):
     assert [row.id for row in rows if row.status in ("failed", "not run")] == []
 
 
+@pytest.mark.grounds("published")
 def test_the_truth_is_johnson_s_circle():
     """The many-digit side by formulas of its own: p0 = (6 N E*^2 / (pi^3 R^2))^(1/3), a = (3 N R / (4 E*))^(1/3)."""
     circle = {name: float(value) for name, value in ellipse(1.0).items()}
@@ -37,6 +38,7 @@ def test_truth_passes_smoothly_into_the_circle():
     assert float(near["flat"] / circle["flat"] - 1) == pytest.approx(-1.25e-12, rel=1e-3)  # D's own slope: 5/4
 
 
+@pytest.mark.grounds("closed form")
 def test_a_line_contact_is_that_of_cylinders():
     """Far from the ends a cylinder has s^2 = 4 N' R / (pi E*) and p0 = 2 N' / (pi s), N' the load per length."""
     contact = by_load(1e-9, 1.0, 1e5, PAIR)
@@ -44,6 +46,7 @@ def test_a_line_contact_is_that_of_cylinders():
     assert contact.b**2 == pytest.approx(4 * per_length * 0.5 / (np.pi * PAIR.modulus), rel=1e-6)  # s^2/l^2 is left out
 
 
+@pytest.mark.grounds("closed form")
 def test_gap_is_the_paraboloid_under_the_pressure():
     """Displacement by Boussinesq, integrated over rays from the point, against approach - A x^2 - B y^2."""
     contact = by_load(1.0, 3.0, 1e5, PAIR)
@@ -81,6 +84,7 @@ def test_extremes_stay_finite():
         assert np.isfinite(field).all() and (field > 0).all()
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("curvatures", [1e-200, 1e-8, 0.3, 1 - 1e-9, 1.0])
 def test_aspect_solves_its_equation(curvatures):
     g, cosine, sine = aspect(curvatures)
@@ -118,6 +122,7 @@ def test_what_cannot_be_used_says_what_is_expected(call, words):
         call()
 
 
+@pytest.mark.grounds("closed form")
 def test_combined_constants():
     """A pair of equals has its own constants; (1 - nu)/G = 1/E* for any pair (Kalker 1990, section 1.7)."""
     assert (PAIR.G, PAIR.nu, PAIR.mismatch) == (STEEL.G, STEEL.nu, 0.0)

@@ -28,6 +28,7 @@ def scene(**more):
     return build({**ON_ROAD, **more}, "s.toml")
 
 
+@pytest.mark.grounds("closed form")
 def test_held_forces_move_the_centre_of_mass_along_parabolas():
     sizes = {engine: centre_gap(r19(), engine, "held") for engine in (*ENGINES, PLAIN)}
     assert max(sizes.values()) < 1e-10  # Runge-Kutta 4 in joint coordinates leaves 5e-12 m
@@ -44,12 +45,14 @@ def test_spans_end_where_samples_change_and_the_guide_goes_on():
     assert part.hubs.ravel().tolist() == [2.0] * 5 and part.guide[:, 0].tolist() == [4.0, 5.0, 6.0, 7.0, 8.0]
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(("engine", "integrator"), [("exudyn", "DOPRI5"), ("reference", "LSODA")])
 def test_methods_that_pick_their_steps_read_forces_at_their_times(engine, integrator):
     assert max(centre_gap(r19(), engine, how, integrator) for how in ("held", "linear")) < 1e-12
     assert path_gap(r19(), engine, integrator) < 1e-7  # the error of Runge-Kutta 4 beside it, 3e-9
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_between_rows_compiled_forces_are_those_of_the_plain_equations():
     assert instants_gap(r19(), 6) < 1e-12
     nearest = HubModel.__init__

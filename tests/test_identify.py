@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
+from models.core.systems import load
 from models.core.tables import write_table
 from models.identification.bands import bands, error_model
 from models.identification.fit import fit
@@ -16,8 +17,10 @@ from models.identification.uncertainty import profile, uncertainty
 from models.measured.outliers import without_outliers
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
+from models.systems.wheelset import run as wheelset_run
 from studies.command.identify import identify, late_clock, lines
 
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
 UNITS = {"yaw rate": "rad/s", "lateral acceleration": "m/s^2", "side slip": "rad"}
 TIMES = np.arange(0.0, 12.0, 0.02)
@@ -179,6 +182,8 @@ def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
         ("vehicle.centre_height", "must start between its bounds"),
         ("front.friction=2:3", "must start between its bounds"),
         ("front.friction=2", "LOW:HIGH"),
+        ("front.friction=2:0.5", "= '2:0.5': .*LOW must be below HIGH"),
+        ("front.friction=nan:3", "= 'nan:3': .*both must be numbers"),
     ],
 )
 def test_parameters_are_refused(scene: SingleTrackScene, text: str, said: str) -> None:
@@ -186,6 +191,22 @@ def test_parameters_are_refused(scene: SingleTrackScene, text: str, said: str) -
     with pytest.raises(InputError, match=said) as caught:
         parameter(scene, text)
     assert text.partition("=")[0] in str(caught.value)
+
+
+def test_a_measurement_of_other_channels_is_refused_before_the_long_run(tmp_path: Path, monkeypatch) -> None:
+    """Nothing longer than a fiftieth of the scene is run."""
+    scene, seconds = load(SCENES / "wheelset.toml"), []
+    honest = wheelset_run.run
+
+    def counted(scene, engine=""):
+        seconds.append(scene.run.duration)
+        return honest(scene, engine)
+
+    monkeypatch.setattr(wheelset_run, "run", counted)
+    write_table(tmp_path / "other.csv", {"time": ("s", TIMES), "yaw rate of another": ("rad/s", TIMES)})
+    with pytest.raises(InputError, match="no channel has the name"):
+        problem_of(scene, tmp_path / "other.csv", ["run.displacement"], "reference")
+    assert seconds and max(seconds) <= scene.run.duration / 50.0
 
 
 def test_files_are_refused(scene: SingleTrackScene, tmp_path: Path) -> None:

@@ -60,6 +60,7 @@ WAVE = np.sin(2 * np.pi * 3.0 * 1e-3 * np.arange(8001))
 TWO = (_signal("a"), _signal("b", at="fr"))
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(
     ("faults", "expected"),
     [
@@ -84,6 +85,7 @@ def test_noise_belongs_to_its_channel() -> None:
     assert (both != _faulty({"noise": {"force": 2.0}}, TWO, still, path=1)).mean() > 0.99
 
 
+@pytest.mark.grounds("closed form")
 def test_a_converter_rounds_and_a_silent_transducer_loses_all_its_channels() -> None:
     signals = (_signal("a"), _signal("b", component="x"), _signal("c", at="fr"))
     truth = np.column_stack([WAVE, 2 * WAVE, WAVE])
@@ -137,6 +139,7 @@ def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:
     assert np.isnan(kept[100:200]).all() and np.isnan(gap.doubt)
 
 
+@pytest.mark.grounds("closed form")
 def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, tmp_path: Path) -> None:
     t = np.arange(-1.0, 12.0)[:, None]
     samples = 2.0 - t + 0.3 * t**2 - 0.05 * t**3
@@ -166,6 +169,7 @@ def test_transducers_agree_with_one_another(car: CutVehicle, driven: VirtualMeas
     assert np.abs(law - value["front left_force"])[5:-5].max() < 0.02 * np.ptp(value["front left_force"])
 
 
+@pytest.mark.grounds("closed form")
 def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     own, deviation = rigid(car), np.tile([8.0] * 3 + [1.0] * 3, 4)
     bias = np.zeros(24)

@@ -14,8 +14,8 @@ from models.advice.own_model_price import priced
 from models.core.errors import InputError, RunFailed
 from models.engines.free_vehicle import free_model
 from models.own_model import certificate as certifying
-from models.own_model.builds import BUILDS, as_parsed, equations, largest_gap, sliding
-from models.own_model.certificate import agreement, certificate, moved_at, softness, states_of
+from models.own_model.builds import BUILDS, SOFT, as_parsed, equations, largest_gap, sliding
+from models.own_model.certificate import agreement, certificate, moved_at, reference, softness, states_of
 from models.own_model.coordinates import turned
 from models.own_model.elements import elements
 from models.own_model.explain import compare, culprits
@@ -95,11 +95,11 @@ def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geare
     """Far from rigid, and the law all the same: to 1e-8, MuJoCo's tolerance; the fault: another impedance."""
     states = states_of(geared, 10)
     assert softness(geared, 10) > 1e-3
-    soft = moved_at(as_parsed(geared), states)
-    assert agreement("", moved_at(softly_coupled(geared), states), soft, geared).acceleration < 1e-8
+    soft = reference(geared, states, SOFT)
+    assert agreement("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement("", moved_at(softly_coupled(other), states), soft, geared).acceleration > 1e-4
+    assert agreement("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
 
 
 SPRUNG = changed(
@@ -124,6 +124,16 @@ def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
             wrong = replace(twin.driven, turning_springs=tuple(springs))
             assert all(row.acceleration > 1e-6 for row in certificate(replace(twin, driven=wrong), 20))
     assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
+
+
+def test_a_sprung_ball_joint_is_one_of_several_joints_of_its_body(tmp_path):
+    """Its spring and damper act from what the hinge before it turned to what the slide behind it shifts."""
+    joints = """<joint name="h" axis="0 1 .2" armature=".02"/><joint name="b" type="ball" stiffness="3" damping=".4"
+    pos="0 .1 0"/><joint name="s" type="slide" axis="1 0 0"/>"""
+    mass = '<inertial pos=".1 0 .3" mass="1" diaginertia=".1 .08 .05"/>'
+    body = f'<body><joint name="arm" axis="0 0 1"/>{mass}<body pos="1 0 0" euler="9 0 0">{joints}{mass}</body></body>'
+    twin = _read(tmp_path, f"<mujoco><worldbody>{body}</worldbody></mujoco>").twin
+    assert all(max(row.mass, row.acceleration) < 1e-11 for row in certificate(twin, 10))
 
 
 PUSHED = TIED.replace(
@@ -172,9 +182,9 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     states = states_of(twin, 5)
     for row in certificate(twin, 5):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
-    soft = moved_at(as_parsed(twin), states)
+    soft = reference(twin, states, SOFT)
     assert softness(twin, 5) > 1e-3
-    assert agreement("", moved_at(softly_coupled(twin), states), soft, twin).acceleration < 1e-8
+    assert agreement("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -183,7 +193,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement("", moved_at(softly_coupled(yielding), states), soft, twin).acceleration > 1e-5
+        assert agreement("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
@@ -214,6 +224,13 @@ def test_constraints_that_contradict_each_other_are_told(tmp_path):
     far = LINKED.replace("<worldbody>", '<worldbody><site name="far" pos="0 0 9"/>')
     twin = _read(tmp_path, far.replace(LOOP, f'<connect site1="tip" site2="far"/>{LOOP}')).twin
     with pytest.raises(RunFailed, match="cannot be satisfied all at once"):
+        certificate(twin, 2)
+
+
+def test_couplings_that_contradict_each_other_are_told_by_name(tmp_path):
+    other = '<joint name="other" joint1="slide" joint2="turn" polycoef=".2 .25 0 0 0"/></equality>'
+    twin = _read(tmp_path, GEARED.replace("</equality>", other)).twin
+    with pytest.raises(RunFailed, match="equality 'gear' and equality 'other' contradict each other"):
         certificate(twin, 2)
 
 
@@ -399,8 +416,8 @@ def test_inside_their_ranges_limits_do_nothing(tmp_path):
     with_limits.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
 
     def apart(states):
-        moved = [moved_at(as_parsed(replace(twin, model=model)), states) for model in (twin.model, with_limits)]
-        return agreement("", *moved, twin).acceleration
+        moved = moved_at(as_parsed(replace(twin, model=with_limits)), states)
+        return agreement("", reference(twin, states, SOFT), moved).acceleration
 
     assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
     beyond = [(1.2 * q, v) for q, v in states]
@@ -534,6 +551,7 @@ def test_includes_are_looked_for_where_mujoco_does(tmp_path):
         (JOINTED, 'gear="3"', 'gear="nan"', "actuator_gear: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'gravity="nan 2 -9"', "gravity: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'timestep="0"', "timestep = 0.0: must be a finite number above 0"),
+        (JOINTED, 'stiffness="2"', 'stiffness="1e308"', "jnt_stiffness = 1e+308: must be 1e+30 or less"),
         (GEARED, 'frictionloss=".4"', 'frictionloss="-1"', "frictionloss = -1.0: must be 0 or more"),
     ],
 )

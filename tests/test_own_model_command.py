@@ -18,6 +18,8 @@ def asked(tmp_path, monkeypatch, capsys):
     (tmp_path / "arm.urdf").write_text(ARM_URDF)
     (tmp_path / "other.xml").write_text(CART.replace('damping=".1"', 'damping=".2"'))
 
+    (tmp_path / "slow.xml").write_text(CART.replace("<worldbody>", '<option timestep="1e-7"/><worldbody>'))
+
     def ask(*words):
         monkeypatch.setattr(sys, "argv", ["twinrig", "twin", *words])
         with pytest.raises(SystemExit) as ended:
@@ -32,6 +34,7 @@ def test_one_file_is_certified_and_gets_a_page(asked, tmp_path):
     code, said, _ = asked("cart.xml", "--states", "3", "--page", "cart.html")
     assert code == 0 and "every build moves as the file does" in said
     page = (tmp_path / "cart.html").read_text()
+    assert "0.0e+00" not in page and "0.0e+00" not in said
     assert "Provenance" in page and "damping" in page and "sha256" in page
     assert not re.search(r"(?:src|href)=\"?(?:https?:)?//", page)  # nothing is fetched
     code, _, error = asked("cart.xml", "--page", "cart.html")
@@ -69,6 +72,7 @@ def test_the_price_names_a_setting_of_every_engine_and_what_its_default_loses(as
         (("cart.xml", "--controls", "c.csv"), "the model has no actuators"),
         (("cart.xml", "--controls", "c.csv", "--no-paths"), "leave out --no-paths"),
         (("cart.xml", "other.xml", "--controls", "c.csv"), "paths of one file alone"),
+        (("slow.xml",), "would take 10,000,000 steps, of 100,000 at the most: leave them out with `--no-paths`"),
         (("cart.xml", "--tolerance", "-1", "--states", "1", "--no-paths"), "--tolerance = -1.0: must be a finite"),
         (("cart.xml", "--tolerance", "1", "--quantity", "tild", "--states", "1", "--no-paths"), "did you mean 'tilt'"),
     ],

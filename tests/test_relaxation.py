@@ -106,6 +106,7 @@ def test_slip_angles_on_a_suspension_rise_by_the_way_and_tend_to_those_without_l
     assert case.rise_apart("exudyn") < 2e-6 and case.short_ratio("exudyn") == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_a_stop_on_a_suspension_is_that_of_plain_code():
     found = whole.run(whole.car(), "exudyn", 0.05, lags=True)
     plain = whole.plain_run("car", 0.05, lags=True)

@@ -69,6 +69,7 @@ def test_a_run_scored_against_itself_is_perfect(place):
     assert {*found.force_rms.values(), found.pitch_max, found.pitch_rms, found.heave_max} == {0.0}
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
 def test_artificial_moment_is_the_multiplier_of_a_guided_run(engine, place):
     folder, _ = place
@@ -77,6 +78,7 @@ def test_artificial_moment_is_the_multiplier_of_a_guided_run(engine, place):
     assert figures_of_run(found, p).moment_rms == pytest.approx(rms(found["enforced_moment"]), rel=0.03)
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
 def test_artificial_moment_is_that_of_the_spring(engine, place):
     folder, _ = place
@@ -97,6 +99,21 @@ def test_a_free_run_has_no_artificial_moment(frame, place):
     assert own.moment_share_band < 1e-4 and own.force_share_band < 1e-4
 
 
+@pytest.mark.grounds("closed form")
+def test_figures_of_a_run_are_shares_of_its_chassis_inertia(place):
+    """The moment by a chassis stated twice as heavy to turn: half of its own inertia term, to the balance's order."""
+    folder, _ = place
+    found, p = run(folder)
+    figures = figures_of_run(found, p.model_copy(update={"I": 2.0 * p.I}))
+    inertia = 2.0 * p.I * np.diff(found["pitch_rate"]) / (found.times[1] - found.times[0])
+    assert figures.moment_rms == pytest.approx(0.5 * np.sqrt(np.mean(inertia**2)), rel=2e-3)
+    assert figures.moment_share == pytest.approx(0.5, rel=2e-3)
+    assert figures.moment_share_band == pytest.approx(0.5, rel=2e-3)
+    assert figures.moment_max == pytest.approx(0.5 * np.abs(inertia).max(), rel=5e-3)
+    assert figures.pitch_max == np.abs(found["pitch"]).max()
+
+
+@pytest.mark.grounds("closed form")
 def test_the_band_ends_at_15_hz():
     t = 1e-3 * np.arange(20_000)
     ratios = [rms(low_pass(np.sin(2 * np.pi * f * t), 1e-3)[5000:-5000]) * 2**0.5 for f in (5.0, 15.0, 30.0)]
@@ -104,6 +121,7 @@ def test_the_band_ends_at_15_hz():
     assert ratios == pytest.approx([1.0, 0.5, 1 / 257], rel=0.02)
 
 
+@pytest.mark.grounds("closed form")
 def test_a_drifting_heave_leaves_body_frame_forces_alone(place):
     _, truth = place
     moved = Result(truth.data.copy())
@@ -122,6 +140,7 @@ def test_vertical_forces_are_blind_to_a_pitch_of_any_size(place):
     assert min(found.damage["f3x"], found.damage["f4x"]) > 1e3
 
 
+@pytest.mark.grounds("closed form")
 def test_section_forces_turn_with_the_chassis():
     """Nose up by 30 degrees: half of a vertical force points forward, and cos 30 of it stays upright."""
     found = section_forces(np.array([2.0]), np.array([-4.0]), np.array([np.pi / 6]))

@@ -27,6 +27,7 @@ def scene(effects, step=5e-4, **engines):
     )
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_readings_are_the_truth_at_their_instants_plus_their_own_noise(engine):
     gyro = {"sampling_rate": 200.0, "deviation": 0.02, "seed": 4, "path": 2}
@@ -48,6 +49,7 @@ def test_instruments_of_one_seed_are_independent():
     assert np.abs(off).max() < 4.0 / np.sqrt(20_000)  # 4 standard errors; the same stream would give 1
 
 
+@pytest.mark.grounds("closed form")
 def test_bias_stands_on_the_gyro_and_beside_it():
     gyro = {"sampling_rate": 1000.0, "deviation": 0.02}
     own = {"turn_on": 10.0, "instability": 3.0, "correlation_time": 0.1, "seed": 5}
@@ -63,6 +65,7 @@ def test_bias_needs_a_gyro():
         simulate(scene({"gyro_bias": {"turn_on": 1.0}}), "reference")
 
 
+@pytest.mark.grounds("closed form")
 def test_stationary_bias_of_any_sampling_rate():
     """4,000 paths at two rates: the variance at each end and the correlation over one correlation time."""
     for later, period in ((2, 0.25), (20, 0.025)):

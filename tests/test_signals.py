@@ -9,6 +9,7 @@ from models.core.signals import Sampled, Smooth, Stacked
 RAMP = np.column_stack([np.arange(50.0), 2 * np.arange(50.0)])
 
 
+@pytest.mark.grounds("closed form")
 def test_held_ramp_is_replayed_exactly_at_any_step():
     held = Sampled(RAMP, 0.1, held=True)
     for parts in (1, 2, 4, 8, 10):
@@ -31,6 +32,7 @@ def test_one_instant_has_the_bits_of_a_grid(held):
     assert all(np.array_equal(signal.at(t), signal.sample(t, 0.1, 1)[0]) for t in times)
 
 
+@pytest.mark.grounds("closed form")
 def test_linear_is_exact_on_a_ramp_between_samples():
     linear = Sampled(RAMP, 0.1, held=False)
     got = linear.sample(0.05, 0.1, 40)
@@ -38,12 +40,14 @@ def test_linear_is_exact_on_a_ramp_between_samples():
     assert np.abs(got[:, 0] - 10 * (0.05 + 0.1 * np.arange(40))).max() < 1e-12
 
 
+@pytest.mark.grounds("closed form")
 def test_impulse_of_held_samples_is_conserved():
     values = np.random.default_rng(0).normal(size=(40, 2))
     fine = Sampled(values, 0.1, held=True).sample(0.0, 0.01, 400)
     assert np.allclose(fine.sum(0) * 0.01, values.sum(0) * 0.1, rtol=1e-13)
 
 
+@pytest.mark.grounds("closed form")
 def test_smooth_is_the_cubic_spline_with_its_derivatives():
     values = np.random.default_rng(1).normal(size=(30, 2))
     smooth = Smooth(values, 0.1, derivatives=2)
@@ -56,6 +60,7 @@ def test_smooth_is_the_cubic_spline_with_its_derivatives():
     assert np.abs(smooth.at(1.0) - np.hstack([spline(1.0), spline(1.0, 1), spline(1.0, 2)])).max() < 1e-9
 
 
+@pytest.mark.grounds("closed form")
 def test_quintic_reproduces_a_quintic():
     t = 0.1 * np.arange(20)
     smooth = Smooth((t**5)[:, None], 0.1, derivatives=2, degree=5)

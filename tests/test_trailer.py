@@ -49,10 +49,12 @@ def file_with(**changes: Any) -> dict[str, Any]:
     return table
 
 
+@pytest.mark.grounds("closed form")
 def test_loads_on_ball_and_axles_are_those_of_levers():
     assert levers_error() < 1e-9
 
 
+@pytest.mark.grounds("closed form")
 def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_car_are_seen():
     right, wrong = towed_turn(caravan(), 10.0, None, 3.0), towed_turn(caravan(), 10.0, keep_to_the_car, 1.5)
     assert abs(right.yaw) < BOUND and np.abs(right.headings).max() < BOUND
@@ -140,6 +142,7 @@ def test_a_trailer_without_wheels_is_told():
         build_vehicle(table, "mine.toml")
 
 
+@pytest.mark.grounds("closed form")
 def test_small_side_forces_of_a_towed_body_see_its_own_heading():
     """A caravan that is turned beside the car by an angle is pushed back by C times that, over its axle's arm."""
     car = replace(caravan(), gravity=9.81)

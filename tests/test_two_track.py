@@ -35,6 +35,7 @@ def test_every_row_of_the_case_passes(tmp_path):
     assert [row.id for row in rows if row.status in ("failed", "not run")] == []
 
 
+@pytest.mark.grounds("closed form")
 def test_a_positive_roll_lifts_the_left_wheels_and_each_has_its_own_arm():
     road = excitation(ROAD, WHEELS)
     heights = sum(road.heights) @ np.array([0.0, 1.0])  # z_M = 0, theta = 1 rad: about x forward, left goes up
@@ -81,6 +82,7 @@ def test_a_cutoff_makes_the_road_differentiable():
     assert by_covariance == pytest.approx(by_spectrum, rel=0.01)
 
 
+@pytest.mark.grounds("closed form")
 def test_a_quarter_car_meets_a_track_and_not_the_mean():
     road, centre = road_of_level(0.8), (WheelPosition("one", 0.0, 0.0, 0),)
     assert half_track(centre) == 0.0
@@ -98,6 +100,7 @@ def test_a_class_keeps_its_variance_when_its_density_changes_sides():
     assert "1.99 times the mean of ISO 8608 class C, one-sided" in road_of_level(0.7).label(0.7)
 
 
+@pytest.mark.grounds("closed form")
 def test_isotropic_coherency_by_hand():
     """x K1(x) at x = 1 and 2 (Abramowitz and Stegun, Table 9.8: K1 = 0.6019072302, 0.1398658818)."""
     road = IsotropicRoad((DensityPart(1e-5),))
@@ -105,6 +108,7 @@ def test_isotropic_coherency_by_hand():
     assert road.coherency(np.array([1e-6, 1.0]), 0.0).tolist() == [1.0, 1.0]
 
 
+@pytest.mark.grounds("closed form")
 def test_mean_and_roll_spectra_are_those_of_the_processes():
     left, right = np.random.default_rng(3).standard_normal((2, 400)).cumsum(axis=1)
     found = spectra(MeasuredTracks(left, right, 0.1, 0.7, "walk"))

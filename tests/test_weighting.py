@@ -31,6 +31,7 @@ def by_quadrature(name: str, pole: float) -> float:
     return 2 * quad(density, np.log(1e-4), np.log(1e4), limit=4000, epsrel=1e-10)[0]
 
 
+@pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("name", ["Wk", "Wd"])
 def test_white_noise_through_a_weighting_has_a_variance_and_the_right_one(name):
     found = stationary(weighted(two_hits(), {"a": name, "b": "We"}))
@@ -49,6 +50,7 @@ def test_what_was_there_stays_as_it_was():
     assert weighted(before, {}) is before
 
 
+@pytest.mark.grounds("closed form")
 def test_band_limits_and_plateaus():
     """Far inside its band a weighting is what its transition says: Wd 1 at 1 Hz and 2/f above 2 Hz, Wk 12.5/f."""
     f = np.array([1.0, 25.0])
@@ -57,6 +59,7 @@ def test_band_limits_and_plateaus():
     assert np.abs(WEIGHTINGS["Wj"].response(np.array([0.02, 30.0]))) == pytest.approx([0.00125, 1.0], rel=0.02)
 
 
+@pytest.mark.grounds("closed form")
 def test_total_value_counts_the_axes():
     assert total_value({"x": 3.0, "y": 0.0, "z": 4.0}, {"x": 1, "y": 1, "z": 1}) == 5.0
     assert total_value({"x": 1.0, "y": 1.0}, HEALTH) == pytest.approx(1.4 * 2**0.5)

@@ -19,6 +19,7 @@ FOLDER = data_folder()
 needs_data = pytest.mark.skipif(FOLDER is None, reason="TWINRIG_DATA names no folder with the benchmark's profiles")
 
 
+@pytest.mark.grounds("published")
 @needs_data
 def test_built_in_profiles_are_those_of_the_benchmark():
     assert wheel_off(read_profile(FOLDER / WHEEL_FILE, "wheel")) < PROFILE_DISTANCE  # 0.0005 mm seen
@@ -70,6 +71,7 @@ def coned_wheel(slope):
     return ContactProfile(y, -slope * y)
 
 
+@pytest.mark.grounds("closed form")
 def test_cone_on_a_round_head_touches_where_geometry_says():
     radius, slope = 0.04, 0.05
     touch = wheel_on_rail(coned_wheel(slope), cone(radius), track=Track(inclination=0.0, gauge=1.5 - 2 * 0.0303975))[0]

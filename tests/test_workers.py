@@ -2,13 +2,12 @@
 
 import os
 import signal
-import time
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from mortal_job import Mortal
 
 from models.core.errors import InputError
 from models.ensemble.runner import Blocks, in_order, run_paths
@@ -98,21 +97,6 @@ def test_workers_and_a_cluster_are_not_asked_for_together():
         given_crew(3, "tcp://a:1")
     with pytest.raises(InputError, match=r"workers = 0"):
         load_scene("study_road", ["workers=0"])
-
-
-class Mortal:
-    """A job of the roots of path numbers; its processes note themselves in a folder, for whoever kills them."""
-
-    def __init__(self, folder: Path):
-        self.folder = folder
-
-    def __call__(self, paths):
-        (self.folder / str(os.getpid())).touch()
-        time.sleep(0.02)
-        return {"x": np.sqrt(np.arange(paths[0], paths[-1] + 1))}
-
-    def facts(self):
-        return {}
 
 
 @pytest.mark.full

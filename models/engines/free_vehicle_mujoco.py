@@ -13,7 +13,7 @@ from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_layout import check
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_native import Native, native
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed, without_warnings
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
 from models.engines.native_mujoco import (
     add_body_load,
@@ -90,7 +90,8 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
     places = MujocoIndices(driven.vehicle, model, _merged(driven))
     if not np.array_equal(places.columns, np.arange(driven.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
-    set_masses(model, places, driven.vehicle.bodies)
+    with without_warnings():  # a hinge with a ball joint of one body has no inertia but its rotor, which comes next
+        set_masses(model, places, driven.vehicle.bodies)
     set_rotors(model, rotors(driven.vehicle))
     if driven.tied:  # how soft constraints are depends on all inertias
         mujoco.mj_setConst(model, mujoco.MjData(model))

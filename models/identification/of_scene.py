@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from models.core.errors import InputError, suggestion
+from models.core.errors import InputError, RunFailed, suggestion
 from models.core.result import Result
 from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import ChannelOnClock, Curve, FitClock, Parameter, Problem, measured_channel
+from models.measured.channel import Source
 from models.measured.curve import curve
 from models.measured.formats import open_source
 
 OPTION = "--parameters"
+SHORTER = 50.0
+"""Part of a scene's duration whose run tells the names of its channels."""
 
 
 def parameter(scene: Any, text: str) -> Parameter:
@@ -29,12 +32,21 @@ def parameter(scene: Any, text: str) -> Parameter:
     key, equals, span = (part.strip() for part in text.partition("="))
     start, low, high = scene_value(scene, key)
     if equals:
-        ends = span.split(":")
-        try:
-            low, high = (float(end) for end in ends)
-        except ValueError:
-            raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH, two numbers") from None
+        low, high = _range(key, span)
     return Parameter(key, start, low, high)
+
+
+def _range(key: str, span: str) -> tuple[float, float]:
+    """LOW:HIGH as two numbers, which may be infinite."""
+    try:
+        low, high = (float(end) for end in span.split(":"))
+    except ValueError:
+        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH, two numbers") from None
+    if np.isnan(low) or np.isnan(high):
+        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH: both must be numbers")
+    if not low < high:
+        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH: LOW must be below HIGH")
+    return low, high
 
 
 def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
@@ -120,18 +132,38 @@ def over_time(run: Result) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
     return answer
 
 
+def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
+    """InputError at once where no channel of the measurement has the name of one of the run, by a run that is shorter;
+    nothing is checked where the scene has no such run."""
+    source, table = open_source(measurement), scene.table()
+    duration = table.get("run", {}).get("duration")
+    if not isinstance(duration, int | float):
+        return
+    set_key(table, "run.duration", duration / SHORTER)
+    try:
+        short = of_table(table, scene.file, Path(scene.folder))
+        names = over_time(import_module(f"{SYSTEMS[scene.system].package}.run").run(short, engine))
+    except (InputError, RunFailed):
+        return
+    _named(source, measurement, tuple(names))
+
+
+def _named(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
+    """Channels of a measurement among these names; InputError where there is none."""
+    named = [channel.name for channel in source.channels if channel.name in names]
+    if not named:
+        theirs = [channel.name for channel in source.channels]
+        raise InputError(path, "", theirs[0] if theirs else None, "no channel has the name of one of the run", names)
+    return named
+
+
 def curves(path: str | Path, units: Mapping[str, str]) -> dict[str, Curve]:
     """Channels of a measurement that have the name of one of ``units``, in that unit.
 
     Raises InputError where there is none, for a unit that does not fit, and for times that go back.
     """
     source = open_source(path)
-    named = [channel.name for channel in source.channels if channel.name in units]
-    if not named:
-        theirs = [channel.name for channel in source.channels]
-        raise InputError(
-            path, "", theirs[0] if theirs else None, "no channel has the name of one of the run", tuple(units)
-        )
+    named = _named(source, path, tuple(units))
     return {name: curve(source, name, units[name]) for name in named}
 
 
@@ -147,6 +179,7 @@ def problem_of(
         if each.name in [other.name for other in asked[:i]]:
             raise InputError(OPTION, each.name, None, "is named twice")
     model = SceneModel(scene, [each.name for each in asked], engine)
+    _check_names(scene, measurement, engine)
     first = over_time(model.result(np.array([each.start for each in asked])))
     read = curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
     clock = _clock([first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement)

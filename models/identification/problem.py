@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,8 @@ OVERSAMPLED = 4.0
 """Samples that are kept for each period of the low-pass."""
 FEWEST_SAMPLES = 32
 """Samples of a channel that a fit needs."""
+SETS_OF_PREDICTIONS = 2
+"""Sets of predictions that are kept, each as many as a base and its derivatives take."""
 
 Curve = tuple[np.ndarray, np.ndarray]
 """Times (n,) in s and values (n,)."""
@@ -142,13 +145,33 @@ class Problem:
         return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
-        """Output of the model (channels, n) at all times of the clock, low-passed like the measurement."""
+        """Output of the model (channels, n) at all times of the clock, low-passed like the measurement; read-only."""
+        key, kept = values.tobytes(), self._latest_predictions
+        if key not in kept:
+            prediction = self._march(values)
+            if len(kept) >= SETS_OF_PREDICTIONS * (len(self.parameters) + 1):
+                kept.pop(next(iter(kept)))
+            kept[key] = prediction
+        return kept[key]
+
+    @cached_property
+    def _latest_predictions(self) -> dict[bytes, np.ndarray]:
+        """Predictions by the bytes of their values: a stage of a fit begins with those that the last one ended with."""
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without predictions: a process that is sent the problem needs none of them."""
+        return {name: value for name, value in vars(self).items() if name != "_latest_predictions"}
+
+    def _march(self, values: np.ndarray) -> np.ndarray:
         run = self.model(values)
         rows = []
         for channel in self.channels:
             times, raw = run[channel.name]
             rows.append(self.clock.filtered(np.interp(self.clock.times, times, raw)))
-        return np.array(rows)
+        prediction = np.array(rows)
+        prediction.flags.writeable = False
+        return prediction
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -180,7 +203,7 @@ class Problem:
         """
         answer = self.residuals if of is None else of
         ways = [self._ways(values, k) for k in range(len(self.parameters))]
-        base, *there = block_results(answer, [values, *(way[0][0] for way in ways)], executor)
+        base, there = answer(values), block_results(answer, [way[0][0] for way in ways], executor)
         again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED]
         chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
         for k, moved in zip(again, block_results(answer, [chosen[k][0] for k in again], executor), strict=True):

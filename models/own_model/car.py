@@ -18,7 +18,8 @@ from models.own_model.car_bodies import CarBodies, car_bodies
 from models.own_model.car_joints import Roles, forget, roles_of
 from models.own_model.content import KINDS, contents, ranges
 from models.own_model.file import check_sane, compiled
-from models.own_model.reading import body_loads, joint_elements, label, line_springs, moving, place_of
+from models.own_model.names import label, moving, place_of
+from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
 from models.own_model.xml_guard import Document, guarded
 from models.vehicles.free_vehicle import CARRIER, SWAY, rotor

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.car_joints import Roles, freedom_of, joints_of, told
-from models.own_model.reading import moving
+from models.own_model.names import moving
 from models.own_model.wheel_sites import SAME, WheelSite
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner

@@ -11,7 +11,8 @@ import numpy as np
 from models.core.errors import InputError
 from models.own_model.content import BIAS, DSBL, GAIN, JOINT_TARGETS, TRN
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import is_fixed, label, moving, tendon_travel
+from models.own_model.names import label, moving
+from models.own_model.reading import is_fixed, tendon_travel
 from models.own_model.wheel_sites import SAME, WheelSite, place
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Freedom

@@ -1,49 +1,62 @@
 """Whether builds move alike: mass matrix, forces and accelerations at random states.
 
-Accelerations are compared in the coordinates of the description, each state's difference by the largest acceleration of
-that state; masses and forces by their largest entries. What a badly conditioned mass matrix makes of rounding is
-counted: the bound is 1e-10, or 100 times the rounding of that matrix's condition where this is more, up to 1e-6, and
-then said.
+Every coordinate is judged for itself, in the coordinates of the description: the difference of its acceleration by its
+acceleration at that state (the largest of three where a body turns or shifts along three axes at once), that of an
+entry of the mass matrix by the root of both entries of the diagonal. Where a change of all numbers by 1000 roundings
+changes it by more than 1e-10 of that (``rounding``), its difference is counted by this change: 1e-10 is then the whole.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from models.core.errors import RunFailed
 from models.own_model.builds import (
     BUILDS,
+    PLAIN,
+    SOFT,
     Equations,
     Moved,
     State,
-    as_parsed,
     equations,
     expected,
     largest_gap,
-    rigid,
     sliding,
 )
+from models.own_model.coordinates import several_at_once
 from models.own_model.reading import TwinModel
+from models.own_model.rounding import sensitivities
 from models.own_model.states import COUNT, random_states
 
 ALIKE = 1e-10
 """Relative difference up to which accelerations are the same."""
-ROUNDING = 100.0 * float(np.finfo(float).eps)
-LOOSEST = 1e-6
-"""Bound beyond which nothing is certified, whatever the condition of the mass matrix."""
-SMALL = 1e-6
-"""m/s^2, rad/s^2: what accelerations are compared with where none is larger."""
+ROUNDING = 1000.0 * float(np.finfo(float).eps)
+"""Share by which numbers may seem to be changed: up to 300 roundings were seen, with 30 joints in a row."""
+WORST_CONDITION = 1e8
+"""Condition of a mass matrix beyond which nothing more is put down to rounding."""
 MET = 1e-10
 """m, rad: gap up to which a state satisfies the constraints of a build."""
 SINGULAR = "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
-QUIET = 1e-3
-"""Share of the largest acceleration of all states, or of gravity, that counts where a state has less: what is there is
-rounding alone, of weights that joints bear."""
+HARDLY = 1e-6
+"""Share of the largest acceleration, weighted with the root of inertia, below which a coordinate hardly moves."""
+TINY = float(np.finfo(float).tiny)
 FASTER = (1.0, 3.0, 10.0)
 """Factors of random rates, of which the first is taken at which all dry friction slides."""
 Told = Callable[[float], object]
 """Told the share that is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What others are held to: names of coordinates (n,), the slice of coordinates that are judged with each (n,), what
+    it does at some states, and how sensitive that is to rounding."""
+
+    names: tuple[str, ...]
+    together: tuple[slice, ...]
+    moved: list[Moved]
+    sensitive: list[Moved]
 
 
 @dataclass(frozen=True)
@@ -51,8 +64,8 @@ class Agreement:
     """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
-    rad/s^2; bound : what acceleration and mass may differ by; gap : how far states are from satisfying the build's own
-    constraints (m, rad).
+    rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more;
+    gap : how far states are from satisfying the build's own constraints (m, rad).
     """
 
     build: str
@@ -66,17 +79,24 @@ class Agreement:
     gap: float = 0.0
 
     @property
-    def alike(self) -> bool:
+    def same_motion(self) -> bool:
         """Whether accelerations are the same, and the mass matrix: what no force moves now may be pushed one day."""
-        return max(self.acceleration, self.mass) <= self.bound and self.gap <= MET
+        return max(self.acceleration, self.mass) <= ALIKE
+
+    @property
+    def alike(self) -> bool:
+        """Whether the motion is the same, and the build's own constraints are met."""
+        return self.same_motion and self.gap <= MET
 
 
 def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
     """Every build of the description beside the file's own model; RunFailed where dry friction sticks at all states."""
     states, rows = states_of(twin, count), list[Agreement]()
+    soft = reference(twin, states, SOFT)
+    rigid = reference(twin, states, PLAIN) if twin.driven.tied else soft
     for i, build in enumerate(BUILDS):
-        true, seen = (moved_at(each, states) for each in (expected(twin, build), equations(twin, build)))
-        rows.append(replace(agreement(build, true, seen, twin), gap=largest_gap(twin, build, states)))
+        row = agreement(build, soft if build == SOFT else rigid, moved_at(equations(twin, build), states))
+        rows.append(replace(row, gap=largest_gap(twin, build, states)))
         told((i + 1) / len(BUILDS))
     return tuple(rows)
 
@@ -100,35 +120,73 @@ def softness(twin: TwinModel, count: int) -> float:
     """Largest relative difference of accelerations of the file's own model with MuJoCo's soft constraints from those
     with rigid ones, at states that satisfy them."""
     states = states_of(twin, count)
-    return agreement("", moved_at(rigid(twin), states), moved_at(as_parsed(twin), states), twin).acceleration
+    return agreement("", reference(twin, states, PLAIN), moved_at(expected(twin, SOFT), states)).acceleration
+
+
+def reference(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
+    """The file's own model at some states, as a build must move; RunFailed as of ``moved_at``."""
+    law = partial(expected, build=build)
+    moved = moved_at(law(twin), states)
+    return Reference(twin.names, several_at_once(twin.model), moved, sensitivities(twin, law, states, moved))
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
-    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any."""
+    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any, or an
+    acceleration is not finite."""
     try:
-        return [move(q, v) for q, v in states]
+        moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
         raise RunFailed("twin", SINGULAR) from None
+    if not all(np.isfinite(each.acceleration).all() for each in moved):
+        raise RunFailed("twin", "an acceleration is not finite: a number of the file is too large, or a mass too small")
+    return moved
 
 
-def agreement(build: str, expected: Sequence[Moved], seen: Sequence[Moved], twin: TwinModel) -> Agreement:
+def agreement(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
     """Largest differences over all states of a model."""
-    mass = max(_share(a.mass, b.mass) for a, b in zip(expected, seen, strict=True))
-    force = max(_share(a.force, b.force) for a, b in zip(expected, seen, strict=True))
-    largest = max(float(np.abs(a.acceleration).max()) for a in expected)
-    least = QUIET * max(largest, float(np.linalg.norm(twin.driven.gravity)))
-    shares = [_share(a.acceleration, b.acceleration, least) for a, b in zip(expected, seen, strict=True)]
-    at = int(np.nanargmax(shares)) if np.isfinite(shares).any() else 0
-    apart = np.abs(seen[at].acceleration - expected[at].acceleration)
-    i = int(apart.argmax())
-    bound = min(LOOSEST, max(ALIKE, ROUNDING * max(_condition(a.mass) for a in expected)))
-    size = float(np.abs(expected[at].acceleration[i]))
-    worst = max(shares) if np.isfinite(shares).all() else np.inf
-    return Agreement(build, mass, force, worst, twin.names[i], float(apart[i]), size, bound)
+    rows = [_scales(expected, i) for i in range(len(seen))]
+    own, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
+    apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired(seen, expected.moved)))
+    mass, force, shares = (
+        np.where(d > 0.0, d / np.maximum(np.maximum(a, r / ALIKE), TINY), 0.0)
+        for d, a, r in zip(apart, own, rounding, strict=True)
+    )
+    at, i = np.unravel_index(np.argmax(np.nan_to_num(shares, nan=np.inf)), shares.shape)
+    bound = _may_be_rounding(own, rounding.acceleration)
+    sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.moved[at].acceleration[i])))
+    return Agreement(build, _largest(mass), _largest(force), _largest(shares), expected.names[i], *sizes, bound)
 
 
-def _share(expected: np.ndarray, seen: np.ndarray, least: float = 0.0) -> float:
-    return float(np.abs(seen - expected).max() / max(SMALL, least, np.abs(expected).max()))
+def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
+    """Share of a coordinate's largest acceleration that may be rounding (s, n), 1e-10 or more; without coordinates
+    that hardly move."""
+    largest, allowed = own.acceleration.max(axis=0), rounding.max(axis=0)
+    weighted = largest * np.sqrt(np.diagonal(own.mass, axis1=1, axis2=2).max(axis=0))
+    moves = weighted > HARDLY * weighted.max()
+    return max(ALIKE, float((allowed[moves] / largest[moves]).max(initial=0.0)))
+
+
+def _paired(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:
+    """Of all states: both masses, both forces, both accelerations."""
+    return zip(zip(*seen, strict=True), zip(*expected, strict=True), strict=True)
+
+
+def _largest(shares: np.ndarray) -> float:
+    return float(shares.max()) if np.isfinite(shares).all() else np.inf
+
+
+def _scales(expected: Reference, state: int) -> tuple[Moved, Moved]:
+    """At one state: sizes of masses, forces and accelerations, and how much of each may be rounding.
+
+    It does not grow any more where a mass matrix is near a singular one.
+    """
+    moved, sensitive = expected.moved[state], expected.sensitive[state]
+    inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
+    force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
+    acceleration = np.array([acceleration[together].max() for together in expected.together])
+    own = Moved(np.outer(inertia, inertia), force, acceleration)
+    allowed = ROUNDING * min(1.0, WORST_CONDITION / _condition(moved.mass))
+    return own, Moved(*(allowed * each for each in sensitive))
 
 
 def _condition(mass: np.ndarray) -> float:

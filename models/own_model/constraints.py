@@ -6,7 +6,8 @@ import numpy as np
 
 from models.multibody.plain.constraints import PlainConstraints
 from models.multibody.plain.motion import Bodies
-from models.own_model.reading import TwinModel, tie_rows
+from models.own_model.equalities import tie_rows
+from models.own_model.reading import TwinModel
 
 REDUNDANT = 1e-9
 """Share of the largest singular value of the constraints' rows up to which they repeat others."""

@@ -12,7 +12,9 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.coordinates import BALL, FREE
-from models.own_model.reading import affine_law, is_fixed, is_line, is_tie, joins, label, pushes_site, rubs
+from models.own_model.equalities import is_tie, joins
+from models.own_model.names import disabled, label
+from models.own_model.reading import JOINT_TARGETS, affine_law, compensation, is_fixed, is_line, pushes_site, rubs
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
@@ -27,7 +29,6 @@ TAGS = {
     "equality": ("connect", "weld", "joint", "tendon", "flex"),
 }
 """Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
-JOINT_TARGETS = (int(TRN.mjTRN_JOINT), int(TRN.mjTRN_JOINTINPARENT))
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 SHOWN = 3
@@ -95,6 +96,9 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
     model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
     model.opt.tolerance = min(1e-8, model.opt.tolerance)
+    if not disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
+        times = model.eq_solref[:, 0]
+        times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
     return left_out
 
 
@@ -113,22 +117,22 @@ NAMELESS = -1
 
 def _touching(model: mujoco.MjModel) -> Listed:
     """Geoms that could touch another one, and pairs."""
-    if model.opt.disableflags & int(DSBL.mjDSBL_CONTACT):
+    if disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
     of = weld[model.geom_bodyid]
-    parents = above[of]
+    parents, filtered = above[of], not disabled(model, "FILTERPARENT")
     for g in range(model.ngeom):
         fits = (model.geom_contype[g] & model.geom_conaffinity) | (model.geom_conaffinity[g] & model.geom_contype)
         kin = (of != 0) & (of[g] != 0) & ((parents == of[g]) | (parents[g] == of))
-        if (fits.astype(bool) & (of != of[g]) & ~kin).any():
+        if (fits.astype(bool) & (of != of[g]) & ~(kin & filtered)).any():
             yield "geom", g
     for p in range(model.npair):
         yield "pair", p
 
 
 def _rubbing(model: mujoco.MjModel) -> Listed:
-    if model.opt.disableflags & int(DSBL.mjDSBL_FRICTIONLOSS):
+    if disabled(model, "FRICTIONLOSS"):
         return
     for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
         yield "joint", int(j)
@@ -137,7 +141,7 @@ def _rubbing(model: mujoco.MjModel) -> Listed:
 
 
 def _equalities(model: mujoco.MjModel) -> Listed:
-    if not model.opt.disableflags & int(DSBL.mjDSBL_EQUALITY):
+    if not disabled(model, "EQUALITY"):
         for e in np.flatnonzero(model.eq_active0):
             yield "equality", int(e)
 
@@ -201,6 +205,12 @@ def _bent_laws(model: mujoco.MjModel) -> Listed:
             yield "tendon", t
 
 
+def _half_lifted(model: mujoco.MjModel) -> Listed:
+    for b in range(1, model.nbody):
+        if 0.0 < compensation(model, b) < 1.0:
+            yield "body", b
+
+
 def _medium(model: mujoco.MjModel) -> Listed:
     if model.opt.density or model.opt.viscosity:
         yield "density and viscosity", NAMELESS
@@ -255,6 +265,11 @@ def _forget_bends(model: mujoco.MjModel) -> None:
     model.jnt_springyield[:] = model.tendon_springyield[:] = 0.0
 
 
+def _forget_lifting(model: mujoco.MjModel) -> None:
+    for b in [b for _, b in _half_lifted(model)]:
+        model.body_gravcomp[b] = 0.0
+
+
 def _forget_medium(model: mujoco.MjModel) -> None:
     model.opt.density = model.opt.viscosity = 0.0
 
@@ -290,6 +305,11 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
     ),
     "turning_law": (_turning_laws, "a rotor of a ball joint, or what turns it or a free one back", _forget_turning),
     "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bends),
+    "gravity_compensation": (
+        _half_lifted,
+        "weight that is compensated at some joints alone, since others leave that to actuators, which are off",
+        _forget_lifting,
+    ),
     "fluid": (_medium, "forces of a medium", _forget_medium),
     "flex": (_flexes, "a deformable body", _keep_flexes),
 }

@@ -76,6 +76,16 @@ class Coordinates:
         return MujocoState(qpos, jacobian @ v, jacobian, rest)
 
 
+def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
+    """For every coordinate (n,), those of its joint that turn or shift a body along three axes at once with it."""
+    groups = list[slice]()
+    for j in range(model.njnt):
+        first = int(model.jnt_dofadr[j])
+        starts = {FREE: (first, first + 3), BALL: (first,)}.get(int(model.jnt_type[j]), ())
+        groups += [slice(start, start + 3) for start in starts for _ in range(3)] or [slice(first, first + 1)]
+    return tuple(groups)
+
+
 def turned(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """R = Rx Ry Rz (3, 3), G (3, 3) of the angular velocity G rates in turned axes, and G' rates (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)

@@ -11,15 +11,20 @@ import mujoco
 import numpy as np
 
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import CONNECT, by_sites, is_line, is_tie, joins, label, pushes_site, sites_of
+from models.own_model.element_words import WORDS
+from models.own_model.equalities import CONNECT, by_sites, is_tie, joins
+from models.own_model.names import disabled, label
+from models.own_model.reading import is_line, pushes_site, sites_of
 
+AFFINE, PLAIN = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
+"""Laws of actuators, whose numbers are the same for gain and bias."""
 SAME = 1e-12
 """Relative difference up to which two values of an element are equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,)."""
+    """kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or one word."""
 
     kind: str
     owner: str
@@ -31,12 +36,50 @@ class Element:
         """What it is."""
         return self.kind, self.owner
 
+    @property
+    def says(self) -> bool:
+        """Whether it is more than zeros."""
+        return says(self.value)
+
+    @property
+    def text(self) -> str:
+        """Its value with its unit."""
+        return shown(self.value, self.unit)
+
     def same(self, other: "Element") -> bool:
         """Whether both have the same value."""
+        if is_word(self.value) or is_word(other.value):
+            return bool(np.array_equal(self.value, other.value))
         if self.value.shape != other.value.shape:
             return False
         size = max(np.abs(self.value).max(initial=0.0), np.abs(other.value).max(initial=0.0))
         return bool(np.abs(self.value - other.value).max(initial=0.0) <= SAME * size)
+
+
+def is_word(value: np.ndarray) -> bool:
+    """Whether a value is a word, and no numbers."""
+    return value.dtype.kind == "U"
+
+
+def says(value: np.ndarray) -> bool:
+    """Whether a value is more than zeros."""
+    return is_word(value) or bool(value.any())
+
+
+def shown(value: np.ndarray, unit: str = "") -> str:
+    """A value with its unit, "none" for zeros or nothing."""
+    if not says(value):
+        return "none"
+    if is_word(value):
+        return ", ".join(value)
+    numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
+    text = ", ".join(f"{number:.6g}" for number in numbers)
+    return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
+
+
+def short(number: float) -> str:
+    """A relative difference in two digits, "0" for none at all."""
+    return f"{number:.1e}" if number else "0"
 
 
 @dataclass(frozen=True)
@@ -56,8 +99,11 @@ def elements(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write an element's value into a model for ``described``; KeyError where it has no such element."""
+    """Write an element's value into a model for ``described``; KeyError where it has no such element, ValueError where
+    this one cannot have that value."""
     kind, number = _place(model, key)
+    if kind.read(model, number).shape != value.shape:
+        raise ValueError(f"{kind.kind} has another number of values")
     kind.write(model, number, value)
     model.body_sameframe[:] = 0
 
@@ -74,7 +120,7 @@ def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
 def _listed(model: mujoco.MjModel) -> Iterator[Element]:
     for kind in KINDS:
         for number in range(_count(model, kind.sort)):
-            value = np.atleast_1d(np.array(kind.read(model, number), float))
+            value = np.atleast_1d(kind.read(model, number))
             if value.size:
                 yield Element(kind.kind, _owner(model, kind, number), _unit(model, kind, number), value)
 
@@ -184,11 +230,12 @@ def _write_inertia(model: mujoco.MjModel, b: int, value: np.ndarray) -> None:
 
 
 def _read_gravity(model: mujoco.MjModel, _: int) -> np.ndarray:
-    return np.array(model.opt.gravity)
+    return np.zeros(3) if disabled(model, "GRAVITY") else np.array(model.opt.gravity)
 
 
 def _write_gravity(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
     model.opt.gravity[:] = value
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
 
 
 def _read_gear(model: mujoco.MjModel, i: int) -> np.ndarray:
@@ -200,8 +247,34 @@ def _write_gear(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     model.actuator_gear[i, : value.size] = value
 
 
-def _of_actuator(field: str, count: int) -> tuple[Callable, Callable]:
-    return _field(field, lambda model, i: (i, slice(count)))
+def _within(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
+    """Reader and writer of a range, which is zeros where nothing is limited."""
+    read, write = _field(range_field, lambda model, i: i)
+
+    def read_limited(model: mujoco.MjModel, i: int) -> np.ndarray:
+        return read(model, i) * float(getattr(model, limited_field)[i])
+
+    def write_limited(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+        getattr(model, limited_field)[i] = value.any()
+        write(model, i, value)
+
+    return read_limited, write_limited
+
+
+def _law(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
+    """Reader and writer of an actuator's three numbers of gain or bias, of which an affine law alone has those from the
+    ``first`` on."""
+
+    def read(model: mujoco.MjModel, i: int) -> np.ndarray:
+        law = np.array(getattr(model, numbers)[i, :3])
+        law[first:] *= getattr(model, kinds)[i] == AFFINE
+        return law
+
+    def write(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+        getattr(model, kinds)[i] = AFFINE if value[first:].any() else PLAIN
+        getattr(model, numbers)[i, :3] = value
+
+    return read, write
 
 
 def _coefficients() -> tuple[Callable, Callable]:
@@ -264,6 +337,17 @@ def _write_softness(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     model.eq_solref[e], model.eq_solimp[e] = value[:2], value[2:]
 
 
+def _read_site(model: mujoco.MjModel, i: int) -> np.ndarray:
+    """Place and orientation of the site that an actuator pushes, in the axes of its body."""
+    site = int(model.actuator_trnid[i, 0])
+    return np.concatenate((model.site_pos[site], model.site_quat[site])) if pushes_site(model, i) else np.zeros(0)
+
+
+def _write_site(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+    site = int(model.actuator_trnid[i, 0])
+    model.site_pos[site], model.site_quat[site], model.site_sameframe[site] = value[:3], value[3:], 0
+
+
 KINDS = (
     _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
     _Kind("body", "mass", "kg", *_body("body_mass")),
@@ -280,7 +364,7 @@ KINDS = (
     _Kind("joint", "damping", "N m s/rad | N s/m", *_of_freedoms("dof_damping")),
     _Kind("joint", "armature", "kg m^2 | kg", *_of_freedoms("dof_armature")),
     _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
-    _Kind("joint", "range", "rad | m", *_of_joint("jnt_range")),
+    _Kind("joint", "range", "rad | m", *_within("jnt_range", "jnt_limited")),
     _Kind("tendon", "coefficients", "", *_coefficients()),
     _Kind("tendon", "ends", "m", _read_ends, _write_ends),
     _Kind("tendon", "stiffness", "N/m", *_field("tendon_stiffness", lambda model, t: t)),
@@ -291,9 +375,11 @@ KINDS = (
     _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
     _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
     _Kind("actuator", "gear", "", _read_gear, _write_gear),
-    _Kind("actuator", "gain", "", *_of_actuator("actuator_gainprm", 3)),
-    _Kind("actuator", "bias", "", *_of_actuator("actuator_biasprm", 3)),
-    _Kind("actuator", "control range", "", *_field("actuator_ctrlrange", lambda model, i: i)),
+    _Kind("actuator", "gain", "", *_law("actuator_gainprm", "actuator_gaintype", 1)),
+    _Kind("actuator", "bias", "", *_law("actuator_biasprm", "actuator_biastype", 0)),
+    _Kind("actuator", "control range", "", *_within("actuator_ctrlrange", "actuator_ctrllimited")),
+    _Kind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
+    *(_Kind(sort, kind, "", read, write) for sort, kind, read, write in WORDS),
 )
 DROPPED = (
     "gravity",

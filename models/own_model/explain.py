@@ -6,23 +6,24 @@ influence, and elements that change nothing are listed as without influence.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import PLAIN, Moved, equations, expected
-from models.own_model.certificate import Agreement, agreement, moved_at, states_of
-from models.own_model.elements import Element, drop, elements, put, tensor_of
+from models.own_model.builds import PLAIN, Moved, equations
+from models.own_model.certificate import ALIKE, Agreement, Reference, agreement, moved_at, reference, states_of
+from models.own_model.elements import Element, drop, elements, is_word, put, short, shown, tensor_of
 from models.own_model.reading import TwinModel, described
 
 STATES = 20
 """States at which elements are tried."""
 OFF = ("range", "softness")
 """Kinds of elements that are off, or that MuJoCo alone has: a difference in them is listed, and not compared."""
-STILL = 1e-13
+STILL = 1e-11
 """Relative change of accelerations and of the mass matrix below which an element has no influence."""
 Key = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
@@ -44,9 +45,14 @@ class Difference:
     off: bool
     said: str = ""
 
+    @property
+    def key(self) -> Key:
+        """What differs."""
+        return self.kind, self.owner
+
     def sentence(self, files: Sequence[str]) -> str:
         """ "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
-        first, second = (_shown(value, self.unit) for value in (self.first, self.second))
+        first, second = ("none" if value is None else shown(value, self.unit) for value in (self.first, self.second))
         return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
 
 
@@ -81,6 +87,16 @@ class Comparison:
         """Differences that change neither."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
+    def rest(self) -> str:
+        """What is left when all elements are taken over that can be."""
+        if self.unexplained <= ALIKE:
+            return f"with these taken over, both move alike: {short(self.unexplained)} is left"
+        untried = any(each.influence is None for each in self.influential)
+        why = "what cannot be tried" if untried else "something that is no element here, or that these change together"
+        return (
+            f"with these taken over where they can be, accelerations still differ by {short(self.unexplained)}: {why}"
+        )
+
 
 def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Comparison:
     """Two files at states within the ranges of the first."""
@@ -89,17 +105,17 @@ def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Compari
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
     order = [second.names.index(name) for name in first.names]
     states = states_of(first, count)
-    twin = moved_at(expected(first, PLAIN), states)
-    other = [_permuted(each, order) for each in moved_at(expected(second, PLAIN), _in_order(states, order))]
-    apart = agreement("the second file", twin, other, first)
-    base = moved_at(equations(first, PLAIN), states)
-    trial = _Trial(first, states, base)
-    back = _Trial(second, _in_order(states, order), moved_at(equations(second, PLAIN), _in_order(states, order)))
+    places = _in_order(states, order)
+    here, there = reference(first, states, PLAIN), reference(second, places, PLAIN)
+    apart = agreement("the second file", _rounded_as_both(here, there, order), _permuted(there.moved, order))
+    trial = _Trial(first, states, replace(here, moved=moved_at(equations(first, PLAIN), states)))
+    back = _Trial(second, places, replace(there, moved=moved_at(equations(second, PLAIN), places)))
     differences = sorted(_differences(first, second, (trial, back)), key=_importance)
-    moved = trial.moved(trial.with_all(elements(second.model), differences))
-    alone = [(each.kind, each.owner) for each in differences if each.first is None]
+    model, taken = trial.with_all(elements(second.model), differences)
+    moved = trial.moved(model)
+    alone = [each.key for each in differences if each.first is None and each.key not in taken]
     rest = back.moved(back.without(alone))
-    left = agreement("", [_permuted(each, order) for each in rest], moved, first)
+    left = agreement("", replace(_rounded_as_both(here, there, order), moved=moved), _permuted(rest, order))
     return Comparison(apart, tuple(differences), left.acceleration, ())
 
 
@@ -114,25 +130,28 @@ class _Trial:
 
     twin: TwinModel
     states: States
-    base: list[Moved]
+    base: Reference
 
     def influence(self, model: mujoco.MjModel) -> float | None:
         """Largest relative change by a changed model: of accelerations, or of the mass matrix where these stay; None
         where it cannot be built."""
         try:
-            change = agreement("", self.base, self.moved(model), self.twin)
+            change = agreement("", self.base, self.moved(model))
             return change.acceleration if change.acceleration > STILL else change.mass
         except RunFailed:
             return None
 
-    def with_all(self, values: dict[Key, Element], differences: Sequence[Difference]) -> mujoco.MjModel:
-        """The file with all elements that it has as the other has them."""
-        model = copy(self.twin.model)
+    def with_all(
+        self, values: dict[Key, Element], differences: Sequence[Difference]
+    ) -> tuple[mujoco.MjModel, list[Key]]:
+        """The file with all elements that can be as the other has them, and which these are."""
+        model, taken = copy(self.twin.model), list[Key]()
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
-            key = (each.kind, each.owner)
-            if each.first is not None:
-                put(model, key, values[key].value if key in values else np.zeros_like(each.first))
-        return model
+            value = values[each.key].value if each.key in values else np.zeros_like(each.first)
+            with suppress(ValueError, KeyError):
+                put(model, each.key, value)
+                taken.append(each.key)
+        return model, taken
 
     def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
         """The file with another value of one element."""
@@ -158,9 +177,15 @@ def _in_order(states: States, order: list[int]) -> States:
     return [(q[places], v[places]) for q, v in states]
 
 
-def _permuted(moved: Moved, order: list[int]) -> Moved:
+def _permuted(moved: Sequence[Moved], order: list[int]) -> list[Moved]:
     """What the second file does, in the order of the first."""
-    return Moved(moved.mass[np.ix_(order, order)], moved.force[order], moved.acceleration[order])
+    return [Moved(each.mass[np.ix_(order, order)], each.force[order], each.acceleration[order]) for each in moved]
+
+
+def _rounded_as_both(here: Reference, there: Reference, order: list[int]) -> Reference:
+    """The first file, with the rounding of that one of both that has more."""
+    pairs = zip(here.sensitive, _permuted(there.sensitive, order), strict=True)
+    return replace(here, sensitive=[Moved(*map(np.maximum, first, second)) for first, second in pairs])
 
 
 def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
@@ -192,12 +217,16 @@ def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Tri
 
 
 def _influence(trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None) -> float | None:
-    """By taking the other's value over, or by leaving the element out of the second file, which alone has it."""
+    """By taking the other's value over, or by leaving the element out of the second file, which alone has it; None
+    where the first cannot have that value."""
     first, second = trials
     if element is None:
         return second.influence(second.without([key]))
     value = np.zeros_like(element.value) if other is None else other.value
-    return first.influence(first.with_one(key, value)) if value.shape == element.value.shape else None
+    try:
+        return first.influence(first.with_one(key, value))
+    except ValueError:
+        return None
 
 
 def _only_turned(kind: str, element: Element | None, other: Element | None) -> bool:
@@ -209,17 +238,8 @@ def _only_turned(kind: str, element: Element | None, other: Element | None) -> b
 
 
 def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
-    """Whether an element that one file lacks is zero in the other."""
-    return (element is None or other is None) and not there.value.any()
-
-
-def _shown(value: np.ndarray | None, unit: str) -> str:
-    """A value with its unit, "none" for zero or nothing."""
-    if value is None or not np.any(value):
-        return "none"
-    numbers = value[:1] if value.size > 1 and np.ptp(value) == 0.0 else value
-    text = ", ".join(f"{number:.6g}" for number in numbers)
-    return f"{text if numbers.size == 1 else f'({text})'} {unit}".rstrip()
+    """Whether an element that one file lacks is zero in the other, or one word, which other elements of it tell."""
+    return (element is None or other is None) and (is_word(there.value) or not there.says)
 
 
 def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
@@ -231,10 +251,10 @@ def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Ele
     rows = list[tuple[Element, float]]()
     for key, element in elements(twin.model).items():
         model = copy(twin.model)
-        if not element.value.any() or not drop(model, key):
+        if not element.says or not drop(model, key):
             continue
         less = described(model, twin.name)
-        seen = agreement(build, moved_at(expected(less, build), states), moved_at(equations(less, build), states), twin)
+        seen = agreement(build, reference(less, states, build), moved_at(equations(less, build), states))
         if seen.alike:
             rows.append((element, seen.acceleration))
     return sorted(rows, key=lambda row: row[1])

@@ -21,6 +21,8 @@ FINITE = (
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
 )
 """Numbers of a compiled model that move something."""
+LARGEST = 1e30
+"""Above, no mechanism has a number, and sums of them are not finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +83,11 @@ def check_sane(model: mujoco.MjModel, name: str) -> None:
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
     for numbers in FINITE:
-        if not np.isfinite(getattr(model, numbers)).all():
+        values = np.asarray(getattr(model, numbers))
+        if not np.isfinite(values).all():
             raise InputError(name, numbers, None, "must be finite numbers")
+        if values.size and np.abs(values).max() > LARGEST:
+            raise InputError(name, numbers, float(np.abs(values).max()), f"must be {LARGEST:g} or less")
     if not np.isfinite(model.opt.gravity).all():
         raise InputError(name, "option gravity", None, "must be finite numbers")
     if not (np.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):

@@ -11,7 +11,8 @@ from copy import copy
 import mujoco
 import numpy as np
 
-from models.own_model.reading import TwinModel, label
+from models.own_model.names import label
+from models.own_model.reading import TwinModel
 
 KINDS = {
     int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT): "joint",

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from scipy.integrate import simpson
 
-from models.core.errors import RunFailed
+from models.core.errors import InputError, RunFailed
 from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
@@ -21,6 +21,7 @@ from models.multibody.plain.joint_elements import PlainTree
 from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
 from models.own_model.content import ranges
 from models.own_model.control_table import ControlTable, Leg, constant_leg
+from models.own_model.elements import short
 from models.own_model.limits import limits_struck
 from models.own_model.reading import TwinModel, controls
 from models.own_model.states import random_states
@@ -29,6 +30,8 @@ DURATION = 1.0
 """s"""
 ALIKE, DISTURBED = 1e-10, 1e-14
 """Relative distance up to which paths are the same, and the disturbance that must stay below it."""
+MOST_STEPS = 100_000
+"""Steps of a path: the plain equations take about a minute for these."""
 LARGEST = 1e6
 """m, rad, m/s, rad/s: what lies beyond has blown up."""
 FILE = "the file's own model"
@@ -79,20 +82,39 @@ class PathReport:
             turned = " (quaternions: distance of the step's error)" if name == FILE and self.quaternions else ""
             given = " (soft constraints give way)" if name == SOFT and self.soft else ""
             first = SOFT if name == FILE and self.soft else ENGINES[0]
-            rows.append(f"  {name} from {first}: {size:.1e}{turned}{given}")
+            rows.append(f"  {name} from {first}: {short(size)}{turned}{given}")
         if self.energy is not None:
-            rows.append(f"  kinetic energy less work of all forces: {self.energy:.1e} of the largest kinetic energy")
+            rows.append(f"  kinetic energy less work of all forces: {short(self.energy)} of the largest kinetic energy")
         return rows
 
 
-def paths(twin: TwinModel, step: float | None = None, table: ControlTable | None = None) -> PathReport:
-    """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without."""
-    step = DURATION / np.ceil(DURATION / (step or float(twin.model.opt.timestep)) - 1e-9)
-    steps, (q,), (v,) = round(DURATION / step), *random_states(twin, 1)
+def steps_of_path(twin: TwinModel) -> int:
+    """How many steps a path at the file's own step takes; InputError where they are too many."""
+    step = float(twin.model.opt.timestep)
+    if DURATION / step > MOST_STEPS:
+        allowed = (
+            f"paths over {DURATION:g} s would take {DURATION / step:,.0f} steps, of {MOST_STEPS:,} at the most: leave "
+            "them out with `--no-paths`, or give the file a longer step"
+        )
+        raise InputError(twin.name, "option timestep", step, allowed)
+    return int(np.ceil(DURATION / step - 1e-9))
+
+
+def paths(
+    twin: TwinModel,
+    step: float | None = None,
+    table: ControlTable | None = None,
+    told: Callable[[float], object] = lambda share: None,
+) -> PathReport:
+    """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without; told : the
+    share that is done. InputError for too many steps."""
+    steps = int(np.ceil(DURATION / step - 1e-9)) if step else steps_of_path(twin)
+    step, (q,), (v,) = DURATION / steps, *random_states(twin, 1)
     legs = table.legs(twin, steps, step) if table else constant_leg(twin, steps)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
-    for build in (*ENGINES, PLAIN):
+    for i, build in enumerate((*ENGINES, PLAIN)):
         _march(build, partial(_by_build, legs, build, (q, v), step), built, failed)
+        told((i + 1) / (len(ENGINES) + 3))
     held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
     _march(FILE, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
     first = built.pop(ENGINES[0], None)
@@ -114,7 +136,8 @@ def paths(twin: TwinModel, step: float | None = None, table: ControlTable | None
 def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
     """Keep a path, or why there is none."""
     try:
-        path = run()
+        with np.errstate(all="ignore"):  # what blows up is told
+            path = run()
     except RunFailed as error:
         failed[name] = error.reason
         return

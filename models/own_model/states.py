@@ -6,7 +6,8 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.own_model.constraints import plain_constraints, satisfying
 from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.reading import TwinModel, tie_rows
+from models.own_model.equalities import tie_rows
+from models.own_model.reading import TwinModel
 
 COUNT = 100
 SEED = 26
@@ -18,6 +19,8 @@ STEEPEST = 1.45
 """rad: how near the middle one of three angles comes to a quarter turn."""
 NEARER = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
 """Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
+UNMET_GAP = 1e-9
+"""rad, m: gap of couplings that no coordinates satisfy all at once."""
 UNMET = "constraints cannot be satisfied all at once by coordinates in their ranges"
 
 
@@ -35,7 +38,12 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
     if not len(rows):
         return q, v
     nearest = np.linalg.pinv(rows).T
-    return q - (q @ rows.T - offsets) @ nearest, v - v @ rows.T @ nearest
+    q, v = q - (q @ rows.T - offsets) @ nearest, v - v @ rows.T @ nearest
+    unmet = np.abs(q @ rows.T - offsets).max(axis=0) > UNMET_GAP
+    if unmet.any():
+        names = [tie.name for tie, off in zip(twin.driven.couplings, unmet, strict=True) if off]
+        raise RunFailed("twin", f"{' and '.join(names)} contradict each other: no coordinates satisfy all of them")
+    return q, v
 
 
 def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.file import ModelFile
-from models.own_model.reading import label
+from models.own_model.names import label
 from models.vehicles.spatial import steiner
 
 SAME = 1e-6

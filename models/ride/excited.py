@@ -172,7 +172,7 @@ def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     if not len(matrix):
         return right
     if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:
-        raise InputError("", "effects", None, "nothing holds what is left without mass")
+        raise InputError("", "effects", None, "a massless body has no spring or damper that holds it")
     return np.linalg.solve(matrix, right)
 
 

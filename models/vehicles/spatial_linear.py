@@ -1,6 +1,6 @@
 """M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -170,7 +170,8 @@ def linearise(
         outputs=tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
-    return limited(whole, vehicle, vehicle.limits)[0] if vehicle.limits else whole
+    limits = vehicle.limits
+    return limited(whole, massless(vehicle, limits.massless), free(vehicle, limits)) if limits else whole
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
@@ -385,12 +386,11 @@ def _is_angle(element: JointElement) -> bool:
     return all(freedom.startswith("r") for _, freedom in element.coordinates)
 
 
-def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> tuple[LinearVehicle, np.ndarray]:
-    """M, D, K and outputs in what coordinates are left, and N (n, r) with q = N r; M may be singular.
+def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
+    """M, D, K and outputs in what coordinates r are left, q = N r, of a vehicle without limits; M may be singular.
 
-    linear : the vehicle without limits. InputError where nothing is left that could move.
+    mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where nothing is left that could move.
     """
-    M, N = massless(linear.mass, vehicle, limits.massless), _free(linear.coordinates, vehicle, limits)
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
     moved = [factors @ N for factors in linear.read[:3]] if linear.outputs else [()] * 3
@@ -400,28 +400,27 @@ def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> t
     )
     return replace(
         linear,
-        mass=N.T @ M @ N,
+        mass=N.T @ mass_matrix @ N,
         damping=N.T @ linear.damping @ N,
         stiffness=N.T @ linear.stiffness @ N,
         road_stiffness=N.T @ linear.road_stiffness,
         road_damping=N.T @ linear.road_damping,
         coordinates=tuple(("", str(i)) for i in range(N.shape[1])),
         outputs=outputs,
-    ), N
+    )
 
 
-def massless(matrix: np.ndarray, vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
-    """The mass matrix (n, n) less that of these bodies; rounding leaves no trace of them."""
-    if not names:
-        return matrix
+def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+    """The mass matrix (n, n) without that of these bodies; rounding leaves no trace of them."""
     light = tuple(
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
     )
     return mass(replace(vehicle, bodies=light))
 
 
-def _free(coordinates: Sequence[tuple[str, str]], vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+def free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
     """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
+    coordinates = vehicle.coordinates()
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
     if not limits.rigid:
         return kept

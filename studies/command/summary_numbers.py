@@ -1,4 +1,4 @@
-"""The numbers that a study's summary gives, by names that say what they are."""
+"""The numbers that a study's summary gives, by names that say what they are; and columns of them over many runs."""
 
 import math
 from collections.abc import Iterator
@@ -11,6 +11,8 @@ SKIPPED_KEYS = ("seconds", "folder", "scene", "table", "failed", "results")
 """What is no answer: how long it took, text, and what the numbers are of."""
 FRAMES = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
+Columns = dict[str, list[Any]]
+"""Numbers of all points by their names, None where there is none."""
 
 
 def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
@@ -69,3 +71,13 @@ def _is_number(value: Any) -> bool:
 
 def _joined_name(name: str, key: str) -> str:
     return f"{name}, {key}" if name else key
+
+
+def present_numbers(column: list[Any]) -> list[Any]:
+    """Numbers of a column without those that are missing."""
+    return [value for value in column if value is not None]
+
+
+def has_several_values(column: list[Any]) -> bool:
+    """Whether a column has more than one value."""
+    return len(set(present_numbers(column))) > 1

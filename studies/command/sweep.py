@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -32,8 +32,10 @@ from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import Crew
 from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
-from studies.command.summary_numbers import summary_scalars
-from studies.command.sweep_figure import Columns, Swept, draw_sweep, has_several_values, present_numbers
+from studies.command.summary_numbers import Columns, has_several_values, present_numbers, summary_scalars
+
+if TYPE_CHECKING:
+    from studies.command.sweep_figure import Swept
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -196,6 +198,8 @@ def _writable(value: Any) -> bool:
 
 def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
     """All points that are not finished yet, computed by a crew, then table and figures."""
+    from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
+
     with locked(job.folder):
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
@@ -223,8 +227,10 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     }
 
 
-def _sweep_columns(job: Points, records: list[Record]) -> Swept:
+def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
     """The records as columns, and what their results say."""
+    from studies.command.sweep_figure import Swept
+
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
@@ -267,7 +273,7 @@ def _absolute_path(scene: str) -> str:
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
-def _save(folder: Path, swept: Swept) -> None:
+def _save(folder: Path, swept: "Swept") -> None:
     """Save ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
         [_largest_error(results) for results in swept.results],

@@ -23,6 +23,7 @@ from models.drawing.figures import (
     save,
     wrapped,
 )
+from studies.command.summary_numbers import Columns, has_several_values, present_numbers
 
 PANELS_ACROSS, PANELS_DOWN, MOST_PAGES = 2, 5, 5
 """Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
@@ -38,9 +39,6 @@ WARNING = {
     "label": f"error above {100.0 * WARNED:g} %",
 }
 """Marks of points, open but for the cross."""
-
-Columns = dict[str, list[Any]]
-"""Numbers of all points by their names, None where there is none."""
 
 
 @dataclass(frozen=True)
@@ -101,16 +99,6 @@ def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     return {
         what: panel for what, panel in panels.items() if any(has_several_values(column) for column in panel.values())
     }
-
-
-def present_numbers(column: list[Any]) -> list[Any]:
-    """Numbers of a column of the sweep, without missing values."""
-    return [value for value in column if value is not None]
-
-
-def has_several_values(column: list[Any]) -> bool:
-    """Whether a column has more than one value."""
-    return len(set(present_numbers(column))) > 1
 
 
 def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:

@@ -8,11 +8,11 @@ from pathlib import Path
 from models.core.errors import InputError
 from models.own_model.certificate import ALIKE, MET, Agreement, certificate, softness, states_of
 from models.own_model.control_table import ControlTable, read_controls
-from models.own_model.elements import Element
+from models.own_model.elements import Element, short
 from models.own_model.explain import Comparison, compare, culprits
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
-from models.own_model.path import PathReport, paths
+from models.own_model.path import PathReport, paths, steps_of_path
 from models.own_model.states import COUNT
 from models.own_model.urdf import Misread, misread
 
@@ -110,6 +110,8 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(wanted.controls), allowed)
     read_files = [read(path, without) for path in files]
+    for file in read_files if wanted.paths else ():
+        steps_of_path(file.twin)
     tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
     parts = len(files) + (len(files) > 1)
     examined = [
@@ -136,8 +138,11 @@ def _examined(file: ModelFile, table: ControlTable | None, wanted: Wanted, tell:
     agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
     explained = {each.build: culprits(file.twin, each.build) for each in agreements if not each.alike}
     lost = misread(file) if file.document.kind == "URDF" else []
-    tell("marching", 1 / 3)
-    report = paths(file.twin, table=table) if wanted.paths else None
+    report = None
+    if wanted.paths:
+        what = f"marching {steps_of_path(file.twin):,} steps by every build"
+        tell(what, 1 / 3)
+        report = paths(file.twin, None, table, lambda share: tell(what, (1 + share) / 3))
     price: tuple[str, ...] = ()
     if wanted.tolerance is not None:
         from models.advice.own_model_price import priced
@@ -165,7 +170,7 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
         told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
         yield (
             f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
-            f"MuJoCo, where accelerations are {softness(twin, count):.1e} away from that"
+            f"MuJoCo, where accelerations are {short(softness(twin, count))} away from that"
         )
 
 
@@ -184,10 +189,10 @@ def verdict(each: Examined) -> str:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
     if each.certified:
         bound = max(row.bound for row in each.agreements)
-        said = f"; up to {bound:.0e} is rounding, by the condition of its mass matrix" if bound > ALIKE else ""
-        return f"every build moves as the file does: accelerations differ by {worst:.1e} at the most{said}"
+        said = f"; up to {bound:.0e} may be rounding" if bound > ALIKE else ""
+        return f"every build moves as the file does: accelerations differ by {short(worst)} at the most{said}"
     builds = ", ".join(row.build for row in each.agreements if not row.alike)
-    return f"differs in {builds}: accelerations by {worst:.1e}"
+    return f"differs in {builds}: accelerations by {short(worst)}"
 
 
 def _file_lines(each: Examined) -> list[str]:
@@ -199,10 +204,11 @@ def _file_lines(each: Examined) -> list[str]:
     ]
     for row in each.agreements:
         off = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
-        apart = f"  its constraints are {row.gap:.1e} (m, rad) apart where those of the file meet"
+        apart = f"  its constraints are {short(row.gap)} (m, rad) apart where those of the file meet"
         rows.append(
-            f"    {row.build:7s} mass {row.mass:.1e}  forces {row.force:.1e}  accelerations {row.acceleration:.1e}"
-            f"{apart if row.gap > MET else ''}{off if max(row.acceleration, row.mass) > row.bound else ''}"
+            f"    {row.build:7s} mass {short(row.mass)}  forces {short(row.force)}  "
+            f"accelerations {short(row.acceleration)}"
+            f"{apart if row.gap > MET else ''}{'' if row.same_motion else off}"
         )
     for build, elements in each.explained.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
@@ -223,16 +229,18 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
     apart, influential = comparison.apart, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
     rows = [
-        f"{head}: accelerations differ by {apart.acceleration:.1e}, most at {apart.worst}; "
-        f"mass matrices by {apart.mass:.1e}"
+        f"{head}: accelerations differ by {short(apart.acceleration)}, most at {apart.worst}; "
+        f"mass matrices by {short(apart.mass)}"
     ]
     for each in influential:
         size = (
-            "cannot be tried" if each.influence is None else f"changes accelerations or masses by {each.influence:.1e}"
+            "cannot be tried"
+            if each.influence is None
+            else f"changes accelerations or masses by {short(each.influence)}"
         )
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
-        rows.append(f"  with these taken over, {comparison.unexplained:.1e} is left")
+        rows.append(f"  {comparison.rest()}")
     rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
     return rows + [
         f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared

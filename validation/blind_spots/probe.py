@@ -1,11 +1,12 @@
 """A process of an audit: runs cases, tests and scenes, and tells what of each failed and which functions it ran.
 
-It reads jobs from its standard input and imports the cases that they name, and what the named tests import, each once,
-without a fault. For each job it starts a fork of itself, in which nothing is left of an earlier fault, and answers how
-that has ended. A job is a line of JSON: "cases", "tests" (what pytest is given) and "runs" (``sides.Run``); "out", a
-file to which a line of JSON is added for each of them that has ended; "faults", by the place of the function; "sound",
-ids that fail without a fault; "patience", seconds of the processor after which the fork is stopped; and "budgets",
-seconds of the processor after which nothing more begins: if something independent has noticed, and if not.
+It reads jobs from its standard input and imports the cases that they name, and what the named tests and runs import,
+each once, without a fault. For each job it starts a fork of itself, in which nothing is left of an earlier fault, and
+answers how that has ended. A job is a line of JSON: "cases", "tests" (what pytest is given) and "runs"
+(``sides.Run``); "out", a file to which a line of JSON is added for each of them that has ended; "faults", by the place
+of the function; "sound", ids that fail without a fault; "patience", seconds of the processor after which the fork is
+stopped; and "budgets", seconds of the processor after which nothing more begins: if something independent has noticed,
+and if not.
 """
 
 import json
@@ -24,7 +25,8 @@ from numba.core import event
 
 from validation.blind_spots import memory
 from validation.blind_spots.rewriting import ROOT
-from validation.blind_spots.sides import prepared
+from validation.blind_spots.shared import modules
+from validation.blind_spots.sides import Run, prepared
 from validation.blind_spots.table import is_independent
 
 IMPORT = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", re.MULTILINE)
@@ -178,10 +180,16 @@ def imported_by(tests: list[str]) -> list[str]:
     return list(dict.fromkeys(name for file in files for name in IMPORT.findall((ROOT / file).read_text("utf-8"))))
 
 
+def imported_by_runs(runs: list[Run]) -> list[str]:
+    """Modules that runs import: all of systems and engines; none without runs."""
+    return sorted(name for name in modules() if name.startswith(("models.systems.", "models.engines."))) if runs else []
+
+
 def ended(job: dict[str, Any]) -> str:
     """Do a job in a fork; returns how it ended, as ``Line.ended`` tells it."""
     memory.clear(memory.FAULTS)
-    for module in [*(f"validation.cases.{name}" for name in job["cases"]), *imported_by(job["tests"])]:
+    named = [f"validation.cases.{name}" for name in job["cases"]]
+    for module in [*named, *imported_by(job["tests"]), *imported_by_runs(job["runs"])]:
         with suppress(Exception):  # a module that breaks as it is imported breaks again where its case or test is run
             import_module(module)
     child = os.fork()

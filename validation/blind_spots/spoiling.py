@@ -1,7 +1,8 @@
 """Numbers that are 1 % off: what a spoiled function gives back or writes into its arguments.
 
 Numbers that count or name places stay: whole numbers of Python, of numba, and those in arrays that Python makes, whose
-tables hold places among their numbers. A function without a fault gives what it is given, itself.
+tables hold places among their numbers; so do labels of labelled arrays, and dataclasses within another one, which it
+hands on. A function without a fault gives what it is given, itself.
 """
 
 import copy
@@ -19,9 +20,19 @@ def numeric(value: Any) -> bool:
         return value.dtype.kind in "fc" or value.dtype.names is not None
     if isinstance(value, tuple | list):
         return any(numeric(part) for part in value[:20])
+    if type(value) is dict:
+        return any(numeric(part) for part in value.values())
     if is_dataclass(value) and not isinstance(value, type):
-        return any(numeric(getattr(value, field.name, None)) for field in fields(value))
+        parts = (getattr(value, field.name, None) for field in fields(value))
+        return any(numeric(part) for part in parts if not is_dataclass(part))
+    if _is_labelled(value):
+        return any(numeric(channel.values) for channel in value.data_vars.values())
     return isinstance(value, float | complex | np.floating | np.complexfloating)
+
+
+def _is_labelled(value: Any) -> bool:
+    """Whether a value is an xarray.Dataset, which is imported where there is one."""
+    return type(value).__name__ == "Dataset" and hasattr(value, "data_vars")
 
 
 def _ran(value: Any, place: int) -> float:
@@ -63,6 +74,8 @@ def _times(value: Any, factor: float) -> Any:
         return [_times(part, factor) for part in value]
     if type(value) is dict:
         return {key: _times(part, factor) for key, part in value.items()}
+    if _is_labelled(value):
+        return value.map(lambda channel: channel.copy(data=_times(channel.values, factor)), keep_attrs=True)
     return _dataclass(value, factor) if is_dataclass(value) and not isinstance(value, type) else value
 
 

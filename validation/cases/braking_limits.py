@@ -103,7 +103,7 @@ def _jackknife_row() -> Row:
     return Observed(
         "braking_limits.jackknife",
         SYSTEM,
-        f"largest hinge angle that is kept of a train that folds, limit 1 rad: {told}",
+        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {told}",
         angle if told else math.nan,
         "rad",
     ).within(1.0, 0.02, "a sample before the limit", "closed form")

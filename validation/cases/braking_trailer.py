@@ -99,11 +99,7 @@ def _alone_rows() -> list[Row]:
     }
     return [
         Observed(
-            f"braking_trailer.alone.{key}",
-            SYSTEM,
-            f"{what}, over the closed form's, less 1",
-            abs(float(getattr(errors, key))),
-            "",
+            f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(getattr(errors, key))), ""
         ).at_most(STATICS, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form")
         for key, what in told.items()
     ]

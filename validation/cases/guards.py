@@ -163,7 +163,7 @@ def _disk_row(folder: Path) -> Row:
     return Observed(
         "guards.full_disk",
         SYSTEM,
-        f"moments, of {full_disk.MOMENTS}, at which a full disk leaves an incomplete file or goes unnoticed",
+        f"number of moments (of {full_disk.MOMENTS}) at which a full disk leaves an incomplete file or is not reported",
         full_disk.damage(folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")

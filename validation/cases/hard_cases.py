@@ -49,7 +49,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "hard.passed",
             SYSTEM,
-            "hard cases that every implementation answers right, refuses or says it failed",
+            "hard cases in which every implementation gives a right answer, refuses, or reports its failure",
             sum("SILENT" not in place for place in words),
             "cases",
         ).within(len(data), 0, f"every one; {share} were run", "none"),

@@ -224,7 +224,7 @@ def _index_two_refused() -> Row:
     return behaves(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
-        "Exudyn's generalised-alpha solver is asked to run with its flag for index 2",
+        "outcome of Exudyn's generalised-alpha solver with its flag for index 2",
         ended,
         "refused",
         "index 2 is there with the trapezoidal rule alone",

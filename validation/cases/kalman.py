@@ -121,7 +121,7 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
     return behaves(
         f"kalman.{name}",
         SYSTEM,
-        f"{words} of a filter that is told 4 times the variance of the {noise}",
+        f"{words} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",

@@ -239,7 +239,7 @@ def resolution(folder: Path) -> list[Row]:
         Observed(
             "measured_formats.rsp.damage",
             SYSTEM,
-            "relative change of the damage by RPC III as it is written, 32-bit floating point",
+            "relative change of the damage when the load is saved as RPC III in 32-bit floating point",
             errors[0],
             "relative",
         ).at_most(1e-5, why, "closed form"),

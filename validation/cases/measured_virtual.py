@@ -181,7 +181,7 @@ def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -
         Observed(
             f"measured_virtual.values_{proof.name}_{format_name}",
             SYSTEM,
-            f"change of hub channels by file, map and clock, over their largest value; {what}",
+            f"change of hub channels by writing, reading and mapping, relative to their largest value; {what}",
             off,
             "1",
         ).at_most(

@@ -134,7 +134,7 @@ def _road_rows(saved_rows: Saved) -> list[Row]:
         behaves(
             "price.road.status.DVERK6",
             SYSTEM,
-            "what the solver DVERK6 does in Exudyn",
+            "behaviour of the solver DVERK6 in Exudyn",
             p.status,
             "refused",
             "Exudyn names the method but has not implemented it",

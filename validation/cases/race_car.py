@@ -146,7 +146,7 @@ def _race_rows(identified: Identified) -> list[Row]:
                 aim, "asked for; predicted from measured steer angle and speed alone", independence="measured"
             ),
             Observed(
-                f"{id}.inside", SYSTEM, f"{name}: share of what was measured inside 95 % bands", inside, ""
+                f"{id}.inside", SYSTEM, f"{name}: share of the measured samples inside 95 % bands", inside, ""
             ).within(0.945, 0.045, "90 to 99 %, as asked for", "measured"),
             Observed(
                 f"{id}.width", SYSTEM, f"{name}: mean half-width of the bands by the rms error", width, ""

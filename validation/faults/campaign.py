@@ -94,7 +94,7 @@ class Campaign:
             Observed(
                 f"{self.id}.false_alarms",
                 SYSTEM,
-                f"alarms of the checks of {self.what} without a fault",
+                f"false alarms of the checks of {self.what} (no fault planted)",
                 len(seeing_checks(clean)),
                 "alarms",
             ).within(0, 0, "a check that cries without a fault is no check", "native"),

@@ -13,7 +13,8 @@ from models.multibody.plain.constraints import turning_rows
 from models.multibody.plain.motion import FIRST
 from models.own_model.builds import Equations, Moved, plain_tree
 from models.own_model.constraints import plain_constraints
-from models.own_model.reading import TwinModel, tie_rows
+from models.own_model.equalities import tie_rows
+from models.own_model.reading import TwinModel
 
 QUATERNION = 0.5
 """Rate of a small rotation's quaternion to its angular velocity: MuJoCo's welds are constraints on the former."""

@@ -6,8 +6,9 @@ roads, if it does not depend on the speed.
 """
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -22,7 +23,7 @@ from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import limited, linearise
+from models.vehicles.spatial_linear import free, limited, linearise, massless
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Reduced:
 
 
 class Numbers:
-    """Numbers of values, the same for equal ones; an object that has been seen is known without its long hash."""
+    """Numbers of values, the same for equal values; an object that has been seen is known without its long hash."""
 
     def __init__(self) -> None:
         self._of_object: dict[int, tuple[object, int]] = {}
@@ -91,6 +92,19 @@ class Numbers:
         if known is None:
             known = self._of_object[id(thing)] = thing, self._of_value.setdefault(value(), len(self._of_value))
         return known[1]
+
+    def of_parts(self, thing: Any, *names: str) -> tuple[int, ...]:
+        """Numbers of attributes, of which most are the same objects in copies of a thing."""
+        parts = [getattr(thing, name) for name in names]
+        return tuple(self.of(part, partial(_same, part)) for part in parts)
+
+
+def _same(value: Hashable) -> Hashable:
+    return value
+
+
+PARTS_OF_VEHICLE = tuple(field.name for field in fields(SpatialVehicle))
+"""Attributes of a vehicle."""
 
 
 class Roads:
@@ -121,6 +135,8 @@ class Vehicles:
         self._numbers = Numbers()
         self._made: dict[Hashable, ReducedVehicle] = {}
         self._linear: dict[Hashable, LinearVehicle] = {}
+        self._masses: dict[Hashable, np.ndarray] = {}
+        self._free: dict[Hashable, np.ndarray] = {}
         self.mass = self.linear(full_vehicle, speed).mass
 
     def __len__(self) -> int:
@@ -136,7 +152,7 @@ class Vehicles:
 
     def number(self, vehicle: SpatialVehicle) -> int:
         """What tells one vehicle from another."""
-        return self._numbers.of(vehicle, lambda: vehicle)
+        return self._numbers.of(vehicle, lambda: self._numbers.of_parts(vehicle, *PARTS_OF_VEHICLE))
 
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
         """The vehicle without its limits."""
@@ -146,11 +162,28 @@ class Vehicles:
         return self._linear[key]
 
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
-        left, N = limited(self.linear(scene.vehicle, speed), scene.vehicle, scene.limits)
+        N = self._free_of(scene)
+        left = limited(self.linear(scene.vehicle, speed), self._mass_of(scene), N)
         states = vehicle_states(left)
         if not len(states.A):
-            raise InputError("", "effects", None, "nothing is left that could move")
+            raise InputError("", "effects", None, "the reduced vehicle has no degree of freedom left")
         return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
+
+    def _mass_of(self, scene: ReducedScene) -> np.ndarray:
+        """The mass matrix (n, n) of a scene, which neither springs nor locks change."""
+        names = scene.limits.massless
+        key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
+        if key not in self._masses:
+            self._masses[key] = massless(scene.vehicle, names)
+        return self._masses[key]
+
+    def _free_of(self, scene: ReducedScene) -> np.ndarray:
+        """N (n, r) of a scene, which bars, tyres and masses do not change."""
+        limits = scene.limits
+        key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
+        if key not in self._free:
+            self._free[key] = free(scene.vehicle, limits)
+        return self._free[key]
 
 
 def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:

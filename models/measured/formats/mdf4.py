@@ -136,7 +136,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
         records = group.channel_group
         if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
             raise InputError(
-                path, f"group {g + 1}", records.cycles_nr, "the file is too short for what its records need"
+                path, f"group {g + 1}", records.cycles_nr, "the file is too short for the records that it announces"
             )
         why = _why_group_unusable(mdf, g, version)
         if why:

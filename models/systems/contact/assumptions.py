@@ -136,7 +136,7 @@ def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) ->
 def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "no slip",
-        "the linear theory's force is far below what friction carries",
+        "the force of the linear theory is far below mu N",
         'name the effect saturation: method.name = "fastsim"',
         watched,
         "mu N",

@@ -1,0 +1,181 @@
+"""Elements of a model that are no numbers: what is switched off, and what is joined to what.
+
+Each has a reader, which gives one word or none, and a writer, which raises ValueError where a model cannot have that
+word without being another tree.
+"""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from models.own_model.coordinates import SLIDE
+from models.own_model.equalities import by_sites, is_tie, joins
+from models.own_model.names import disabled, label
+from models.own_model.reading import (
+    JOINT_TARGETS,
+    LAST_GROUP,
+    acts,
+    is_fixed,
+    is_line,
+    pushes_site,
+    sites_of,
+    tendon_travel,
+)
+
+HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+WORLD = "the world"
+OFF = "off"
+Reader = Callable[[mujoco.MjModel, int], np.ndarray]
+Writer = Callable[[mujoco.MjModel, int, np.ndarray], None]
+
+
+def _word(text: str) -> np.ndarray:
+    return np.array([text])
+
+
+def _refused(what: str) -> Writer:
+    """A writer of what is another tree."""
+
+    def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
+        raise ValueError(f"{what} cannot be changed in a compiled model")
+
+    return write
+
+
+def _numbered(model: mujoco.MjModel, sort: str, owner: str) -> int:
+    """The number of a thing by what ``label`` calls it; ValueError where there is none."""
+    count = {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon}[sort]
+    for number in range(count):
+        if label(model, sort, number) == owner:
+            return number
+    raise ValueError(f"no {owner}")
+
+
+def _switch(flag: str) -> tuple[Reader, Writer]:
+    """Whether a part of MuJoCo is switched off in a file."""
+    bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
+
+    def write(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
+        off = value[0] == OFF
+        model.opt.disableflags = (model.opt.disableflags & ~bit) | (bit if off else 0)
+
+    return lambda model, _: _word(OFF if disabled(model, flag) else "on"), write
+
+
+def _read_acts(model: mujoco.MjModel, i: int) -> np.ndarray:
+    """Whether an actuator is in a group that is switched off."""
+    return _word("on" if acts(model, i) else OFF)
+
+
+def _write_acts(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+    off = value[0] == OFF
+    free = next((g for g in range(LAST_GROUP) if not model.opt.disableactuator & (1 << g)), None)
+    if not off and free is None:
+        raise ValueError("all groups are off")
+    if off:
+        model.opt.disableactuator |= 1 << LAST_GROUP
+    model.actuator_group[i] = LAST_GROUP if off else free
+
+
+def _read_type(model: mujoco.MjModel, j: int) -> np.ndarray:
+    return _word(mujoco.mjtJoint(int(model.jnt_type[j])).name.removeprefix("mjJNT_").lower())
+
+
+def _write_type(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
+    kinds = {"hinge": HINGE, "slide": SLIDE}
+    if value[0] not in kinds or int(model.jnt_type[j]) not in kinds.values():
+        raise ValueError("ball and free joints have other coordinates")
+    model.jnt_type[j] = kinds[value[0]]
+
+
+def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
+    """The joint before a joint, on the way from the world."""
+    body = int(model.jnt_bodyid[j])
+    if j > model.body_jntadr[body]:
+        return _word(label(model, "joint", j - 1))
+    return _moved_by(model, int(model.body_parentid[body]))
+
+
+def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """The last joint on the way from the world to a body."""
+    while body and not model.body_jntnum[body]:
+        body = int(model.body_parentid[body])
+    last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
+    return _word(label(model, "joint", last) if body else WORLD)
+
+
+def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
+    """Joints of a fixed tendon, bodies at both ends of a straight one."""
+    if is_fixed(model, t):
+        return _word(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
+    if is_line(model, t):
+        return _word(", ".join(_body_of(model, site) for site in sites_of(model, t)))
+    return np.zeros(0)
+
+
+def _write_held(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
+    names, first = value[0].split(", "), int(model.tendon_adr[t])
+    if not is_fixed(model, t) or len(names) != model.tendon_num[t]:
+        raise ValueError("a tendon of another kind, or of another number of joints")
+    model.wrap_objid[first : first + len(names)] = [_numbered(model, "joint", name) for name in names]
+
+
+def _body_of(model: mujoco.MjModel, site: int) -> str:
+    body = int(model.site_bodyid[site])
+    return label(model, "body", body) if body else WORLD
+
+
+def _read_target(model: mujoco.MjModel, i: int) -> np.ndarray:
+    """What an actuator drives: a joint, a tendon, the body of a site."""
+    target = int(model.actuator_trnid[i, 0])
+    if pushes_site(model, i):
+        return _word(f"a site of {_body_of(model, target)}")
+    if int(model.actuator_trntype[i]) in JOINT_TARGETS:
+        return _word(label(model, "joint", target))
+    tendon = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON
+    return _word(label(model, "tendon", target)) if tendon else np.zeros(0)
+
+
+def _write_target(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
+    kind, there = value[0].split(" ")[0], _read_target(model, i)[0].split(" ")[0]
+    if kind != there or kind == "a":
+        raise ValueError("a target of another kind")
+    model.actuator_trnid[i, 0] = _numbered(model, kind, value[0])
+
+
+def _read_between(model: mujoco.MjModel, e: int) -> np.ndarray:
+    """Joints that a constraint couples, bodies that it holds together."""
+    things = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
+    if is_tie(model, e):
+        return _word(" and ".join(label(model, "joint", j) for j in things if j >= 0))
+    if not joins(model, e):
+        return np.zeros(0)
+    bodies = [_body_of(model, s) if by_sites(model, e) else label(model, "body", s) if s else WORLD for s in things]
+    return _word(" and ".join(bodies))
+
+
+def _write_between(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
+    names, sort = value[0].split(" and "), "joint" if is_tie(model, e) else "body"
+    before = _read_between(model, e)[0].split(" and ")
+    if len(names) != len(before) or by_sites(model, e) or not all(name.startswith(sort) for name in names):
+        raise ValueError("a constraint of another kind")
+    numbers = [_numbered(model, sort, name) for name in names]
+    model.eq_obj1id[e], model.eq_obj2id[e] = (*numbers, -1)[:2]
+
+
+WORDS: tuple[tuple[str, str, Reader, Writer], ...] = (
+    ("model", "springs", *_switch("SPRING")),
+    ("model", "dampers", *_switch("DAMPER")),
+    ("model", "actuators", *_switch("ACTUATION")),
+    ("model", "equality constraints", *_switch("EQUALITY")),
+    ("model", "dry friction", *_switch("FRICTIONLOSS")),
+    ("actuator", "switch", _read_acts, _write_acts),
+    ("joint", "type", _read_type, _write_type),
+    ("joint", "parent", _read_parent, _refused("the joint before a joint")),
+    ("body", "supporting joint", _moved_by, _refused("the joint that moves a body")),
+    ("tendon", "attachment", _read_held, _write_held),
+    ("actuator", "target", _read_target, _write_target),
+    ("equality", "partners", _read_between, _write_between),
+)
+"""What has it, its name, its reader and its writer."""

@@ -1,0 +1,99 @@
+"""Equality constraints of a file as the description has them: couplings of joints, and joints between bodies."""
+
+from collections.abc import Iterator, Sequence
+
+import mujoco
+import numpy as np
+
+from models.engines.native_parts import Connection, Coupling
+from models.own_model.coordinates import BALL, FREE
+from models.own_model.names import disabled, label, massive, moving, rotation_of, vector
+
+CONNECT, WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
+
+
+def is_tie(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint makes a hinge or slide follow another one in proportion, or stay where it is."""
+    if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
+        return False
+    joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
+    return not any(model.jnt_type[j] in (BALL, FREE) for j in joints)
+
+
+def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
+    """Equality constraints of two joints, or of one, that act."""
+    if disabled(model, "EQUALITY"):
+        return
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
+        first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        driver = int(model.jnt_dofadr[second]) if second >= 0 else None
+        offset, ratio = model.eq_data[e, :2].tolist()
+        softness = _softness(model, e)
+        yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
+
+
+def _softness(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """solref, as stiffness and damping whatever the step, and solimp.
+
+    MuJoCo takes a time constant shorter than two steps for two steps, unless ``refsafe`` is off.
+    """
+    time, ratio = model.eq_solref[equality].tolist()
+    if time > 0.0 and ratio > 0.0:
+        time = time if disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
+        time, ratio = -1.0 / (time * ratio) ** 2, -2.0 / time
+    return (time, ratio), tuple(model.eq_solimp[equality].tolist())
+
+
+def joins(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint keeps points of bodies together, or bodies as they lie to each other."""
+    return int(model.eq_type[equality]) in (CONNECT, WELD)
+
+
+def by_sites(model: mujoco.MjModel, equality: int) -> bool:
+    """Whether an equality constraint is between two sites, and not between bodies."""
+    return bool(model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
+
+
+def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
+    """Equality constraints between points of two bodies, or with their axes, that act."""
+    if disabled(model, "EQUALITY"):
+        return
+    numbers = moving(model)
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and joins(model, e)):
+        things = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        bodies = [int(model.site_bodyid[thing]) if by_sites(model, e) else thing for thing in things]
+        first, second = (massive(b) if b in numbers else None for b in bodies)
+        if first == second:
+            continue
+        (start, turned), (end, other) = _frames(model, design, e)
+        turns = model.eq_type[e] == WELD and model.eq_data[e, 10]
+        axes = (turned, other) if turns else None
+        softness = _softness(model, e)
+        ends = (first, vector(start)), (second, vector(end))
+        yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
+
+
+def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Points (3,) and axes (3, 3) of both ends of a constraint in the design position: they lie alike where it is met.
+
+    A weld between bodies has its point of the second one first.
+    """
+    things, data = (model.eq_obj1id[equality], model.eq_obj2id[equality]), model.eq_data[equality]
+    if by_sites(model, equality):
+        return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
+    points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
+    if model.eq_type[equality] == WELD:
+        points, axes = points[::-1], [rotation_of(data[6:10]), np.eye(3)]
+    turns = [design.xmat[b].reshape(3, 3) for b in things]
+    places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]
+    return [(place, turn @ own) for place, turn, own in zip(places, turns, axes, strict=True)]
+
+
+def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """(c, n) and (c,): rows q = offsets is what couplings ask of n coordinates."""
+    rows = np.zeros((len(ties), size))
+    for row, coupling in zip(rows, ties, strict=True):
+        row[coupling.driven] = 1.0
+        if coupling.driver is not None:
+            row[coupling.driver] -= coupling.ratio
+    return rows, np.array([coupling.offset for coupling in ties])

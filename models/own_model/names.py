@@ -1,0 +1,86 @@
+"""Names of what a compiled model has, of the bodies that stand for its joints, and small readers of its numbers."""
+
+import mujoco
+import numpy as np
+
+from models.own_model.coordinates import BALL, FREE, SLIDE
+from models.vehicles.spatial import FREEDOMS, Freedom, Vector
+
+TURNS: tuple[Freedom, ...] = ("rx", "ry", "rz")
+OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL: TURNS, FREE: FREEDOMS}
+"""Freedoms of joints that have several."""
+CONSTRAINTS = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
+
+
+def label(model: mujoco.MjModel, kind: str, number: int) -> str:
+    """Name of a joint, body, tendon or actuator of a file; its number where it has none."""
+    name: str = getattr(model, kind)(number).name
+    return f"{kind} {name!r}" if name else f"{kind} {number}"
+
+
+def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Of every coordinate: its joint, and which freedom of it where it has several."""
+    names = list[str]()
+    for j in range(model.njnt):
+        of = OF_KIND.get(int(model.jnt_type[j]), ())
+        names += [f"{label(model, 'joint', j)} {freedom}" for freedom in of] or [label(model, "joint", j)]
+    return tuple(names)
+
+
+def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
+    """The coordinate of a hinge or slide."""
+    return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE else "rx"
+
+
+def moving(model: mujoco.MjModel) -> dict[int, None]:
+    """Numbers of the bodies that a joint moves, their own or one further down, in their order."""
+    numbers = dict[int, None]()
+    for b in range(1, model.nbody):
+        if model.body_jntnum[b] or int(model.body_parentid[b]) in numbers:
+            numbers[b] = None
+    return numbers
+
+
+def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
+    """All joints that move a body."""
+    joints = list[int]()
+    while body:
+        first = int(model.body_jntadr[body])
+        joints += range(first, first + int(model.body_jntnum[body]))
+        body = int(model.body_parentid[body])
+    return joints
+
+
+def disabled(model: mujoco.MjModel, what: str) -> bool:
+    """Whether a file switches something off, as "GRAVITY"; all constraints at once, too."""
+    kinds = (what, "CONSTRAINT") if what in CONSTRAINTS else (what,)
+    return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
+
+
+def moved_by(joint: int) -> str:
+    """Name of the body without mass of a joint; numbers, since names of files need not be there."""
+    return f"joint {joint}"
+
+
+def massive(body: int) -> str:
+    """Name of the body with the mass of a file's body, behind all of its joints."""
+    return f"body {body}"
+
+
+def vector(numbers: np.ndarray) -> Vector:
+    """Three numbers as a description has them."""
+    x, y, z = np.asarray(numbers, float).tolist()
+    return x, y, z
+
+
+def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
+    """(3, 3) as a description has it."""
+    x, y, z = map(vector, matrix)
+    return x, y, z
+
+
+def rotation_of(quaternion: np.ndarray) -> np.ndarray:
+    """(3, 3) of a quaternion."""
+    numbers = np.empty(9)
+    mujoco.mju_quat2Mat(numbers, quaternion)
+    return numbers.reshape(3, 3)

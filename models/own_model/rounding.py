@@ -1,0 +1,122 @@
+"""What rounding makes of mass matrices, forces and accelerations, measured on the file's own model.
+
+A computation in floating point is at best the exact answer for numbers that are changed by their rounding (backward
+stability). So the model is computed again with every number of it, and the state, changed at random by a small share
+of itself: lengths by this share of the model's reach, since places are sums of lengths, directions by this angle. The
+change of an answer divided by the share, times the rounding of a number, is what rounding may make of that answer. Each
+coordinate has its own: a light wheel that spins up fast says nothing about a heavy slide beside it, unless the mass
+matrix couples them; a stiff constraint magnifies the rounding of places; weights that a joint bears leave rounding
+where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from models.own_model.builds import Equations, Moved, State, as_parsed, forward
+from models.own_model.coordinates import BALL, FREE
+from models.own_model.equalities import joins
+from models.own_model.reading import TwinModel
+
+SHARE = 1e-9
+"""Changes of numbers: far above their rounding, and small enough for the answer to change in proportion."""
+SAMPLES, SEED = 8, 27
+"""Random changes, of whose effects the root mean square is taken: by one alone, effects may cancel."""
+RELATIVE = (
+    *("body_mass", "body_inertia", "body_gravcomp", "jnt_stiffness", "dof_damping", "dof_armature"),
+    *("dof_frictionloss", "tendon_stiffness", "tendon_damping", "tendon_armature", "tendon_lengthspring", "wrap_prm"),
+    *("actuator_gainprm", "actuator_biasprm", "actuator_gear", "eq_solref", "eq_solimp", "qpos_spring"),
+)
+LENGTHS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
+DIRECTIONS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
+"""Numbers of a compiled model: changed by a share of themselves, of the reach, and unit vectors."""
+Law = Callable[[TwinModel], Equations]
+"""The file's own model as a function of coordinates and rates: with soft constraints, or with rigid ones."""
+
+
+def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Sequence[Moved]) -> list[Moved]:
+    """Changes of mass (n, n), force (n,) and acceleration (n,) at each state per share by which all numbers change.
+
+    law, moved : the file's own model, and what it does at the states.
+    """
+    draw, reach = np.random.default_rng(SEED), reach_of(twin)
+    squares = [Moved(*map(np.zeros_like, each)) for each in moved]
+    for _ in range(SAMPLES):
+        move = law(replace(twin, model=changed(twin.model, draw, reach)))
+        for square, exact, (q, v) in zip(squares, moved, states, strict=True):
+            other = move(*_changed_state(twin, draw, q, v))
+            for total, there, here in zip(square, other, exact, strict=True):
+                total += ((there - here) / SHARE) ** 2 / SAMPLES
+    by_numbers = [Moved(*map(np.sqrt, each)) for each in squares]
+    return by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _free(twin, states)))
+
+
+def _free(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
+    """What the file's own model does without its equality constraints."""
+    model = copy(twin.model)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
+    move = as_parsed(replace(twin, model=model))
+    return [move(q, v) for q, v in states]
+
+
+def _constrained(sensitive: Moved, free: Moved) -> Moved:
+    """Sensitivities with those of what constraints take away: where they stop a joint, the rounding of that is left."""
+    force, acceleration = sensitive.force + abs(free.force), sensitive.acceleration + abs(free.acceleration)
+    return sensitive._replace(force=force, acceleration=acceleration)
+
+
+def reach_of(twin: TwinModel) -> float:
+    """Largest distance (m) of a body, a centre of mass or an anchor from the world's origin in the design position."""
+    data = mujoco.MjData(twin.model)
+    forward(twin, data, np.zeros(twin.size), np.zeros(twin.size))
+    places = np.concatenate((data.xpos, data.xipos, data.xanchor, data.site_xpos))
+    return float(np.linalg.norm(places, axis=1).max())
+
+
+def changed(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> mujoco.MjModel:
+    """A copy, all of whose numbers that move something are changed at random by the share."""
+    model = copy(model)
+
+    def unit(shape: tuple[int, ...]) -> np.ndarray:
+        return SHARE * draw.uniform(-1.0, 1.0, shape)
+
+    for name in RELATIVE:
+        numbers = getattr(model, name)
+        numbers *= 1.0 + unit(numbers.shape)
+    for name in LENGTHS:
+        numbers = getattr(model, name)
+        numbers += reach * unit(numbers.shape)
+    for name in DIRECTIONS:
+        numbers = getattr(model, name)
+        numbers += unit(numbers.shape)
+        numbers /= np.linalg.norm(numbers, axis=-1, keepdims=True)
+    model.opt.gravity += np.linalg.norm(model.opt.gravity) * unit((3,))
+    for e, size in _ends(model, reach):
+        model.eq_data[e] += size * unit(size.shape)
+    model.body_sameframe[:] = model.site_sameframe[:] = 0
+    return model
+
+
+def _ends(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray]]:
+    """Every equality constraint, and the sizes (k,) of its numbers: of places between bodies, of factors elsewhere."""
+    for e in range(model.neq):
+        size = np.abs(model.eq_data[e])
+        if joins(model, e):
+            size[:6] = np.maximum(size[:6], reach)
+            size[6:10] = 1.0
+        yield e, size
+
+
+def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
+    """A state that is changed by the share: coordinates with the zero that the file counts them from."""
+    model, size = twin.model, np.abs(q)
+    for j in range(model.njnt):
+        first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL, FREE))
+        place, shifts = int(model.jnt_qposadr[j]), 3 if model.jnt_type[j] == FREE else 0 if several else 1
+        size[first : first + shifts] += np.abs(model.qpos0[place : place + shifts])
+        size[first + shifts : first + shifts + 3 * several] += 1.0
+    share = SHARE * draw.uniform(-1.0, 1.0, (2, twin.size))
+    return q + size * share[0], v * (1.0 + share[1])
