@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from docs.alike import alike
-from docs.pages import ROOT, Block, blocks, pages
+from docs.pages import ROOT, ExampleBlock, blocks, pages
 
 COLUMNS = 100
 """Width of the terminal that examples see."""
@@ -46,7 +46,7 @@ class Session:
     environment: dict[str, str]
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
 
-    def run(self, block: Block) -> str:
+    def run(self, block: ExampleBlock) -> str:
         """The output of a block; raises ExampleFailed where the block ends otherwise than its mark says."""
         return self._python(block.text) if block.language == "python" else self._console(block)
 
@@ -59,7 +59,7 @@ class Session:
                 raise ExampleFailed(f"{type(error).__name__}: {error}\nin\n{text}") from error
         return said.getvalue()
 
-    def _console(self, block: Block) -> str:
+    def _console(self, block: ExampleBlock) -> str:
         lines = commands(block.text)
         fails = [False] * (len(lines) - 1) + [block.mark == "run: fails"]
         return "".join(self._command(line, wanted) for line, wanted in zip(lines, fails, strict=True))
@@ -159,12 +159,12 @@ def answer(page: Path, check: bool) -> tuple[Path, list[str], str]:
     return page, changes, ""
 
 
-def run_pages(chosen: list[Path], check: bool, strict: bool) -> bool:
-    """Run the examples of pages, two pages at a time; prints what differs, and returns whether all is well.
+def run_pages(pages: list[Path], check: bool, strict: bool) -> bool:
+    """Run the examples of pages, two pages at a time; prints differences, and returns whether there are none.
 
     strict : an output that differs is not well.
     """
-    with_examples = [page for page in chosen if has_examples(page)]
+    with_examples = [page for page in pages if has_examples(page)]
     well = True
     with ProcessPoolExecutor(WORKERS, get_context("spawn"), max_tasks_per_child=1) as pool:
         for page, changes, failed in pool.map(partial(answer, check=check), with_examples):

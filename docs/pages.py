@@ -27,7 +27,7 @@ def pages(root: Path = ROOT) -> list[Path]:
 
 
 @dataclass(frozen=True)
-class Block:
+class ExampleBlock:
     """A fenced block of a page, or an image that examples draw.
 
     mark : text of the comment before it, "" where there is none; language : the word after the fence, "image" for an
@@ -47,7 +47,7 @@ class Block:
         return self.mark.partition(": ")[2] if self.mark.startswith(("file: ", "picture: ")) else ""
 
 
-def blocks(text: str) -> list[Block]:
+def blocks(text: str) -> list[ExampleBlock]:
     """All fenced blocks and marked images of a page, in order."""
     from markdown_it import MarkdownIt
 
@@ -59,10 +59,10 @@ def blocks(text: str) -> list[Block]:
         elif token.type == "fence" and token.map:
             first, last = token.map
             blocks_of_page.append(
-                Block(mark, token.info.strip(), "".join(lines[first + 1 : last - 1]), first + 1, last - 1)
+                ExampleBlock(mark, token.info.strip(), "".join(lines[first + 1 : last - 1]), first + 1, last - 1)
             )
             mark = ""
         elif token.type == "inline" and mark.startswith("picture: ") and token.map:
-            blocks_of_page += [Block(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
+            blocks_of_page += [ExampleBlock(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
             mark = ""
     return blocks_of_page

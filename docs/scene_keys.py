@@ -164,7 +164,7 @@ def _toml(value: Any) -> str:
 
 
 def _summary(model: type[BaseModel]) -> str:
-    """First sentence of what a table is."""
+    """First sentence of a table's docstring."""
     return (getdoc(model) or "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
 
 

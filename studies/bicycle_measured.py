@@ -24,7 +24,7 @@ FEEDBACK = Control(gain=2.0, until=6.5)
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class BicycleObservations:
     """Observations of all speeds; the choice on some of them; predictions by it of the speeds that took no part, and of
     each speed by a choice on all others, where none was asked to stand aside: (mean (2,), deviations (2,)) by speed."""
 
@@ -35,7 +35,7 @@ class Measured:
 
 def measured(
     folder: str | Path, choose: Sequence[float] = (), bicycle: Whipple | None = None, base: Control = FEEDBACK
-) -> Measured:
+) -> BicycleObservations:
     """Choose suspects on the speeds ``choose`` (m/s), all if there are none, and predict the others; InputError."""
     seen, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in seen]
@@ -53,10 +53,10 @@ def measured(
             by = chosen(bicycle, base, [o for o in seen if o is not observation])
         mean, _ = forecast(bicycle, base, by, observation)
         predictions[observation.speed] = mean, deviations(bicycle, base, by, observation)
-    return Measured(seen, choice, predictions)
+    return BicycleObservations(seen, choice, predictions)
 
 
-def lines(answer: Measured, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
+def lines(answer: BicycleObservations, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
     """The answer as text."""
     told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
     for seen in answer.seen:

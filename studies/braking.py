@@ -80,18 +80,20 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
     return {"scene": scene.title, "folder": str(folder), **told}
 
 
-def rim_speed_differences(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:
+def rim_speed_differences(
+    measured_pressures: MeasuredPressures | None, stop: Stop, rims: np.ndarray
+) -> dict[str, np.ndarray]:
     """Differences by which the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
-    if measured is None or measured.speeds is None:
+    if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured.rms(stop.times, rims)}
+    return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rims)}
 
 
-def measurement_end_line(measured: MeasuredPressures | None, stop: Stop) -> list[str]:
+def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
     """A line if the run lasts longer than its measured pressures."""
-    if measured is None or measured.times[-1] > stop.times[-2]:
+    if measured_pressures is None or measured_pressures.times[-1] > stop.times[-2]:
         return []
-    return [f"    measured pressures end at {measured.times[-1]:.3f} s: from then on the last ones stay"]
+    return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
 def compared(results: dict[str, Result]) -> list[str]:

@@ -113,7 +113,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
     """The scene with another friction and steer angle; RunFailed where the fit leaves what is possible."""
     if not (0.05 < scale < 2.0 and steer < 1.0):
-        raise RunFailed("calibration", f"the fit goes astray: friction times {scale:.3g}, steer angle {steer:.3g} rad")
+        raise RunFailed("calibration", f"the fit diverges: friction times {scale:.3g}, steer angle {steer:.3g} rad")
     procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
     tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: scale}})
     return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})

@@ -129,7 +129,8 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
 
 
 def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
-    """A stop per line, or along the axis of the result, which says what all of them say of themselves."""
+    """Save the stops: a line of a table each, and a result with an axis of stops and the assumptions that any of them
+    broke."""
     heads = [*SHOWN_QUANTITIES, LOCKED] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
     columns = {head: np.array([stop[head] for stop in stops]) for head in heads}

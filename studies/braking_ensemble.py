@@ -13,7 +13,7 @@ from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results, gathered
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew, places_of
 from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference

@@ -38,7 +38,7 @@ OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 
 
 def stop_figure(
-    scene: BrakingScene, name: str, results: Results, file: File, measured: MeasuredPressures | None = None
+    scene: BrakingScene, name: str, results: Results, file: File, measured_pressures: MeasuredPressures | None = None
 ) -> File:
     """Panels of the first result: speeds, slips, pressures, torques, the path; motion to the side where there is any,
     and of a vehicle on its suspension also its body's lean, and loads."""
@@ -47,7 +47,7 @@ def stop_figure(
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
     figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(COLUMN_WIDTH, 2.3 * (len(rows) + 1) + 0.4))
-    _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured)
+    _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured_pressures)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
     _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
@@ -99,12 +99,14 @@ def _moves_aside(stop: Stop) -> bool:
     return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
 
 
-def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
+def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
     for i, (name, values) in enumerate(zip(wheel_names(rims.shape[1]), rims.T, strict=True)):
         axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=name)
-    if measured is not None and measured.speeds is not None:
-        for i, values in enumerate(measured.speeds.T):
-            axis.plot(measured.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None)
+    if measured_pressures is not None and measured_pressures.speeds is not None:
+        for i, values in enumerate(measured_pressures.speeds.T):
+            axis.plot(
+                measured_pressures.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None
+            )
     axis.plot(stop.times, stop.speed, color=DARK, lw=1.6, label="vehicle")
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
 

@@ -35,7 +35,7 @@ class Options(Strict):
 
 
 @dataclass(frozen=True)
-class Alone:
+class SingleEffect:
     """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot be; what it saves: work
     of the scene with longer steps alone, divided by that of what is left at the longest step that is then allowed."""
 
@@ -52,7 +52,7 @@ class SceneChoice:
     scene: Any
     engine: str
     choice: Choice
-    alone: list[Alone]
+    alone: list[SingleEffect]
     further: dict[str, float]
     watts: dict[str, float]
     results: list[Result] = field(default_factory=list)
@@ -115,9 +115,9 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
     }
 
 
-def _pass_progress(progress: Progress, title: str, completed: int, of: int, share: float) -> None:
+def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
     """Pass on what is spent of a scene's search, after some of so many scenes."""
-    progress(title, (completed + share) / of)
+    progress(title, (completed + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -161,7 +161,7 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
         choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
-        Alone(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))
+        SingleEffect(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))
         for effect in chooser.effects
     ]
     return SceneChoice(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
@@ -179,7 +179,7 @@ def _linear(scene: Any) -> SceneChoice:
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
         alone = [
-            Alone(effect.name, abs(chooser.predicted(each)), calls / chooser.cost(each).calls)
+            SingleEffect(effect.name, abs(chooser.predicted(each)), calls / chooser.cost(each).calls)
             for effect, each in singles.items()
         ]
         further = {effect.name: change for effect, change in chooser.further(frozenset(linear.left_out)).items()}
@@ -375,7 +375,7 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_and_whether_gone(choice_of: SceneChoice, effect: Alone) -> str:
+def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> str:
     """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
     return effect.effect.replace("_", " ") + (
         " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.accuracy import Error
-from models.contact.theories import Contact, ExactOnEllipse, Fastsim, OnEllipse
+from models.contact.theories import ExactOnEllipse, Fastsim, OnEllipse, RollingContact
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
@@ -152,7 +152,7 @@ def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
 SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
-def _pressure(body: Contact) -> str:
+def _pressure(body: RollingContact) -> str:
     """Text that names the pressure distribution of the cells."""
     if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
         return f"FASTSIM's pressure ({body.choices['bound']} bound)"

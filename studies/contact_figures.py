@@ -40,7 +40,7 @@ ARROWS = 17
 def contact_figure(
     patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
 ) -> None:
-    """Pressure (a word or two tell of which kind) over the contact area beside its tractions, all patches to scale.
+    """Figure of pressure (its kind in the title) and tractions over the contact area, all patches to scale.
 
     forces : the result whose last motion is shown.
     """
@@ -201,10 +201,10 @@ def price_figure(price: Result, title: str) -> Figure:
     return figure
 
 
-def _priced(axis: Any, name: str, line: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
+def _priced(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
     """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
     colour, marker = STYLES[name]
-    mean, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))
+    mean, most = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
     axis.plot(along, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if bar:

@@ -25,7 +25,7 @@ from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
 from models.ensemble.runner import BLOCK, Blocks, each_block, run_paths
-from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright
 from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
@@ -128,10 +128,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _channels(
-    times: np.ndarray, statistics: PathStatistics, saved: int
+    times: np.ndarray, statistics: PathStatistics, saved_paths: int
 ) -> tuple[dict[str, Channel], dict[str, Channel]]:
     """The first paths and the statistics of all, with their axes."""
-    paths = {name: values[:saved] for name, values in statistics.first.items()}
+    paths = {name: values[:saved_paths] for name, values in statistics.first.items()}
     units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
     channels = {
         "states": Channel(("path", "time", "state"), paths["states"], units),
@@ -157,11 +157,11 @@ def _channels(
 
 
 def _with_errors(
-    saved: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
+    result: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
     """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
     error = json.loads(first.data.attrs["error"])
-    saved.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
+    result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
         name: by_chance(row[f"{name} error"], row[name], unit, options.paths)
         for name, unit in (("pitch", "rad"), ("heave", "m"))
@@ -169,7 +169,7 @@ def _with_errors(
     }
     assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(statistics))]
     return of_chance(
-        with_assumptions(saved, assumed),
+        with_assumptions(result, assumed),
         {f"deviation of {name}": breach for name, breach in worst.items()},
         options.paths,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from models.core.result import Result
 from models.core.tables import write_table
 from models.machine.seconds import cost
-from models.rail.contact_table import Placed
+from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail import run as system
 from models.systems.wheel_rail.plan import case_text
 from models.systems.wheel_rail.run import PATCH, POSITION, WHEELS, patches, position_quantities
@@ -129,8 +129,9 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     save(drawn, path)
 
 
-def _table(placed: list[Placed]) -> list[str]:
-    """A line for each patch, positions with several patches on a wheel, and the first on a flange."""
+def _table(placed: list[WheelsetPlacement]) -> list[str]:
+    """Table with a line per contact patch, the positions at which a wheel has several patches, and the first flange
+    contact."""
     heads = (
         f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"

@@ -54,7 +54,7 @@ SENSORS = "effects.accelerometers.sensors"
 
 
 class Options(Strict):
-    """[options] of this study."""
+    """Keys of the table [options] for this study."""
 
     file: str | None = Field(None, description="CSV of measured readings: time [s], ax1 [m/s^2], ay1, az1, ax2, ...")
     zeroed: bool = Field(False, description="true for readings set to zero at rest on level ground (eq. 17)")
@@ -64,7 +64,8 @@ class Options(Strict):
 
 @dataclass
 class Source:
-    """Readings (n, sensors, 3) every ``period`` (s) of one engine or file, the truth and a gyro where there are any."""
+    """Accelerometer readings (n, sensors, 3) of an engine or a file, ``period`` (s) apart, with the true motion and a
+    gyro if there are any."""
 
     name: str
     readings: np.ndarray
@@ -77,7 +78,7 @@ class Source:
 
     @property
     def start(self) -> Start:
-        """Where the record begins: as the run did, or at rest and level."""
+        """Initial attitude and velocity of the recovered motion: those of the run, or at rest and level."""
         first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
         return Start.pitched(*first) if self.truth else Start()
 
@@ -327,7 +328,7 @@ def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: s
 
 
 def _errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
-    """The largest error of each way up to every time, on a logarithmic scale: curves that can be told apart."""
+    """Draw the largest error of each method up to every time, on a logarithmic scale."""
     for way, error in errors.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
     axis.set_title(title)

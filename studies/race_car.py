@@ -160,11 +160,11 @@ def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
     return build(table, scene.file, Path(scene.folder))
 
 
-def figures(chosen: Identified) -> dict[str, Any]:
+def figures(identified: Identified) -> dict[str, Any]:
     """Per channel: rms error by the rms, share of what was measured inside the bands, their half-width by the error."""
-    sizes = np.array([channel.size for channel in chosen.known.fit.problem.channels])
-    crossed = np.sqrt(np.mean(chosen.crossed**2, axis=1)) / sizes
-    inside, width, relative = chosen.bands.inside(), chosen.bands.width(), chosen.bands.relative()
+    sizes = np.array([channel.size for channel in identified.known.fit.problem.channels])
+    crossed = np.sqrt(np.mean(identified.crossed**2, axis=1)) / sizes
+    inside, width, relative = identified.bands.inside(), identified.bands.width(), identified.bands.relative()
     return {
         name: {
             "error": float(relative[k]),
@@ -176,23 +176,23 @@ def figures(chosen: Identified) -> dict[str, Any]:
     }
 
 
-def _told(chosen: Identified, others: dict[str, Identified]) -> list[str]:
+def _told(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
     for name, each in figures(chosen).items():
         table.append(
             f"  {name:<26}{each['error']:>9.1%}{AIMS[name]:>8.0%}{each['inside']:>13.1%}"
             f"{each['half-width by error']:>12.2f}{each['error between parts']:>9.1%}"
         )
-    for name, each in others.items():
+    for name, each in identified.items():
         errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMS, each.bands.relative(), strict=True))
         table.append(f"  {name}: {errors}")
     return table
 
 
-def residual_correlations(chosen: Identified) -> dict[str, dict[str, float]]:
+def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
     """Per channel: correlation of the residual's magnitude, and of itself, with what the car does."""
-    problem = chosen.known.fit.problem
-    model = problem.model.result(chosen.known.fit.values)  # type: ignore[attr-defined]
+    problem = identified.known.fit.problem
+    model = problem.model.result(identified.known.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
     speed = np.interp(clock, model.times, model.detail.speed)
@@ -207,7 +207,7 @@ def residual_correlations(chosen: Identified) -> dict[str, dict[str, float]]:
     }
     return {
         name: {cause: float(np.corrcoef(of(row), values)[0, 1]) for cause, (of, values) in causes.items()}
-        for name, row in zip(AIMS, chosen.crossed, strict=True)
+        for name, row in zip(AIMS, identified.crossed, strict=True)
     }
 
 

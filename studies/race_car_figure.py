@@ -14,7 +14,7 @@ SECONDS = 60.0
 """s of the prediction that are shown."""
 
 
-def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path: Path) -> Path:
+def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
     """Channels over time with bands, and below the errors of all vehicles."""
     problem = chosen.bands.problem
     times = problem.clock.times
@@ -32,7 +32,7 @@ def draw(chosen: "Identified", others: dict[str, "Identified"], title: str, path
         unit = channel.unit.replace("^2", "²")
         axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
-    vehicles = {"chosen": chosen, **others}
+    vehicles = {"chosen": chosen, **identified}
     for i, (name, each) in enumerate(vehicles.items()):
         at = np.arange(len(names)) + 0.25 * i
         axes[-1].bar(at, 100.0 * each.bands.relative(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)

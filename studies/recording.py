@@ -26,7 +26,7 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: Any) -> dict[str, Any]:
-    """Do all of it; the page is written even where errors in the recording stop the run."""
+    """Check, run and judge the recording; the page is written even where errors in the recording stop the run."""
     from studies.recording_page import write
 
     result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
@@ -48,37 +48,40 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _failed(exam: Examination) -> dict[str, str]:
+def _failed(examination: Examination) -> dict[str, str]:
     """Reasons why the command ends with code 1: errors in the recording, or a failed run of what was to be handed
     on."""
-    if exam.stopped:
-        count = sum(finding.weight == "error" for finding in exam.findings)
+    if examination.stopped:
+        count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
-    return {name: text for name, text in exam.failed.items() if name == exam.scene.stabilise.method}
+    return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}
 
 
-def _sizes(exam: Examination) -> dict[str, Any]:
+def _sizes(examination: Examination) -> dict[str, Any]:
     """Largest magnitude and rms of what is handed on: what a sweep draws."""
     sizes = dict[str, Any]()
-    for answer, counted in exam.counted.items():
-        assert exam.outcome is not None
+    for answer, counted in examination.counted.items():
+        assert examination.outcome is not None
         largest = float(np.abs([counted.least, counted.greatest]).max())
-        sizes[answer.name] = {"unit": answer.unit, "max": largest, "rms": rms(exam.outcome.samples(answer))}
+        sizes[answer.name] = {"unit": answer.unit, "max": largest, "rms": rms(examination.outcome.samples(answer))}
     return sizes
 
 
-def _lines_of_findings(exam: Examination) -> list[str]:
+def _lines_of_findings(examination: Examination) -> list[str]:
     """Lines for the terminal: findings that matter, and how the runs ended."""
-    lines = [f"  {finding.weight}: {finding.text}" for finding in gathered(exam.findings) if finding.weight != "note"]
-    notes = sum(finding.weight == "note" for finding in exam.findings)
+    lines = [
+        f"  {finding.weight}: {finding.text}" for finding in gathered(examination.findings) if finding.weight != "note"
+    ]
+    notes = sum(finding.weight == "note" for finding in examination.findings)
     lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")
-    lines += [f"  {what} of the free run: {trust}" for what, trust in exam.trust]
-    for name, outcome in exam.runs.items():
-        end = exam.failed.get(name, "to the end")
+    lines += [f"  {what} of the free run: {trust}" for what, trust in examination.trust]
+    for name, outcome in examination.runs.items():
+        end = examination.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
-    lines += [f"  effect of {text}" for text in consequence_texts(exam.consequences)]
+    lines += [f"  effect of {text}" for text in consequence_texts(examination.consequences)]
     lines += [
-        f"  verdict on the {name} run: {verdict.word} ({verdict.reason})" for name, verdict in exam.verdicts.items()
+        f"  verdict on the {name} run: {verdict.word} ({verdict.reason})"
+        for name, verdict in examination.verdicts.items()
     ]
     return lines
 

@@ -27,8 +27,8 @@ from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNITS, Signal
 from models.systems.measured.holds import FREE
 from models.systems.measured.run import Examination
-from models.systems.measured.section_run import Outcome
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import SectionOutcome
+from models.systems.measured.sections import SectionChannel
 from models.systems.measured.verdict import Compared, overlay
 from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
@@ -213,58 +213,58 @@ def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
     return drawn, panels
 
 
-def inputs_figure(exam: Examination, path: Path) -> Path:
+def inputs_figure(examination: Examination, path: Path) -> Path:
     """Forces at all hubs along each axis."""
-    recording, axes = exam.recording, [a for a in "zxy" if exam.recording.find("force", component=a)]
+    recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
-        for i, hub in enumerate(exam.rig.hubs):
+        for i, hub in enumerate(examination.rig.hubs):
             for signal in (s for s in recording.find("force", hub, axis) if not s.check):
                 panel.plot(
                     *thinned(times, recording.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7
                 )
         panel.set_title(f"Force on the hub along {axis} [kN]")
-    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(exam.rig.hubs))
+    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(examination.rig.hubs))
     return save(drawn, path)
 
 
-def drift_figure(exam: Examination, path: Path) -> Path:
+def drift_figure(examination: Examination, path: Path) -> Path:
     """Roll and pitch of every run, beside what was measured and, of a virtual measurement, the truth."""
-    angles = exam.rig.angles
+    angles = examination.rig.angles
     drawn, panels = _timed(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
     for panel, angle in zip(panels[:, 0], angles, strict=True):
-        curves = _angles(exam, angle)
+        curves = _angles(examination, angle)
         for name, (times, values) in curves.items():
             label, colour = RUNS[name]
             panel.plot(*thinned(times, np.degrees(values)), color=colour, label=label, lw=1.0)
-        if exam.drift is not None and exam.chosen != FREE and exam.chosen in curves:
-            about = np.interp(exam.drift.times, *curves[exam.chosen])
-            spread = exam.drift.deviations[:, ("roll", "pitch").index(angle)]
+        if examination.drift is not None and examination.chosen != FREE and examination.chosen in curves:
+            about = np.interp(examination.drift.times, *curves[examination.chosen])
+            spread = examination.drift.deviations[:, ("roll", "pitch").index(angle)]
             label = "free run as predicted, 1 standard deviation"
             bounds = np.degrees(about - spread), np.degrees(about + spread)
-            panel.fill_between(exam.drift.times, *bounds, color=LOUD, alpha=0.15, lw=0, label=label)
-        panel.set_title(f"{angle} of the {exam.rig.chassis} [degrees]")
+            panel.fill_between(examination.drift.times, *bounds, color=LOUD, alpha=0.15, lw=0, label=label)
+        panel.set_title(f"{angle} of the {examination.rig.chassis} [degrees]")
         low, high = panel.get_ylim()
         panel.set_ylim(max(-30.0, low), min(30.0, high))  # a run that topples must not squeeze all else to a line
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     return save(drawn, path)
 
 
-def _angles(exam: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times (s) and values (rad) of an angle as measured, in every run, and in truth."""
-    recording, chassis = exam.recording, exam.rig.chassis
+    recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
     for signal in recording.find("angle", chassis, angle)[:1]:
         curves["measured"] = recording.period * np.arange(recording.count), recording.samples(signal)
-    for name, run in exam.runs.items():
+    for name, run in examination.runs.items():
         curves[name] = run.period * np.arange(run.done), run.samples(f"{chassis} {angle}")
-    if exam.virtual is not None:
-        curves["truth"] = exam.virtual.run.times, exam.virtual.run.states[:, ANGLES[angle]]
+    if examination.virtual is not None:
+        curves["truth"] = examination.virtual.run.times, examination.virtual.run.states[:, ANGLES[angle]]
     return curves
 
 
-def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str = "") -> Path:
+def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
     """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
     times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
     drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
@@ -280,7 +280,7 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
     return save(drawn, path)
 
 
-def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
+def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
     """Level crossings and range pairs of some loads."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
@@ -298,15 +298,15 @@ def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     return save(drawn, path)
 
 
-def overlay_figure(exam: Examination, run: Outcome, compared: Sequence[Compared], path: Path) -> Path:
+def overlay_figure(examination: Examination, run: SectionOutcome, compared: Sequence[Compared], path: Path) -> Path:
     """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
     drawn, panels = _timed(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
     for (left, right), each in zip(panels, compared, strict=True):
-        times, measured, computed = overlay(exam.recording, run, each.signal, each.answer)
+        times, measured, computed = overlay(examination.recording, run, each.signal, each.answer)
         near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
         for values, colour, width, label in (
             (measured, PALE, 2.6, "measured"),
-            (computed, RUNS[exam.chosen][1], 0.8, "computed"),
+            (computed, RUNS[examination.chosen][1], 0.8, "computed"),
         ):
             left.plot(*thinned(times, values), color=colour, lw=width, label=label)
             right.plot(times[near], values[near], color=colour, lw=width)

@@ -18,7 +18,7 @@ from models.fatigue.damage import SLOPE
 from models.systems.measured.consequences import DAMAGE, FORCE
 from models.systems.measured.holds import FREE
 from models.systems.measured.run import Examination
-from models.systems.measured.section_run import Outcome
+from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import DISAGREES, errors
 from studies import recording_figures as draw
 
@@ -30,73 +30,81 @@ DRAWN = 6
 """Section forces drawn at the most; all of them are in the table and in the files."""
 
 
-def write(exam: Examination, path: Path, result: Result) -> Path:
+def write(examination: Examination, path: Path, result: Result) -> Path:
     """Write the page of a result, whole or not at all; returns its path."""
     with TemporaryDirectory() as folder:
-        text = page(exam, Path(folder), result)
+        text = page(examination, Path(folder), result)
     write_whole(path, text)
     return path
 
 
-def page(exam: Examination, folder: Path, result: Result) -> str:
-    """The page as text, with what the result says of its error and assumptions; figures pass through ``folder``."""
+def page(examination: Examination, folder: Path, result: Result) -> str:
+    """HTML text of the page, with the result's stated error and assumptions; figures are drawn into ``folder`` and
+    embedded."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"as": format, "png": lambda path: base64.b64encode(path.read_bytes()).decode()}
-    library = exam.engine if exam.engine != "reference" else "numpy"
+    library = examination.engine if examination.engine != "reference" else "numpy"
     return environment.get_template(TEMPLATE).render(
-        exam=exam,
+        exam=examination,
         names=NAMES,
         errors=error_lines(result),
         breaches=[breach.line() for breach in broken_of(result)],
         assumed=assumed_of(result),
         free=FREE,
-        weights=[finding.weight for finding in exam.findings],
-        used=[(signal, exam.put_in(signal)) for signal in exam.recording.signals],
-        effects={finding: f" {each}." for each in exam.consequences if each.section for finding in [each.finding]},
-        figures=_figures(exam, folder),
+        weights=[finding.weight for finding in examination.findings],
+        used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],
+        effects={
+            finding: f" {each}." for each in examination.consequences if each.section for finding in [each.finding]
+        },
+        figures=_figures(examination, folder),
         limits={"disagrees": DISAGREES, "force": FORCE, "damage": DAMAGE},
-        forces=_forces(exam, exam.outcome, folder) if exam.outcome is not None else None,
-        sizes=[math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf for each in exam.compared],
-        files=[(source, exam.scene.path(source.file, f"files.{i}.file")) for i, source in enumerate(exam.scene.files)],
+        forces=_forces(examination, examination.outcome, folder) if examination.outcome is not None else None,
+        sizes=[math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf for each in examination.compared],
+        files=[
+            (source, examination.scene.path(source.file, f"files.{i}.file"))
+            for i, source in enumerate(examination.scene.files)
+        ],
         command=" ".join(sys.argv),
         versions={name: version(name) for name in dict.fromkeys(("twinrig", library, "numpy", "scipy"))},
         python=platform.python_version(),
-        scene=(Path(exam.scene.folder) / exam.scene.file).read_text(encoding="utf-8-sig"),
+        scene=(Path(examination.scene.folder) / examination.scene.file).read_text(encoding="utf-8-sig"),
     )
 
 
-def _figures(exam: Examination, folder: Path) -> dict[str, Any]:
+def _figures(examination: Examination, folder: Path) -> dict[str, Any]:
     """Paths of the figures: of every finding that says more than a note and can be drawn, of what drives, of the runs,
     and of the channels that were not put in."""
-    figures: dict[str, Any] = {"inputs": draw.inputs_figure(exam, folder / "inputs.png")}
+    figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
     figures["findings"] = [
-        (finding, draw.figure(finding, exam.evidence, folder / f"finding_{i}.png"))
-        for i, finding in enumerate(exam.findings)
+        (finding, draw.figure(finding, examination.evidence, folder / f"finding_{i}.png"))
+        for i, finding in enumerate(examination.findings)
         if finding.weight != "note"
     ]
-    if exam.runs:
-        figures["drift"] = draw.drift_figure(exam, folder / "drift.png")
-    if exam.outcome is not None and exam.compared:
-        shown = [each for each in exam.compared if each.signal.check] or exam.compared
-        figures["checks"] = draw.overlay_figure(exam, exam.outcome, shown[:DRAWN], folder / "checks.png")
+    if examination.runs:
+        figures["drift"] = draw.drift_figure(examination, folder / "drift.png")
+    if examination.outcome is not None and examination.compared:
+        shown = [each for each in examination.compared if each.signal.check] or examination.compared
+        figures["checks"] = draw.overlay_figure(examination, examination.outcome, shown[:DRAWN], folder / "checks.png")
     return figures
 
 
-def _forces(exam: Examination, outcome: Outcome, folder: Path) -> dict[str, Any]:
+def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
     """The page's section on section forces: those that change, how many do not, and figures of the first ones."""
     moving = {
-        answer: counts for answer, counts in exam.counted.items() if counts.greatest - counts.least > NEGLIGIBLE_CHANGE
+        answer: counts
+        for answer, counts in examination.counted.items()
+        if counts.greatest - counts.least > NEGLIGIBLE_CHANGE
     }
-    first, inside = list(moving)[:DRAWN], set(exam.rig.places.connectors)
+    first, inside = list(moving)[:DRAWN], set(examination.rig.places.connectors)
     return {
         "slope": SLOPE,
-        "true": errors(outcome, exam.virtual, SLOPE).damage if exam.virtual is not None else {},
+        "true": errors(outcome, examination.virtual, SLOPE).damage if examination.virtual is not None else {},
         "moving": moving,
-        "still": len(exam.counted) - len(moving),
+        "still": len(examination.counted) - len(moving),
         "first": len(first),
         "parts": [
             {a: counts for a, counts in moving.items() if (a.section in inside) is part} for part in (True, False)
         ],
-        "forces": draw.forces_figure(outcome, first, folder / "forces.png", exam.chosen),
+        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen),
         "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),
     }

@@ -213,18 +213,19 @@ def _change(other: float, value: float) -> str:
     )
 
 
-def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free: float | None) -> list[str]:
+def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
     """Lines on how often each travel passes the free travel (m), and on its rate where the vehicle file asks for its
     rate."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []
     for output in parts:
-        if output.kind == "travel" and free is not None:
+        if output.kind == "travel" and free_travel is not None:
             deviation = deviations[output.name]
-            text = f"  {output.name}: beyond {1e3 * free:g} mm for {share_beyond(deviation, free):.3g} of the time"
+            share = share_beyond(deviation, free_travel)
+            text = f"  {output.name}: beyond {1e3 * free_travel:g} mm for {share:.3g} of the time"
             if output.part in rates:
-                text += f", {3600 * exceedances(deviation, rates[output.part], free):.3g} times an hour"
+                text += f", {3600 * exceedances(deviation, rates[output.part], free_travel):.3g} times an hour"
             lines.append(text)
     return lines
 

@@ -37,7 +37,7 @@ class Options(Samples):
 
 
 @dataclass(frozen=True)
-class Alone:
+class EffectAlone:
     """One effect left out alone: predicted and confirmed changes (quantities,); why it may not, else empty."""
 
     effect: Effect
@@ -91,7 +91,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
-    """Deviations of the scene and of what a choice leaves of it, with their errors and what they take for granted."""
+    """Standard deviations of the full and the reduced scene, with their errors and assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced.vehicle, limits=reduced.limits)
     if reduced != ReducedScene.complete(scene):
@@ -99,9 +99,9 @@ def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     return results
 
 
-def _effect_alone(chooser: Chooser, effect: Effect) -> Alone:
+def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
     single = frozenset([effect])
-    return Alone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
+    return EffectAlone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
 
 
 def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
@@ -132,7 +132,7 @@ def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) 
 
 def _save(
     scene: RideScene,
-    alone: list[Alone],
+    single_effects: list[EffectAlone],
     choice: RideChoice,
     watts: dict[str, float],
     runs: tuple[dict[str, Result], dict[str, int]],
@@ -143,12 +143,12 @@ def _save(
     import pandas as pd
 
     results, counts = runs
-    told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in alone]}
+    told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in single_effects]}
     changes = {
-        part: np.array([getattr(each, part) for each in alone]).reshape(-1, len(scene.quantities))
+        part: np.array([getattr(each, part) for each in single_effects]).reshape(-1, len(scene.quantities))
         for part in ("predicted", "confirmed")
     }
-    effects, why = [each.effect.name for each in alone], [each.illegal for each in alone]
+    effects, why = [each.effect.name for each in single_effects], [each.illegal for each in single_effects]
     channels = {part: Channel(("effect", "quantity"), values, "1") for part, values in changes.items()}
     channels |= {"left_out": Channel("effect", told["left out"]), "not_alone_because": Channel("effect", why)}
     axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
@@ -173,7 +173,7 @@ def _save(
 
 def choice_figure(
     scene: RideScene,
-    alone: list[Alone],
+    single_effects: list[EffectAlone],
     choice: RideChoice,
     watts: dict[str, float],
     results: dict[str, Result],
@@ -182,14 +182,14 @@ def choice_figure(
     """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, save, subplots
 
-    names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
+    names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in single_effects]
     heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS
     figure, (above, below) = subplots(2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights)
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
         for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
-            changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*alone, choice)]))
+            changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*single_effects, choice)]))
             shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST), LOWEST, HIGHEST)
             above.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
     above.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
@@ -226,7 +226,9 @@ def percent(value: float) -> str:
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
-def _table(scene: RideScene, choice: RideChoice, alone: list[Alone], further: dict[Effect, float]) -> list[str]:
+def _table(
+    scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], further: dict[Effect, float]
+) -> list[str]:
     """The choice in words."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
@@ -244,7 +246,7 @@ def _table(scene: RideScene, choice: RideChoice, alone: list[Alone], further: di
     lines += [
         f"    {single.effect.name}: {', '.join(map(percent, single.confirmed))}"
         + (f" ({single.illegal})" if single.illegal else "")
-        for single in alone
+        for single in single_effects
     ]
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"

@@ -143,7 +143,7 @@ def _costs(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, lis
 
 
 def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path) -> None:
-    """A row per output, a column per model and road, relative; empty where a model has no such output."""
+    """Save relative errors: a row per output, a column per model and road; empty where a model lacks the output."""
     heads = [f"{model}, {road}" for model, road in errors]
     saved = result(
         scene,
@@ -156,9 +156,9 @@ def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[s
     write_whole(folder / "errors.csv", table.to_csv())
 
 
-def _table(errors: Errors, costs: dict[str, list[float]], full: SpatialVehicle) -> list[str]:
+def _table(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
     """The largest error of each model and road, by kind of output."""
-    kinds = np.array([output.kind for output in full.outputs])
+    kinds = np.array([output.kind for output in full_vehicle.outputs])
     shown = list(dict.fromkeys(kinds.tolist()))
     width = max(len(f"{model}, {road}") for model, road in errors) + 2
     lines = [

@@ -68,8 +68,8 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer(drive: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
-    gaps = quasi_stationary_gaps(drive, alone)
+def _answer(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
+    gaps = quasi_stationary_gaps(drive, quasi_stationary)
     finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
     return {
@@ -78,12 +78,12 @@ def _answer(drive: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _table(drive: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str]:
+def _table(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
     """Largest deviation of each output, and where taking each speed by itself is most wrong."""
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]
     width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]
-    gaps = quasi_stationary_gaps(drive, alone)
+    gaps = quasi_stationary_gaps(drive, quasi_stationary)
     for i, name in enumerate(heads):
         deviation = drive.deviation[:, i]
         if not np.isfinite(deviation).all():

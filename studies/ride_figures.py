@@ -52,7 +52,7 @@ class Heading(NamedTuple):
 
 
 def along_figure(
-    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, above: Heading, path: Path
+    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, heading: Heading, path: Path
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
@@ -69,7 +69,7 @@ def along_figure(
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
         _say_where_none(axis)
     legend_below(figure, left, columns=2)
-    _save(figure, above, ": which correlations of the road matter where", path)
+    _save(figure, heading, ": which correlations of the road matter where", path)
 
 
 def _middle_acceleration(vehicle: SpatialVehicle) -> str:
@@ -85,7 +85,7 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    swept: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], above: Heading, path: Path
+    swept: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
 ) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
     groups = list(dict.fromkeys(kinds))
@@ -104,7 +104,7 @@ def outputs_figure(
         axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
         _say_where_none(axis)
         _name_below(axis)
-    _save(figure, above, ": standard deviations over speed", path)
+    _save(figure, heading, ": standard deviations over speed", path)
 
 
 def _say_where_none(axis: Axes) -> None:
@@ -142,7 +142,7 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, above: Heading, path: Path) -> None:
+def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
     densities = one_sided(linear, excitation, speed, frequency)
@@ -160,10 +160,10 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
         _name_below(axis)
-    _save(figure, above, f": spectra at {speed:g} m/s", path)
+    _save(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
-def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: Heading, path: Path) -> None:
+def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
     """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
@@ -180,14 +180,14 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: 
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
     legend_below(figure, left, right, columns=3)
-    _save(figure, above, ": the road", path)
+    _save(figure, heading, ": the road", path)
 
 
 def detail_figure(
     errors: Mapping[tuple[str, str], np.ndarray],
     names: Sequence[str],
     cost: Mapping[str, float],
-    above: Heading,
+    heading: Heading,
     path: Path,
 ) -> None:
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
@@ -213,7 +213,7 @@ def detail_figure(
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
     what = "largest error of each standard deviation [%], and the time of one covariance"
-    _save(figure, above, f"\n{what.capitalize()}", path)
+    _save(figure, heading, f"\n{what.capitalize()}", path)
 
 
 def _signed(percent: float) -> str:
@@ -223,10 +223,10 @@ def _signed(percent: float) -> str:
 
 def drive_figure(
     varied: VaryingSpeed,
-    alone: np.ndarray,
+    quasi_stationary: np.ndarray,
     drawn_outputs: Sequence[str],
     kinds: Mapping[str, tuple[str, str]],
-    above: Heading,
+    heading: Heading,
     path: Path,
 ) -> None:
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
@@ -237,7 +237,7 @@ def drive_figure(
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         columns = {name: varied.names.index(name) for name in drawn_outputs if kinds[name] == (kind, unit)}
-        pairs = {name: np.concatenate([varied.deviation[:, i], alone[:, i]]) for name, i in columns.items()}
+        pairs = {name: np.concatenate([varied.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()}
         for label, both in _distinct(pairs).items():
             exact, quasi = np.split(both, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
@@ -249,14 +249,14 @@ def drive_figure(
         _name_below(axis, 0.03)
     axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    _save(figure, above, "\nSolid: exact; dashed: each speed taken by itself", path)
+    _save(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST_OUTPUTS = 12
 """Outputs that a figure shows."""
 
 
-def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
+def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
     """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
     outputs = answer.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
@@ -285,11 +285,11 @@ def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
     legend_below(figure, *axes, columns=2)
-    _save(figure, above, "\nStandard deviations over speed", path)
+    _save(figure, heading, "\nStandard deviations over speed", path)
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, above: Heading, path: Path
+    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
 ) -> None:
     """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
@@ -307,7 +307,7 @@ def engine_spectra_figure(
         unit = f"one-sided density [{_squared(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
-    _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
+    _save(figure, heading, f"\nSpectra at {speed:g} m/s", path)
 
 
 def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
@@ -322,6 +322,6 @@ def _name_below(axis: Axes, drop: float = 0.18) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 
-def _save(figure: Figure, above: Heading, text: str, path: Path) -> None:
-    heading(figure, above.title + text, above.results)
+def _save(figure: Figure, plot_heading: Heading, text: str, path: Path) -> None:
+    heading(figure, plot_heading.title + text, plot_heading.results)
     save(figure, path)

@@ -58,19 +58,21 @@ def agreement(results: dict[str, Result]) -> dict[str, float]:
     return {f"{a} - {b}": difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
-def difference(first: Result, other: Result) -> float:
+def difference(first: Result, other_result: Result) -> float:
     """Largest difference of any state; where the rows lie elsewhere, the denser run is read by a cubic spline."""
-    if same_times(first, other):
-        return float(np.abs(first.states - other.states).max())
+    if same_times(first, other_result):
+        return float(np.abs(first.states - other_result.states).max())
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (first, other) if len(first.times) > len(other.times) else (other, first)
+    fine, coarse = (first, other_result) if len(first.times) > len(other_result.times) else (other_result, first)
     return float(np.abs(CubicSpline(fine.times, fine.states)(coarse.times) - coarse.states).max())
 
 
-def same_times(first: Result, other: Result) -> bool:
+def same_times(first: Result, other_result: Result) -> bool:
     """True if the rows of both runs lie at the same times."""
-    return len(first.times) == len(other.times) and bool(np.allclose(first.times, other.times, rtol=0, atol=1e-9))
+    return len(first.times) == len(other_result.times) and bool(
+        np.allclose(first.times, other_result.times, rtol=0, atol=1e-9)
+    )
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:

@@ -98,13 +98,13 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
     ]
 
 
-def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
+def _figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
     """Figures like the paper's 4 to 8."""
     from models.drawing.figures import save
 
-    save(_figure_measurement(measured), folder / "fig4_measurement.png")
+    save(_figure_measurement(measured_run), folder / "fig4_measurement.png")
     main = {
-        "virtual measurement": measured,
+        "virtual measurement": measured_run,
         "undisturbed": runs["undisturbed"],
         "noisy": runs["noisy 1"],
         "perturbed model": runs["perturbed"],
@@ -115,30 +115,32 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
         ("noisy", "noise samples", "fig6_noise_samples"),
         ("model", "perturbed models", "fig7_perturbed_models"),
     ):
-        chosen = {"virtual measurement": measured} | {key: run for key, run in runs.items() if key.startswith(prefix)}
+        chosen = {"virtual measurement": measured_run} | {
+            key: run for key, run in runs.items() if key.startswith(prefix)
+        }
         if len(chosen) == 1:
             continue
         save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), folder / f"{name}.png")
     save(_figure_moment(runs["guided, both"]), folder / "fig8_enforced_moment.png")
 
 
-def _figure_measurement(measured: Result) -> Any:
+def _figure_measurement(measured_run: Result) -> Any:
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 4.6), sharex="col", width_ratios=(2, 1))
-    middle = round(float(measured.times[-1]) / 2, 1)
-    detail = (measured.times >= middle) & (measured.times <= middle + 1)
+    middle = round(float(measured_run.times[-1]) / 2, 1)
+    detail = (measured_run.times >= middle) & (measured_run.times <= middle + 1)
     panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))
     for (whole, part), (channels, label, scale) in zip(axes, panels, strict=True):
         for channel, name in zip(channels, ("front", "rear"), strict=True):
-            whole.plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
-            part.plot(measured.times[detail], scale * measured[channel][detail], label=name)
+            whole.plot(measured_run.times, scale * measured_run[channel], label=name, linewidth=0.7)
+            part.plot(measured_run.times[detail], scale * measured_run[channel][detail], label=name)
         whole.set_title(label)
         part.set_title("Detail " + label[label.index("[") :])
     legend_below(figure, axes[0, 0])
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured})
+    heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured_run})
     return figure
 
 

@@ -95,7 +95,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> Options:
-    """The scene's options; refuses, before anything is written, what is neither a road nor a free run on wheel
+    """Options of the scene; refuses, before any file is written, a scene that is neither a road nor a free run on wheel
     forces."""
     options = read(Options, scene.options, scene.file, "options")
     check_steps(scene, engines)
@@ -143,15 +143,15 @@ def _ensemble(
     return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _with_errors(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
     """The result with the error of the steps, of the run without noise, and the standard error of the median."""
-    saved.data.attrs["error"] = quiet.data.attrs["error"]
-    with_assumptions(saved, [small_errors(options.angle)])
+    result.data.attrs["error"] = quiet.data.attrs["error"]
+    with_assumptions(result, [small_errors(options.angle)])
     middle, low, high = quantile(spread["drift_off"], 0.5)
     if not math.isfinite(high):
-        return saved
+        return result
     error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
-    return of_chance(saved, {"median drift-off by noise": error}, options.paths)
+    return of_chance(result, {"median drift-off by noise": error}, options.paths)
 
 
 def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
@@ -245,7 +245,8 @@ def _remedies(
 
 
 def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
-    """Size of an error at the wanted time by the allowed angle, from drift-off or the run's end on by the law of noise.
+    """Ratio of the pitch error at a time to the allowed angle; beyond drift-off or the end of the run, extrapolated by
+    the growth law of noise.
 
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
     taken for as rough as the run.

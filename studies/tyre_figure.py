@@ -15,10 +15,14 @@ COLOURS = colormaps["viridis"]
 
 
 def tyre_figure(
-    tables: Mapping[str, TyreTable], at: tuple[Sequence[float], float], title: str, path: Path, results: Results
+    tables: Mapping[str, TyreTable],
+    slip_angles: tuple[Sequence[float], float],
+    title: str,
+    path: Path,
+    results: Results,
 ) -> None:
     """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
-    angles, load = at
+    angles, load = slip_angles
     figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), SLIPS, load)

@@ -34,9 +34,9 @@ SHOWN_SECONDS = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
-def _note(axis: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
+def _note(axis: Axes, text: str, point: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
     """Text that ends so many points beside a place."""
-    axis.annotate(text, place, shift, textcoords="offset points", ha="right", **style)
+    axis.annotate(text, point, shift, textcoords="offset points", ha="right", **style)
 
 
 def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:

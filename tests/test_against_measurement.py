@@ -7,7 +7,7 @@ import pytest
 
 import twinrig as library
 from models.core.errors import InputError
-from models.measured.time_shift import Pair, time_shift
+from models.measured.time_shift import ChannelPair, time_shift
 from models.measured.units import factor_between
 from models.systems.pitch_plane.run import run as simulate
 from studies.command.against_measurement import overlay
@@ -69,9 +69,11 @@ def test_samples_that_are_missing_and_means_do_not_matter():
     clock = np.arange(2.0, 7.0, 0.013)
     values = 5.0 + 2.0 * np.interp(clock, times, run)
     values[50:90] = np.nan
-    found = time_shift([Pair(times, run, clock - 40.0, values), Pair(times, 0.0 * times, clock - 40.0, 0.0 * values)])
+    found = time_shift(
+        [ChannelPair(times, run, clock - 40.0, values), ChannelPair(times, 0.0 * times, clock - 40.0, 0.0 * values)]
+    )
     assert found.seconds == pytest.approx(-40.0, abs=1e-3) and found.correlation > 0.9999
-    still = time_shift([Pair(times, 0.0 * times, clock, 1.0 + 0.0 * clock)])
+    still = time_shift([ChannelPair(times, 0.0 * times, clock, 1.0 + 0.0 * clock)])
     assert still.seconds == 0.0 and np.isnan(still.correlation)
 
 

@@ -15,7 +15,7 @@ from models.brake.trailer import CHOSEN, hooked, train
 from models.engines.braking import set_held
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked
-from validation.braking.braked_truck import Moving, constant, on_road, truck_on
+from validation.braking.braked_truck import RollingTruck, constant, on_road, truck_on
 
 MU = 0.4
 LOCKING = np.full(4, 1e14)
@@ -98,7 +98,7 @@ def test_locked_wheels_stop_in_the_time_of_coulomb_s_friction(speed):
     """t = v / (mu g), and the wheels bear mu m g on the way; at a walking pace steps are cut into parts."""
     plane = truck(PAPER)
     still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
-    moving = Moving(truck_on(constant(MU), still), speed)
+    moving = RollingTruck(truck_on(constant(MU), still), speed)
     moving.on(np.tile(LOCKING, (2, 1)), 5.5e-3)
     forces, loads = -moving.report.force_x.sum(), moving.report.load.sum()
     assert (loads, forces) == pytest.approx((PAPER.mass * GRAVITY, MU * PAPER.mass * GRAVITY), rel=1e-6)
@@ -140,7 +140,7 @@ def test_wheels_at_the_edge_of_locking_bear_the_load_that_just_locks_them(inerti
     plane = truck(PAPER)._replace(spin=np.full(4, inertia))
     load = (plane.static - plane.by_x * MU * GRAVITY) * (1.0 - share)  # a little less than behind if all are locked
     torques = np.where(plane.place[:, 0] < 0.0, plane.radius * MU * load, LOCKING)
-    moving = Moving(on_road(plane, falling(), slope=1e-6), speed)
+    moving = RollingTruck(on_road(plane, falling(), slope=1e-6), speed)
     moving.turning[:] = 0.0
     moving.on(torques, step)
     lift, mass = PAPER.mass * PAPER.height / (2.0 * PAPER.wheelbase), PAPER.mass

@@ -89,7 +89,7 @@ def test_valves_apply_slowly_only_where_the_scene_has_them():
 
 def test_what_cannot_be_is_refused_with_its_value():
     with pytest.raises(ControllerFailed, match="too high: a pressure of 299 bar, above the 6 bar"):
-        checked_answer(Command(pressures=np.full(4, 299.0)), GIVEN, most=6.0)
+        checked_answer(Command(pressures=np.full(4, 299.0)), GIVEN, maximum_pressure=6.0)
     with pytest.raises(ControllerFailed, match="wrong frame: complex"):
         checked_answer(Command(pressures=np.full(4, 1j)), GIVEN)
     with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):

@@ -26,7 +26,7 @@ from models.brake.port.example import Example
 from models.brake.port.faults import Fault, Faulty
 from models.brake.port.pace import WallClock
 from models.brake.port.sensors import Conversion, sensed
-from models.brake.port.setup import PortTable, Run, opened
+from models.brake.port.setup import ControllerRun, PortTable, opened
 from models.brake.port.socket_port import connected
 from models.brake.port.teeth import Counted, Teeth
 from models.brake.pressure import Chambers
@@ -159,7 +159,7 @@ def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     builder = pytest.importorskip("pythonfmu").FmuBuilder
     file = builder.build_FMU(HERE / "example_slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=PATIENT, start=PATIENT)
-    with opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
+    with opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
         path = vehicle.run(other, 11.0, SHORT)
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
@@ -182,7 +182,7 @@ def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
     (tmp_path / "slave.py").write_text(source)
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=time_out(name, 0.5), start=PATIENT)
-    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     with pytest.raises(ControllerFailed, match=name), opened(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         ask(other, of())
@@ -192,7 +192,7 @@ def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
 def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
     (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    table, run = PortTable(fmu="a.fmu"), Run(RADIUS, SAMPLE, folder=tmp_path)
+    table, run = PortTable(fmu="a.fmu"), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     with pytest.raises(InputError, match=r"twinrig\[fmi\]"), opened(table, run, Example(4)):
         pass
 
@@ -200,7 +200,10 @@ def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
 def test_a_file_that_is_no_fmu(tmp_path):
     (tmp_path / "a.fmu").write_text("no")
     table = PortTable(fmu="a.fmu")
-    with pytest.raises(InputError, match="no FMU"), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
+    with (
+        pytest.raises(InputError, match="no FMU"),
+        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+    ):
         pass
 
 
@@ -288,7 +291,7 @@ def _exits(given):
 )
 def test_nonsense_of_a_callable_is_named(answer, name):
     with pytest.raises(ControllerFailed, match=name):
-        ask(Says(answer), of(), most=6.0)
+        ask(Says(answer), of(), maximum_pressure=6.0)
 
 
 HOSTILE = {
@@ -333,7 +336,7 @@ def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, c
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n        print('noise', flush=True)\n"
         "        return Command(valves=np.ones(4))\n"
     )
-    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     with opened(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
         ask(other, of())
     said = capfd.readouterr()
@@ -355,7 +358,7 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
         f"    def sample(self, given):\n        {does}\n"
     )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)
-    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     with pytest.raises(ControllerFailed, match=name), opened(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         ask(other, of())
@@ -371,7 +374,10 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
             f"class Made:\n    def __init__(self, wheels):\n        {does}\n    def sample(self, given): pass\n"
         )
         table = PortTable(callable="made.py:Made", start=start)
-        with pytest.raises(RunFailed, match=told), opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)):
+        with (
+            pytest.raises(RunFailed, match=told),
+            opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        ):
             pass
 
 
@@ -391,7 +397,7 @@ def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.4 s; .* give start"),
-        opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -402,7 +408,7 @@ def test_an_fmu_that_is_never_ready_ends_as_an_answer_does(tmp_path):
     lines = (HERE / "example_slave.py").read_text().replace("import", f"import os, time\n{WAITS}import", 1)
     (tmp_path / "slave.py").write_text(lines.replace("super().__init__(", "waits()\n        super().__init__("))
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
-    table, run = PortTable(fmu=Path(file).name, timeout=0.8), Run(RADIUS, SAMPLE, folder=tmp_path)
+    table, run = PortTable(fmu=Path(file).name, timeout=0.8), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     (tmp_path / "begun").touch()
     with chdir(tmp_path), pytest.raises(RunFailed, match=r"not made within 0.8 s"), opened(table, run, Example(4)):
         pass
@@ -421,7 +427,7 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     table = PortTable(command=["sleep", "30"], timeout=0.2)
     begun = time.perf_counter()
     with pytest.raises(RunFailed, match=r"nobody connected to .* within 0.2 s; .* give start"):
-        opened(table, Run(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
+        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
     assert time.perf_counter() - begun < 2 * table.timeout
     assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0
 
@@ -432,7 +438,7 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     [(lambda given: None, "wrong frame"), (lambda given: Command(pressures=np.full(4, -1.0)), "below zero")],
 )
 def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
-    run = Run(RADIUS, SAMPLE, folder=tmp_path)
+    run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     failing = Says(answer)
     with opened(read(PortTable, table, ""), run, failing) as (other, _), pytest.raises(ControllerFailed, match=name):
         ask(other, of())
@@ -486,7 +492,7 @@ def test_the_socket_listens_on_this_machine_alone():
 
 
 def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
-    run = Run(RADIUS, SAMPLE, "a scene", tmp_path)
+    run = ControllerRun(RADIUS, SAMPLE, "a scene", tmp_path)
     with opened(PortTable(log="a.log"), run, Example(4)) as (own, _):
         path = vehicle.run(own, 11.0, SHORT)
     with opened(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
@@ -503,7 +509,7 @@ def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
         vehicle.run(replayed, 11.0, SHORT + 0.1)
     with (
         pytest.raises(InputError, match="another scene"),
-        opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
+        opened(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
     ):
         pass
     (tmp_path / "no.log").write_bytes(b"no")
@@ -632,7 +638,7 @@ def test_a_table_that_cannot_be(table, told):
 
 def test_a_fault_of_a_wheel_that_is_not_there():
     table = PortTable(faults=[Fault(kind="lost", wheels=[4])])
-    with pytest.raises(InputError, match="from 0 to 3"), opened(table, Run(RADIUS, SAMPLE), Example(4)):
+    with pytest.raises(InputError, match="from 0 to 3"), opened(table, ControllerRun(RADIUS, SAMPLE), Example(4)):
         pass
 
 
@@ -658,9 +664,12 @@ def test_a_controller_that_writes_into_its_question_does_not_change_the_log(tmp_
         given.wheels[:] = 0.0
         return Command(valves=np.ones(4, dtype=np.int64))
 
-    with opened(PortTable(log="a.log"), Run(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (own, _):
+    with opened(PortTable(log="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (own, _):
         own.sample(of())
-    with opened(PortTable(replay="a.log"), Run(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (replayed, _):
+    with opened(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (
+        replayed,
+        _,
+    ):
         assert (replayed.sample(of()).valves == 1).all()
 
 

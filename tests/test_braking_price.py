@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.advice.price import runner as cost
-from models.engines.braking import Carried
+from models.engines.braking import CarriedChassis
 from models.systems.braking.march import Braked
 from models.tyre.tyre_table import stacked
 from validation.braking.quarter_stops import FRONT
@@ -49,7 +49,7 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
         short._chambers,
         np.zeros(1),
         substeps=2,
-        engine=Carried(engine, FRONT.plane),
+        engine=CarriedChassis(engine, FRONT.plane),
     )
     path = stop.run(Played(short.valves), 2.0)
     assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._stop_by_twinrig(2).distance, abs=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.advice.choice import choose
-from models.advice.choice.answer import Answer, Quantity, added, less, relative, rounding, sizes
+from models.advice.choice.answer import Quantity, RunQuantities, added, less, relative, rounding, sizes
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
 from models.advice.choice.variants import Variants
@@ -72,7 +72,7 @@ class Made(Variants):
 
     def _run(self, left_out, times):
         value = np.array([self.function(left_out, times)])
-        return Answer({"q": Quantity("", (value,))}, {"calls": 100 // times, "states": 2}, 1.0)
+        return RunQuantities({"q": Quantity("", (value,))}, {"calls": 100 // times, "states": 2}, 1.0)
 
 
 def chooser(monkeypatch, function, effects, tolerance=0.05):
@@ -185,7 +185,9 @@ def test_what_only_rounds_does_not_move():
     scene = half_car(effects={}, quantities=["z1_rate"])  # 2e-17 m/s at rest
     with pytest.raises(InputError, match="does not move"):
         Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    answer = Answer({"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0)
+    answer = RunQuantities(
+        {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
+    )
     assert sizes(answer.of("a").cases)[0] < rounding(answer, "N") == pytest.approx(5e-6)
     assert rounding(answer, "m") == 1e-15
 

@@ -6,7 +6,7 @@ import pytest
 from models.advice.price.recommendation import priced, recommend
 from models.advice.price.text import lines
 from models.contact.fastsim import RollingEllipse, fastsim
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.systems.contact.scene import build
 
@@ -24,7 +24,7 @@ def table(tmp_path):
 
 
 def forces(cells, march="second-order"):
-    rolled = fastsim(RollingEllipse(*np.array(ROWS).T), Pair(), cells=cells, march=march)
+    rolled = fastsim(RollingEllipse(*np.array(ROWS).T), MaterialPair(), cells=cells, march=march)
     return np.column_stack([rolled.fx, rolled.fy])
 
 

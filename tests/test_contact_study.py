@@ -13,7 +13,7 @@ from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import fastsim_fields
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.core.tables import NEWTONS, SHARES, blocks, read_table
 from models.ensemble.store import Store
@@ -41,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 def answered(text, name="cases.csv", **method):
     """Counts and rows that a table is answered with."""
     Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    counts = answer_table(Path(name), Path("out.csv"), partial(Built, Pair()), Method(**method))
+    counts = answer_table(Path(name), Path("out.csv"), partial(Built, MaterialPair()), Method(**method))
     with open("out.csv", newline="") as file:
         return counts, list(csv.DictReader(file))
 
@@ -177,7 +177,7 @@ def test_the_linear_theory_states_how_far_it_is_beyond_friction():
 
 def test_fields_of_fastsim_are_those_of_its_forces():
     for choices in ({}, {"march": "plain", "flexibilities": "one"}, {"bound": "elliptic", "flexibilities": "three"}):
-        given = RollingEllipse(6e-3, 3e-3, 8e4, 0.3, 1e-3, -7e-4, 0.4), Pair()
+        given = RollingEllipse(6e-3, 3e-3, 8e4, 0.3, 1e-3, -7e-4, 0.4), MaterialPair()
         sums, f = fastsim(*given, **choices), fastsim_fields(*given, **choices)
         area = f.dx * f.dy
         assert (f.px * area).sum() == pytest.approx(float(sums.fx), rel=1e-12)
@@ -188,7 +188,7 @@ def test_fields_of_fastsim_are_those_of_its_forces():
 
 def test_a_row_of_a_table_is_the_contact_with_its_units():
     counts, rows = answered(CASES + ROW)
-    one = fastsim(RollingEllipse(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4), Pair())
+    one = fastsim(RollingEllipse(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4), MaterialPair())
     assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == HEADER and rows[0]["status"] == "ok"
     for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
         assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)
@@ -256,7 +256,7 @@ def test_a_table_that_was_cut_off_says_so():
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
-        answer_table(Path("cases.csv"), Path("out.csv"), partial(Built, Pair()), Method())
+        answer_table(Path("cases.csv"), Path("out.csv"), partial(Built, MaterialPair()), Method())
     assert words in str(found.value) and not Path("out.csv").exists()
 
 
@@ -338,7 +338,7 @@ class Counting:
 def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monkeypatch, tmp_path):
     """Blocks of 2 rows, one of them with a wrong row; what was finished before the interrupt is not computed again."""
     monkeypatch.setattr(cases_table, "blocks", partial(blocks, rows=2))
-    path, built = tmp_path / "cases.csv", partial(Built, Pair())
+    path, built = tmp_path / "cases.csv", partial(Built, MaterialPair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))
     assert answer_table(path, alone, built, Method()) == {"rows": 9, "wrong": 1}

@@ -10,7 +10,7 @@ import pytest
 
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import build as hub_model
-from models.engines.export import Subject, export_free_vehicle
+from models.engines.export import ExportSubject, export_free_vehicle
 from models.engines.exudyn_system import mass_and_force, set_start
 from models.engines.free_vehicle_exudyn import FreeExudyn
 from models.engines.free_vehicle_mujoco import compiled_model
@@ -140,7 +140,7 @@ CARS = {"shipped": r19, "twin": lambda: cut(twin(), "body"), "rough": rough_car}
 def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
     """The product has all its forces here, with hub forces of 0 and what no element has set to 0."""
     whole = CARS[car]()
-    answer = of_cut(engine, whole, Subject("car", "car.toml", ""), [])
+    answer = of_cut(engine, whole, ExportSubject("car", "car.toml", ""), [])
     tree = whole.tree
     if engine == "mujoco":
         tree, lowered = realisable(tree)
@@ -156,7 +156,7 @@ def test_parts_that_are_left_out_of_a_cut_car_are_named():
     for engine in ("mujoco", "exudyn"):
         car = rough_car()
         reasons = divide(car.tree, car.elements, engine).reasons
-        answer = of_cut(engine, rough_car(), Subject("car", "car.toml", ""), ["stabiliser"])
+        answer = of_cut(engine, rough_car(), ExportSubject("car", "car.toml", ""), ["stabiliser"])
         assert reasons
         assert all(any(name in text and why in text for text in answer.left_out) for name, why in reasons.items())
         assert answer.left_out.count("stabiliser") == 1 and "stabiliser" in answer.text
@@ -207,7 +207,7 @@ def test_a_rotor_keeps_its_motion_with_a_tensor_that_mujoco_takes(tmp_path):
     tensor = ((300.0, 0.0, -10.0), (0.0, 1400.0, 0.0), (-10.0, 0.0, 1600.0))
     bodies = tuple(replace(body, inertia=tensor) if body.name == "body" else body for body in driven.vehicle.bodies)
     driven = replace(driven, vehicle=replace(driven.vehicle, bodies=bodies))
-    answer = export_free_vehicle("mujoco", driven, Subject("", "", ""), [])
+    answer = export_free_vehicle("mujoco", driven, ExportSubject("", "", ""), [])
     assert answer.left_out == ()
     assert error(answer.text, "mujoco", bare_exudyn(FreeExudyn(driven).mbs), driven.size, tmp_path) < 1e-9
 

@@ -11,12 +11,12 @@ from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS, grid
 from models.contact.fields import fastsim_fields
 from models.contact.linear_theory import coefficients, flexibilities
-from models.contact.material import Falling, Pair
+from models.contact.material import Falling, MaterialPair
 from models.core.errors import InputError
 from validation.cases import fastsim as case
 from validation.contact.fuzzed_creepage import OPTIONS, contacts, most_moment, worst_violation
 
-PAIR = Pair()
+PAIR = MaterialPair()
 AT = {"a": 6e-3, "b": 4e-3, "load": 80e3, "mu": 0.3, "xi_x": 1e-3, "xi_y": -5e-4, "spin": 0.3}
 STREAM = 500
 """Of the tests: the case draws from streams 0 and 100 on."""

@@ -193,7 +193,7 @@ def test_an_interrupt_in_exudyn_is_an_interrupt(monkeypatch):
 
         return read
 
-    monkeypatch.setattr(exudyn_engine.Clock, "reader", reader)
+    monkeypatch.setattr(exudyn_engine.SignalClock, "reader", reader)
     model = build("exudyn", setups.driven_by_forces(base, forces), Settings("RK44", 1e-3, 0.1))
     with pytest.raises(KeyboardInterrupt):
         model.run()

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import dblquad
 
 from models.contact.half_space import Convolution, influence, offsets
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 
-PAIR = Pair(STEEL, Material(E=7e10, nu=0.4))  # all nine numbers differ from zero
+PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.4))  # all nine numbers differ from zero
 DX, DY = 0.5e-3, 0.3e-3
 
 

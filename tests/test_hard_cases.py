@@ -70,12 +70,12 @@ def test_without_the_guard_a_huge_run_is_silent(monkeypatch, tmp_path):
 
 
 def test_a_clock_that_keeps_its_last_sample_is_found(monkeypatch, tmp_path):
-    class Stale(exudyn_engine.Clock):
+    class Stale(exudyn_engine.SignalClock):
         def __setattr__(self, name, value):
             if not (name == "step" and value == 0 and getattr(self, "step", 0) > 0):
                 super().__setattr__(name, value)
 
-    monkeypatch.setattr(exudyn_engine, "Clock", Stale)
+    monkeypatch.setattr(exudyn_engine, "SignalClock", Stale)
     assert found(stepping, "repeated run", "exudyn", tmp_path) == "SILENT"
 
 
@@ -210,5 +210,5 @@ def test_there_are_eighty_cases_without_the_measurement_files():
 
 def test_a_refusal_that_is_wanted_passes_its_row_also_where_no_implementation_has_a_part():
     case = Case("odd", "hard", "check", "", 0.0, "why", broken, dict.fromkeys(IMPLEMENTATIONS, "refused"), once=True)
-    row = hard_cases._row(case, "reference", hard_cases.Outcome("refused"))
+    row = hard_cases._row(case, "reference", hard_cases.CaseOutcome("refused"))
     assert (row.id, row.status) == ("hard.odd.any", "passed")

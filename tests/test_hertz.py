@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from models.contact.hertz import aspect, by_approach, by_axes, by_load, integrals
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.contact.simplified_theory import roll
 from models.core.errors import InputError
 from models.core.strict import read
 from models.systems.contact.run import interpenetrating
 from validation.cases.contact_hertz import ellipse, measure
 
-PAIR = Pair()
+PAIR = MaterialPair()
 
 
 def test_every_row_of_the_case_passes(tmp_path):
@@ -24,7 +24,7 @@ def test_the_truth_is_johnson_s_circle():
     """The many-digit side by formulas of its own: p0 = (6 N E*^2 / (pi^3 R^2))^(1/3), a = (3 N R / (4 E*))^(1/3)."""
     circle = {name: float(value) for name, value in ellipse(1.0).items()}
     radius = 1 / (2 * circle["flat"])
-    modulus = Pair(STEEL, Material(E=7e10, nu=0.33)).modulus
+    modulus = MaterialPair(STEEL, Material(E=7e10, nu=0.33)).modulus
     rounding = 1e-14  # of a power of 1/3 of a number of size 1e27
     assert circle["long"] == pytest.approx((0.75 * circle["load"] * radius / modulus) ** (1 / 3), rel=rounding)
     cube = 6 * circle["load"] * modulus**2 / (np.pi**3 * radius**2)
@@ -109,7 +109,7 @@ def test_aspect_solves_its_equation(curvatures):
         (lambda: by_load(1.0, 1.0, "1e4", PAIR), r"load = '1e4': must be a number"),
         (lambda: by_load(1.0, 1.0, np.ma.masked_less([1.0, -1.0], 0.0), PAIR), r"load.*must be a number"),
         (lambda: by_load(1.0, 1.0, np.array([1.0 + 1.0j]), PAIR), r"load.*must be a number"),
-        (lambda: Pair(STEEL, 0.28), r"pair.rail = 0.28: must be a Material"),
+        (lambda: MaterialPair(STEEL, 0.28), r"pair.rail = 0.28: must be a Material"),
         (lambda: Material(E=2.1e5, nu=0.28), r"E = 210000.0: must be 1e\+06 or more \(Young's modulus, not in MPa"),
         (lambda: Material(E=2.1e11, nu=0.6), r"nu = 0.6: must be at most 0.5"),
         (lambda: Material(E=float("nan"), nu=0.3), r"E = nan"),
@@ -127,7 +127,7 @@ def test_combined_constants():
     """A pair of equals has its own constants; (1 - nu)/G = 1/E* for any pair (Kalker 1990, section 1.7)."""
     assert (PAIR.G, PAIR.nu, PAIR.mismatch) == (STEEL.G, STEEL.nu, 0.0)
     assert pytest.approx(STEEL.E / (2 * (1 - 0.28**2))) == PAIR.modulus
-    unlike = Pair(STEEL, Material(E=7e10, nu=0.33))
+    unlike = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
     assert (1 - unlike.nu) / unlike.G == pytest.approx(1 / unlike.modulus, rel=1e-14)
     # Dundurs' constant of steel on aluminium, from his own formula with kappa = 3 - 4 nu
     (one, two), (k1, k2) = (unlike.wheel.G, unlike.rail.G), (3 - 4 * 0.28, 3 - 4 * 0.33)
@@ -136,11 +136,11 @@ def test_combined_constants():
 
 
 def test_unlike_pairs_are_refused_only_where_they_rub():
-    unlike, near = Pair(STEEL, Material(E=7e10, nu=0.33)), Pair(Material(E=2.06e11, nu=0.3), STEEL)
+    unlike, near = MaterialPair(STEEL, Material(E=7e10, nu=0.33)), MaterialPair(Material(E=2.06e11, nu=0.3), STEEL)
     assert by_load(1.0, 1.0, 1e4, unlike).a > 0.0
     near.require_likeness()
     assert near.quasi_identity_error(0.3) == pytest.approx(0.042, abs=1e-3)  # 2 |K| / mu, K = -0.0063
-    assert near.quasi_identity_error(0.3) == Pair(near.rail, near.wheel).quasi_identity_error(0.3)
+    assert near.quasi_identity_error(0.3) == MaterialPair(near.rail, near.wheel).quasi_identity_error(0.3)
     with pytest.raises(InputError, match=r"too unlike .*K = -0.07"):
         unlike.require_likeness()
     pressed = interpenetrating(by_load(1.0, 1.0, 1e4, unlike), unlike)  # the simplified theory, too, leaves K out

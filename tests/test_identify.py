@@ -12,7 +12,7 @@ from models.core.tables import write_table
 from models.identification.bands import bands, error_model
 from models.identification.fit import fit
 from models.identification.of_scene import parameter, problem_of
-from models.identification.problem import Clock, Parameter, Problem, measured_channel
+from models.identification.problem import FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import profile, uncertainty
 from models.measured.outliers import without_outliers
 from models.systems.single_track.run import run
@@ -151,7 +151,7 @@ def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
 def test_profile_of_a_straight_problem_is_a_parabola() -> None:
     """A model that is linear in its parameters: the profile is what the standard error says."""
     times, random = np.linspace(0.0, 1.0, 400), np.random.default_rng(5)
-    clock = Clock(times)
+    clock = FitClock(times)
 
     def model(values: np.ndarray) -> dict:
         return {"y": (times, values[0] + values[1] * times)}

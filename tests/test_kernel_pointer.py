@@ -15,15 +15,15 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach, by_load
 from models.contact.kernel_pointer import EXAMPLE, HEADER, Pointer, pointer
 from models.contact.linear_theory import forces
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
 
-PAIR = Pair(STEEL, Material(E=2.0e11, nu=0.29))
+PAIR = MaterialPair(STEEL, Material(E=2.0e11, nu=0.29))
 GOOD = (1.1, 1.7, 8e4, 0.3, 1e-3, -5e-4, 0.3)
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
-def call(how: Pointer, given: int, values: tuple[float, ...], pair: Pair = PAIR) -> tuple[int, np.ndarray]:
+def call(how: Pointer, given: int, values: tuple[float, ...], pair: MaterialPair = PAIR) -> tuple[int, np.ndarray]:
     inputs, outputs = np.array([*values, pair.G, pair.nu]), np.full(k.OUTPUTS, 7.0)
     status = how.call(given, *(array.ctypes.data_as(DOUBLES) for array in (how.net, inputs, outputs)))
     return status, outputs
@@ -172,7 +172,7 @@ def test_c_program_calls_the_kernel(tmp_path):
     creepage_for.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_double] * 3]
     how, load, mu, force = pointer(), 8e4, 0.3, 15e3
     found = creepage_for(how.address, how.net_address, load, mu, force)
-    shear = Pair(Material(E=82.03e9 * 2.56, nu=0.28), Material(E=82.03e9 * 2.56, nu=0.28))
+    shear = MaterialPair(Material(E=82.03e9 * 2.56, nu=0.28), Material(E=82.03e9 * 2.56, nu=0.28))
     hertz = by_load(0.5 / 0.46, 0.5 / 0.3, load, shear)
     # sixty halvings of 0.1 end at the last digit of the creepage
     ellipse = RollingEllipse(hertz.a, hertz.b, load, mu, 0.0, found, 0.0)

@@ -10,12 +10,12 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
 from models.contact.kernel_pointer import pointer
 from models.contact.kernel_simplified import table
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.simplified_theory import press, roll
 from models.contact.undeformed_distance import from_function, quadratic
 from models.core.errors import InputError
 
-PAIR, SIZE = Pair(), (-0.03, 0.03)
+PAIR, SIZE = MaterialPair(), (-0.03, 0.03)
 ELLIPSE = quadratic(1.1, 1.7, 0.03, 0.03, 61)
 SHAPES = {
     "ellipse": ELLIPSE,

@@ -15,11 +15,11 @@ from models.contact.linear_theory import (
     flexibilities_at,
     forces,
 )
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
 from validation.cases import contact_coefficients as case
 
-PAIR = Pair()
+PAIR = MaterialPair()
 A, B = 5e-3, 3e-3
 
 
@@ -129,8 +129,8 @@ def test_compiled_callers_get_the_same():
         (lambda: forces(A, B, np.nan, 0, 0, PAIR), r"xi_x = nan: must be a creepage"),
         (lambda: forces(A, B, 0, 0, np.inf, PAIR), r"spin = inf: must be a spin in 1/m"),
         (lambda: forces([A, A], B, [1e-3] * 3, 0, 0, PAIR), r"no common shape: .*xi_x \(3,\)"),
-        (lambda: flexibilities(A, B, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
-        (lambda: forces(A, B, 0, 0, 0, Pair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
+        (lambda: flexibilities(A, B, MaterialPair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
+        (lambda: forces(A, B, 0, 0, 0, MaterialPair(STEEL, Material(E=7e10, nu=0.33))), "too unlike"),
     ],
 )
 def test_what_cannot_be_used_says_what_is_expected(call, words):

@@ -20,7 +20,7 @@ from models.measured.signal import Quantity, Signal, TransducerPlace
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, consequence_texts
 from models.systems.measured.inputs import Inputs
-from models.systems.measured.section_run import Outcome
+from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import filter_doubts
 from models.systems.measured.virtual import VirtualMeasurement, recording
 from models.vehicles.cut_vehicle import rigid
@@ -339,7 +339,7 @@ def test_without_a_vehicle_every_check_says_what_it_would_need(tmp_path):
 def test_a_filter_that_is_surprised_by_its_measurements_is_a_doubt(tmp_path):
     """NaN is a run without a filter."""
     columns = made(tmp_path, force_z=white()).columns
-    told = [filter_doubts(Outcome(columns, (), PERIOD, 2, surprise, ())) for surprise in (1.2, np.nan, 2.5)]
+    told = [filter_doubts(SectionOutcome(columns, (), PERIOD, 2, surprise, ())) for surprise in (1.2, np.nan, 2.5)]
     assert told[:2] == [(), ()]
     assert [(one.weight, one.size) for one in told[2]] == [("doubt", 2.5)]
 

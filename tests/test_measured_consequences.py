@@ -13,7 +13,7 @@ from models.fatigue.damage import SLOPE, damage_ratio
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
 from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, consequences, verdict_with_consequences
-from models.systems.measured.section_run import Hold, Outcome, SectionRun, run
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun, run
 from models.systems.measured.sections import Sections
 from models.systems.measured.virtual import VirtualMeasurement, recording
 from validation.measured import planted as bench
@@ -27,9 +27,9 @@ def ridden() -> VirtualMeasurement:
     return bench.measurement(road=("C", 1, 20.0, 5.0))
 
 
-def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> Outcome:
+def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> SectionOutcome:
     """The run with the filter."""
-    return run(SectionRun(ridden.vehicle, own, Sections(ridden.vehicle), hold=Hold()), folder / "run")
+    return run(SectionRun(ridden.vehicle, own, Sections(ridden.vehicle), hold=AttitudeHold()), folder / "run")
 
 
 def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path) -> tuple[Consequence, float, float]:

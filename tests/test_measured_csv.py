@@ -28,7 +28,7 @@ from validation.measured.measured_files.csv_forms import (
     iso,
     stamps,
 )
-from validation.measured.measured_files.odd import TIMES, Odd, difference, read, usual
+from validation.measured.measured_files.odd import TIMES, OddFile, difference, read, usual
 
 PLAIN = Form().times
 FORMS = st.builds(
@@ -115,7 +115,7 @@ def test_a_cut_within_a_line_is_never_silent(form, place):
 
 
 @pytest.mark.parametrize("odd", FILES, ids=lambda odd: odd.name)
-def test_a_form_is_read_or_refused_as_it_should(tmp_path, odd: Odd):
+def test_a_form_is_read_or_refused_as_it_should(tmp_path, odd: OddFile):
     if odd.wanted == "refused":
         with pytest.raises(InputError):
             odd.error(tmp_path)

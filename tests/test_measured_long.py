@@ -19,7 +19,7 @@ from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.inputs import Inputs, StepGrid
-from models.systems.measured.section_run import Checkpoint, Hold, SectionRun, run
+from models.systems.measured.section_run import AttitudeHold, Checkpoint, SectionRun, run
 from models.systems.measured.sections import AccelerometerPoint, Sections, points
 from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import PITCH, ROLL
@@ -94,7 +94,7 @@ def test_killed_at_any_moment_it_goes_on_to_the_same_bits(whole, tmp_path, monke
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda own: replace(own, hold=Hold("none")), "another stabiliser"),
+        (lambda own: replace(own, hold=AttitudeHold("none")), "another stabiliser"),
         (lambda own: replace(own, engine="exudyn"), "another engine"),
         (lambda own: replace(own, step=5e-4), "another step"),
         (lambda own: replace(own, sections=Sections(own.vehicle)), "another list of sections"),
@@ -125,7 +125,7 @@ def test_a_vehicle_that_topples_ends_with_the_time_and_what_there_was(whole, tmp
         return values
 
     with pytest.raises(RunFailed, match=r"topples|infinite|gave up") as error:
-        run(replace(changed(own, tmp_path, pushed), hold=Hold("none")), tmp_path / "run", block=0.03)
+        run(replace(changed(own, tmp_path, pushed), hold=AttitudeHold("none")), tmp_path / "run", block=0.03)
     assert error.value.time is not None and 0.097 <= error.value.time <= SECONDS  # the cubic begins a sample earlier
     assert 98 <= error.value.partial.done <= 201
     assert np.isfinite(error.value.partial.samples(error.value.partial.answers[0])).all()

@@ -17,8 +17,8 @@ from models.measured.signal import Quantity, Signal
 from models.systems.measured.inputs import Inputs, StepGrid
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as plane_run
-from models.systems.measured.section_run import DAMPING, Hold
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import DAMPING, AttitudeHold
+from models.systems.measured.sections import SectionChannel
 from models.systems.measured.trust import Level, drift, position
 from models.systems.measured.verdict import Band, Compared, disagreement, uncertainty
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
@@ -191,7 +191,7 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
 
 
 def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehicle) -> None:
-    hold = Hold(force=1e-9, moment=1e-9, angle=2e-3, rate=5e-3)
+    hold = AttitudeHold(force=1e-9, moment=1e-9, angle=2e-3, rate=5e-3)
     corner, h = 2 * np.pi * hold.bandwidth, PERIOD
     noise = np.random.default_rng(1).normal(size=(2, 400_000)) * np.array([[hold.angle], [hold.rate]])
     pushed = corner**2 * noise[0] + 2 * DAMPING * corner * noise[1]
@@ -203,7 +203,7 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
 
 
 def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
-    answer = Answer("a", "N", "")
+    answer = SectionChannel("a", "N", "")
     band = Compared(_signal("a"), answer, 0.0, (Band(0.0, 9.0, 10.0, 3.0), Band(9.0, 99.0, 0.0, 4.0)), 0.0, {}, np.inf)
     assert disagreement(band) == pytest.approx(0.5)  # 5 of 10
     assert disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))
@@ -228,17 +228,17 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, tmp_path: Path) -> None:
-    found = plane_run(PlaneJob(planar, "itwm_drift", hold=Hold(force=10.0)), tmp_path / "run")
+    found = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
     pitch = found.outcome.columns.read("chassis pitch")
     assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
     assert found.verdict.word == "accepted" and found.outcome.surprise < 1.0  # nothing but the stated noise is missing
-    free = plane_run(PlaneJob(planar, "itwm_drift", hold=Hold("none", force=2000.0)), tmp_path / "free")
+    free = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold("none", force=2000.0)), tmp_path / "free")
     assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
 
 
 def test_a_free_run_on_turning_forces_is_accepted_only_beside_its_pitch(planar: Recording, tmp_path: Path) -> None:
     turning = replace(planar, signals=tuple(replace(s, frame="body") for s in planar.signals))
-    job = PlaneJob(turning, "itwm_drift", hold=Hold("none", force=10.0))
+    job = PlaneJob(turning, "itwm_drift", hold=AttitudeHold("none", force=10.0))
     assert plane_run(job, tmp_path / "right").verdict.word == "accepted"
     # nothing grows where forces turn with the vehicle, so that its own prediction never ends
     blind = replace(turning, signals=turning.signals[:4])
@@ -256,7 +256,7 @@ def test_another_vehicle_or_a_missing_wheel_is_refused(planar: Recording, tmp_pa
     light = Columns(tmp_path / "light.bin", names, planar.count)
     light.write(0, 0.8 * planar.columns.block(names, 0, planar.count))
     with pytest.raises(InputError, match="too little"):
-        plane_run(PlaneJob(replace(planar, columns=light), "itwm_drift", hold=Hold("none")), tmp_path / "light")
+        plane_run(PlaneJob(replace(planar, columns=light), "itwm_drift", hold=AttitudeHold("none")), tmp_path / "light")
     fewer = replace(planar, signals=planar.signals[1:])
     with pytest.raises(InputError, match="both 'front left' and 'front right'"):
-        plane_run(PlaneJob(fewer, "itwm_drift", hold=Hold("none")), tmp_path / "fewer")
+        plane_run(PlaneJob(fewer, "itwm_drift", hold=AttitudeHold("none")), tmp_path / "fewer")

@@ -9,7 +9,7 @@ import pytest
 
 from models.advice.choice.variants import system_of
 from models.advice.price import effects, effects_of_ride, effects_text
-from models.advice.price.effects import Changed, price_list
+from models.advice.price.effects import QuantityChange, price_list
 from models.advice.ride_choice.reduced import FullScene
 from models.core.errors import InputError
 from models.core.scene_effects import listing, own_table, rebuilt, with_effects, without
@@ -384,6 +384,6 @@ def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
 
 
 def test_a_large_number_of_a_price_has_no_exponent():
-    changed = effects_text._changed(Changed("slip [1]", "N", 10_712.0, 2.904, 0.121))
+    changed = effects_text._changed(QuantityChange("slip [1]", "N", 10_712.0, 2.904, 0.121))
     assert changed == "slip by 10,700 N (290 % +- 12 %)" and effects_text._micros((4139.0, 96.0)) == "4,140 +- 100 us"
-    assert effects_text._changed(Changed("slip", "1", 0.0123, np.inf)) == "slip by 0.0123 (from nothing)"
+    assert effects_text._changed(QuantityChange("slip", "1", 0.0123, np.inf)) == "slip by 0.0123 (from nothing)"

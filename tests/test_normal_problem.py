@@ -6,11 +6,11 @@ import pytest
 from models.contact import normal_problem
 from models.contact.half_space import influence
 from models.contact.hertz import by_load
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.normal_problem import TOLERANCE, centres, solve_normal
 from models.core.errors import InputError, RunFailed
 
-PAIR = Pair()
+PAIR = MaterialPair()
 STEP = 0.4e-3
 X = centres(41, STEP)
 

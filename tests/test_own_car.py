@@ -12,7 +12,7 @@ from models.brake.sprung import sprung
 from models.core.errors import InputError, Refused
 from models.core.systems import load
 from models.engines.braking_sprung_plain import PlainOnSprings
-from models.engines.export import Subject
+from models.engines.export import ExportSubject
 from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
 from models.multibody.plain.rolling import PlainRolling
@@ -194,7 +194,7 @@ def test_what_is_no_car_of_a_scene_is_refused_by_name(tmp_path, fault):
 
 def exported(handling: Handling) -> str:
     """A car as ``twinrig export`` writes it, with the sites that its user adds."""
-    text = of_handling("mujoco", handling, Subject("car", "car.toml", ""), []).text
+    text = of_handling("mujoco", handling, ExportSubject("car", "car.toml", ""), []).text
     for tyre in handling.given.tyres:
         cornering = next(side.stiffness for side in handling.given.side_forces if side.name == tyre.name)
         site = f'<site name="tyre {tyre.name}" user="{tyre.stiffness} {tyre.damping} {cornering}"/>'

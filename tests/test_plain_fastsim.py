@@ -17,11 +17,11 @@ from models.contact.fastsim_derivatives import derivatives
 from models.contact.fields import fastsim_fields
 from models.contact.kernel_pointer import pointer
 from models.contact.linear_theory import coefficients, flexibilities
-from models.contact.material import STEEL, Falling, Material, Pair
+from models.contact.material import STEEL, Falling, Material, MaterialPair
 from validation.contact import plain_fastsim as plain
 
 pytestmark = pytest.mark.grounds("plain counterpart")
-PAIR = Pair(STEEL, Material(E=2.0e11, nu=0.29))
+PAIR = MaterialPair(STEEL, Material(E=2.0e11, nu=0.29))
 NAMES = ("a", "b", "load", "mu", "xi_x", "xi_y", "spin")
 PROGRAMS = [
     plain.Program(9, *each)
@@ -72,7 +72,7 @@ def test_coefficients(ratio, nu):
     computed = coefficients(ratio, nu)
     expected = plain.coefficients(ratio, nu)
     assert [computed.c11, computed.c22, computed.c23, computed.c33] == pytest.approx(expected, rel=1e-12)
-    pair = Pair(Material(E=2e11, nu=nu), Material(E=2e11, nu=nu))
+    pair = MaterialPair(Material(E=2e11, nu=nu), Material(E=2e11, nu=nu))
     assert flexibilities(5e-3, 5e-3 / ratio, pair) == pytest.approx(
         plain.flexibilities(5e-3, 5e-3 / ratio, pair.G, nu), rel=1e-12
     )

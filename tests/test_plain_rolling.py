@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.rolling_kernels import answer, factor, orthogonalise, substitute, sweep, turned
 from models.contact.rolling_operator import SlipOperator, gmres
 
@@ -72,7 +72,7 @@ def test_one_cell_sticks_or_slips():
 def test_a_sweep_takes_one_cell_after_the_other():
     """From the leading edge back, each with the slip that all others leave it then; cells outside stay."""
     draw, relaxation = np.random.default_rng(5), 0.7
-    operator = SlipOperator(5, 4, 1e-3, 1.5e-3, Pair())
+    operator = SlipOperator(5, 4, 1e-3, 1.5e-3, MaterialPair())
     rigid, bound = draw.normal(0.0, 1.0, (4, 5, 2)), draw.uniform(0.2, 3.0, (4, 5))
     bound[0, :2] = 0.0
     traction = draw.normal(0.0, 0.3, (4, 5, 2)) * (bound > 0.0)[..., None]

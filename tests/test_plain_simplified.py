@@ -13,7 +13,7 @@ from models.contact import kernel as k
 from models.contact.distance_kernels import least_of_row
 from models.contact.kernel_pointer import Pointer, pointer
 from models.contact.kernel_simplified import table
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import FineNet, covariances, drag, gather, push, slope_products
 from models.contact.simplified_theory import SimplifiedOptions, press, roll
@@ -21,7 +21,7 @@ from models.contact.undeformed_distance import from_arrays
 from validation.contact import plain_simplified as plain
 
 pytestmark = pytest.mark.grounds("plain counterpart")
-PAIR, MU, CELLS, APPROACH = Pair(), 0.3, 9, 6e-5
+PAIR, MU, CELLS, APPROACH = MaterialPair(), 0.3, 9, 6e-5
 X, Y = np.linspace(-0.028, 0.03, 59), np.linspace(-0.03, 0.026, 57)
 CLOSE = 1e-8
 """Of load and mu N: the approach is met to 1e-11, roots of splines to 1e-12."""

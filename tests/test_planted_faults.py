@@ -121,8 +121,8 @@ def test_a_late_read_or_a_held_stage_loses_three_orders():
 
 def test_a_fault_lives_only_while_its_model_works():
     watched = [
-        (exudyn.Clock, "advance"),
-        (exudyn.Clock, "reader"),
+        (exudyn.SignalClock, "advance"),
+        (exudyn.SignalClock, "reader"),
         (exudyn.ExudynModel, "_enforced"),
         (mujoco, "specification"),
         (mujoco, "_suspension"),

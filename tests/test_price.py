@@ -287,14 +287,14 @@ def test_no_interval_from_one_run():
 def test_a_job_takes_part_in_some_rounds():
     calls = []
     jobs = [lambda i=i: calls.append(i) for i in range(2)]
-    seconds = interleave(jobs, 15, 0.0, lasted=[1.0, 7.0], every=[1, 3])
+    seconds = interleave(jobs, 15, 0.0, lasted=[1.0, 7.0], round_interval=[1, 3])
     assert (calls.count(0), calls.count(1), seconds[1, 0]) == (15, 4, 7.0), "the run that has been is its first"
     assert np.flatnonzero(np.isfinite(seconds[0])).size == 15
     assert np.flatnonzero(np.isfinite(seconds[1])).tolist() == [0, 3, 6, 9, 12]
 
 
 def test_a_job_that_has_not_been_is_timed_in_its_first_round():
-    seconds = interleave([lambda: sum(range(100))], 8, 1e-5, every=[4])
+    seconds = interleave([lambda: sum(range(100))], 8, 1e-5, round_interval=[4])
     assert (seconds[0, [0, 4]] > 0.0).all(), "no run of no seconds, which would be the least"
 
 
@@ -334,7 +334,7 @@ def test_interval_of_a_paired_ratio_covers_it():
 
 def test_interleaving_runs_every_job_in_every_round():
     calls = []
-    seconds = interleave([lambda i=i: calls.append(i) for i in range(3)], rounds=20, least=0.0)
+    seconds = interleave([lambda i=i: calls.append(i) for i in range(3)], rounds=20, minimum_seconds=0.0)
     assert seconds.shape == (3, 20)
     assert (seconds >= 0).all()
     rounds = np.array(calls[-60:]).reshape(20, 3)

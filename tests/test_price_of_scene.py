@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import priced_scene
@@ -36,13 +36,13 @@ class Planted:
 
     def ladders(self):
         return [
-            Ladder("exudyn", "fourth", STEPS, 4),
-            Ladder("exudyn", "first", STEPS, 1, default=0.05),
-            Ladder("exudyn", "liar", STEPS, 2),
+            SettingLadder("exudyn", "fourth", STEPS, 4),
+            SettingLadder("exudyn", "first", STEPS, 1, default=0.05),
+            SettingLadder("exudyn", "liar", STEPS, 2),
         ]
 
     def reference(self):
-        return Ladder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
+        return SettingLadder("reference", "exact", tuple(5e-3 / 2**k for k in range(6)), 4)
 
     def second(self, last):
         return Setting("reference", "other", 1e-9, 0, adaptive=True)
@@ -61,7 +61,7 @@ class Planted:
             error = self.lies
         grown = 1.0 + self.growing * (times > 1.5)
         values = times**2 * np.sin(5 * times) + error * grown
-        return Answer(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
+        return PricedRun(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
 
     def lines(self, setting):
         return [setting.label()]
@@ -90,10 +90,10 @@ class AsGood(Planted):
     """One whose steps must be so short that they are those of the reference, which has the same error."""
 
     def ladders(self):
-        return [Ladder("exudyn", "fourth", STEPS[5:], 4)]
+        return [SettingLadder("exudyn", "fourth", STEPS[5:], 4)]
 
     def reference(self):
-        return Ladder("reference", "fourth", tuple(2 * STEPS[5] / 2**k for k in range(6)), 4)
+        return SettingLadder("reference", "fourth", tuple(2 * STEPS[5] / 2**k for k in range(6)), 4)
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def test_two_families_that_differ_are_no_truth():
 
 def test_values_between_rows_do_not_reach_across_a_kink():
     times = np.linspace(0.0, 1.0, 41)
-    kinked = Answer(times, np.abs(times - 0.5)[:, None] ** 3, {})
+    kinked = PricedRun(times, np.abs(times - 0.5)[:, None] ** 3, {})
     between = np.linspace(0.0, 1.0, 333)
     off = {
         cell: np.abs(values_at(kinked, between, cell)[:, 0] - np.abs(between - 0.5) ** 3).max() for cell in (0.0, 0.5)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from models.advice.price import Ladder, recommendation
+from models.advice.price import SettingLadder, recommendation
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import recommend
-from models.advice.price.search import Search, Tried
+from models.advice.price.search import Search, TriedSetting
 from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import truth
 from models.core.errors import InputError, RunFailed
@@ -32,7 +32,7 @@ class Torn(Whole):
     """One engine gives no answer at all."""
 
     def ladders(self):
-        return [*super().ladders(), Ladder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
+        return [*super().ladders(), SettingLadder("exudyn", "RK4", (0.1, 0.05), 4, default=0.1)]
 
     def solve(self, setting, duration):
         if setting.engine == "exudyn":
@@ -114,9 +114,9 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
 
 def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
     own = Whole()
-    quick = Tried(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
+    quick = TriedSetting(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
     search = Search(own, truth(own, LOOSE_TOLERANCE, own.whole), LOOSE_TOLERANCE, own.whole, [quick])
-    rough = Tried(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
+    rough = TriedSetting(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
     ladder = own.ladders()[2]
     assert not search._too_long(ladder, 0, rough)  # 8 s
     assert search._too_long(ladder, 2, rough)  # 24 s

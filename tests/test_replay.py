@@ -7,7 +7,7 @@ import pytest
 
 from validation.replay import __main__ as replay
 from validation.replay.answers import CommandAnswer, answer, difference, load, save
-from validation.replay.jobs import Job, jobs
+from validation.replay.jobs import ReplayJob, jobs
 
 COMMAND = """#!{python}
 import json, sys
@@ -96,7 +96,7 @@ def test_a_bound_is_of_the_largest_number_and_of_every_number():
 
 
 def test_what_a_machine_decides_is_no_part_of_an_answer(tmp_path):
-    now = answer(Job("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
+    now = answer(ReplayJob("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
     assert now.message == "a plan, made in SECONDS\n" and now.codes == [0, 0]
     assert set(now.arrays) == {"out/path.csv: time [s]", "out/path.csv: x [m]", ": 1/scene", ": 1/answer/largest x [m]"}
 

@@ -6,14 +6,14 @@ import pytest
 from models.contact import rolling_problem
 from models.contact.half_space import influence
 from models.contact.linear_theory import coefficients
-from models.contact.material import STEEL, Material, Pair
-from models.contact.normal_problem import Pressed, centres, hertzian, solve_normal
+from models.contact.material import STEEL, Material, MaterialPair
+from models.contact.normal_problem import PressureGrid, centres, hertzian, solve_normal
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
 from models.core.errors import InputError, RunFailed
 from validation.cases.contact_exact import CASES, carter, measure, roll
 
-PAIR, LOAD, A, B, MU = Pair(), 8e4, 6e-3, 4e-3, 0.3
+PAIR, LOAD, A, B, MU = MaterialPair(), 8e4, 6e-3, 4e-3, 0.3
 PRESSED = hertzian(A, B, LOAD, 16)
 SCALE = MU * LOAD / (PAIR.G * A * B)
 
@@ -80,7 +80,7 @@ def test_nothing_from_nothing():
     assert still.stick[PRESSED.contact].all()
     smooth = solve_rolling(PRESSED, 0.0, 0.01, 0.0, 0.0, PAIR)
     assert smooth.fx == 0.0
-    apart = Pressed(np.zeros((5, 5)), centres(5, 1e-3), centres(5, 1e-3))
+    apart = PressureGrid(np.zeros((5, 5)), centres(5, 1e-3), centres(5, 1e-3))
     assert solve_rolling(apart, MU, 0.01, 0.0, 0.0, PAIR).fx == 0.0
 
 
@@ -98,9 +98,12 @@ def test_next_to_no_friction_turns_with_the_slip(part):
     [
         (lambda: solve_rolling(PRESSED, MU, [1e-3, 2e-3], 0.0, 0.0, PAIR), r"xi_x = .*one number, not an array"),
         (lambda: solve_rolling(PRESSED, MU, 0.0, 0.0, 1e12, PAIR), r"spin = 1000000000000.0: must be a spin in 1/m"),
-        (lambda: Pressed(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)), r"pressure = \[5, 4\]: .*\(4, 5\)"),
-        (lambda: Pressed(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
-        (lambda: Pressed(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
+        (
+            lambda: PressureGrid(np.zeros((5, 4)), centres(5, 1e-3), centres(4, 1e-3)),
+            r"pressure = \[5, 4\]: .*\(4, 5\)",
+        ),
+        (lambda: PressureGrid(np.zeros((4, 5)), centres(5, 1e-3)[::-1], centres(4, 1e-3)), r"x: must ascend"),
+        (lambda: PressureGrid(np.full((4, 5), -1.0), centres(5, 1e-3), centres(4, 1e-3)), r"pressure\[0, 0\] = -1.0"),
     ],
 )
 def test_wrong_input_is_named(wrong, words):
@@ -112,7 +115,7 @@ def test_size_and_stiffness_do_not_matter():
     """Forces by mu N depend on creepage by mu N / (G ab) alone."""
     found = solve_rolling(PRESSED, MU, 0.2 * SCALE, 0.0, 0.1 * SCALE / A, PAIR)
     soft = Material(E=7e10, nu=STEEL.nu)
-    pair, load, mu, size = Pair(soft, soft), 10.0, 0.05, 1e-2
+    pair, load, mu, size = MaterialPair(soft, soft), 10.0, 0.05, 1e-2
     scale = mu * load / (pair.G * A * B * size**2)
     other = solve_rolling(hertzian(size * A, size * B, load, 16), mu, 0.2 * scale, 0.0, 0.1 * scale / (size * A), pair)
     assert other.fx / (mu * load) == pytest.approx(found.fx / (MU * LOAD), rel=1e-6)
@@ -122,7 +125,7 @@ def test_size_and_stiffness_do_not_matter():
 def test_empty_cells_around_do_not_matter():
     """The same pressure in a larger grid, off its middle; moments are taken about the origin of x and y."""
     x, y = PRESSED.x[0] + PRESSED.dx * np.arange(-3, 20), PRESSED.y[0] + PRESSED.dy * np.arange(-1, 18)
-    wide = Pressed(np.pad(PRESSED.pressure, ((1, 2), (3, 4))), x, y)
+    wide = PressureGrid(np.pad(PRESSED.pressure, ((1, 2), (3, 4))), x, y)
     motion = (0.1 * SCALE, 0.0, 0.2 * SCALE / A)
     one, other = (solve_rolling(grid, MU, *motion, PAIR) for grid in (PRESSED, wide))
     assert (other.fx, other.fy, other.mz) == pytest.approx((one.fx, one.fy, one.mz), rel=1e-12)
@@ -171,7 +174,7 @@ def test_carter_s_own_limits():
         ((0.3, np.nan, 0.0, 0.0, PAIR), "xi_x"),
         ((0.3, 0.0, np.inf, 0.0, PAIR), "xi_y"),
         ((0.3, 0.0, 0.0, np.nan, PAIR), "spin"),
-        ((0.3, 0.0, 0.0, 0.0, Pair(STEEL, Material(E=3e9, nu=0.4))), "pair"),
+        ((0.3, 0.0, 0.0, 0.0, MaterialPair(STEEL, Material(E=3e9, nu=0.4))), "pair"),
     ],
 )
 def test_bad_input_is_refused(arguments, place):

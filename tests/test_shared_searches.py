@@ -8,16 +8,16 @@ import pytest
 
 from models.advice.choice.choose import Choice, Chooser
 from models.advice.choice.variants import Variants
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SettingChoice, _valid_over_run, recommend
-from models.advice.price.search import Search, Tried
-from models.advice.price.truth import Truth, truth
+from models.advice.price.search import Search, TriedSetting
+from models.advice.price.truth import ReferenceTruth, truth
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 from models.ensemble.workers import processes
 from models.identification.fit import fit
-from models.identification.problem import FAILED, Clock, Parameter, Problem, measured_channel
+from models.identification.problem import FAILED, FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import uncertainty
 from models.rail.equations import Equations
 from models.rail.limit_cycle import beginning, branch, refined
@@ -64,7 +64,7 @@ def bent(values):
 
 def bent_problem():
     times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
-    clock = Clock(times)
+    clock = FitClock(times)
     values = np.exp(-2.0 * times) + 0.3 * times + 0.02 * random.standard_normal(200)
     parameters = [Parameter("a", 0.7), Parameter("b", -1.0, high=-0.1), Parameter("c", 0.1)]
     return Problem(bent, parameters, [measured_channel("y", "-", (times, values), clock)], clock)
@@ -152,10 +152,10 @@ class Planted:
     first: float = 1.0
 
     def ladders(self):
-        return [Ladder("exudyn", "second", STEPS, 2), Ladder("exudyn", "first", STEPS, 1, default=0.05)]
+        return [SettingLadder("exudyn", "second", STEPS, 2), SettingLadder("exudyn", "first", STEPS, 1, default=0.05)]
 
     def reference(self):
-        return Ladder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
+        return SettingLadder("reference", "fine", tuple(2e-2 / 2**k for k in range(9)), 4)
 
     def second(self, last):
         return None
@@ -170,13 +170,13 @@ class Planted:
         times = np.linspace(0.0, duration, round(duration / setting.value) + 1)
         size = {"second": 40.0, "first": 1.0, "fine": 1e4}[setting.method]
         values = times**2 * np.sin(5 * times) + size * setting.value**setting.order * (1.0 + 5.0 * (times > 1.5))
-        return Answer(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
+        return PricedRun(times, values[:, None], {"steps": len(times) - 1, "force calls": 4 * (len(times) - 1)})
 
     def lines(self, setting):
         return [setting.label()]
 
 
-def same(alone: Truth, shared: Truth):
+def same(alone: ReferenceTruth, shared: ReferenceTruth):
     keys = ("uncertainty", "how", "rung", "broken")
     equal = np.array_equal(alone.answer.values, shared.answer.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
@@ -188,7 +188,7 @@ def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
     assert same(alone, shared) and alone.rung > 0
     over, blocks = Search(Planted(), alone, 1e-2, 2.0), []
     for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
-        tried = Tried(ladder.setting(i), "ok", seconds=0.5, calls=10)
+        tried = TriedSetting(ladder.setting(i), "ok", seconds=0.5, calls=10)
         blocks.append((ladder, SettingChoice(tried, 0.0, 10, 0.5, False, (0.4, 0.5, 0.6))))
     here, there = (block_results(partial(_valid_over_run, over), blocks, executor) for executor in (None, pool))
     assert here == there and all(each.choice.confirmed and each.choice.error < 1e-2 for each in here)

@@ -8,7 +8,7 @@ import pytest
 
 from models.contact.half_space import Z, influence
 from models.contact.hertz import by_load
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.patches import separate
 from models.contact.simplified_kernels import FineNet, displacement, drag, march, step_on
 from models.contact.simplified_theory import PAPER, SimplifiedOptions, press, roll
@@ -17,7 +17,7 @@ from models.core.errors import InputError
 from validation.cases.contact_simplified import largest_jump
 from validation.contact.contact_shapes import Shape, exact_normal
 
-PAIR = Pair()
+PAIR = MaterialPair()
 A = 1.0 / 0.92
 A0, B = 6e-3, 3e-3
 """Semi-axes of an ellipse (m)."""

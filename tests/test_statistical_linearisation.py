@@ -161,7 +161,7 @@ def test_copies_of_a_linear_vehicle_have_its_covariance():
 def test_engines_agree_where_springs_are_bent():
     vehicle, excitation_ = ride(NONLINEAR, 4.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    one, other = (ridden(engine, vehicle, road, 0.3, seed=5, every=20) for engine in ("exudyn", "mujoco"))
+    one, other = (ridden(engine, vehicle, road, 0.3, seed=5, stride=20) for engine in ("exudyn", "mujoco"))
     assert np.abs(one.run.positions - other.run.positions).max() < 1e-13
     assert np.abs(one.run.rates - other.run.rates).max() < 1e-12
     # the strut is all that pulls at the body: its output would be -m a, and is not read by a gain

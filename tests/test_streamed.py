@@ -8,7 +8,7 @@ import pytest
 from models.core.noise import normal
 from models.ensemble.runner import Blocks, each_block
 from models.ensemble.statistics import FAN, deviation, percentiles, quantile
-from models.ensemble.streamed import ACCURACY, Covariance, Moments, Spread, Tally
+from models.ensemble.streamed import ACCURACY, Moments, Spread, StreamedCovariance, Tally
 
 VALUES = normal(11, 0, 3000 * 4, 1).reshape(1000, 3, 4) * [1.0, 1e3, 1e-6, 1.0] + [0.0, 5e3, 1.0, 1e4]
 
@@ -23,7 +23,7 @@ def streamed(kind, values, cuts):
 @pytest.mark.parametrize("cuts", [[], [1, 10, 700], list(range(50, 1000, 50))], ids=len)
 def test_moments_and_covariances_are_those_of_all_values(cuts):
     """To rounding of sums about a mean that lies up to 1e6 deviations away: 1e6 eps of a deviation, 1e-10."""
-    moments, both = (streamed(kind, VALUES, cuts) for kind in (Moments, Covariance))
+    moments, both = (streamed(kind, VALUES, cuts) for kind in (Moments, StreamedCovariance))
     for place in np.ndindex(3, 4):
         assert moments.deviation(*place) == pytest.approx(deviation(VALUES[:, *place]), rel=1e-9)
     for row in range(3):

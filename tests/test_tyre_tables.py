@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.tyre.magic_formula import PACEJKA, SURFACES, Burckhardt, Curve, by_similarity, factors, graded, surface
+from models.tyre.magic_formula import (
+    PACEJKA,
+    SURFACES,
+    Burckhardt,
+    MagicFormulaCurve,
+    by_similarity,
+    factors,
+    graded,
+    surface,
+)
 from models.tyre.tyre_source import named
 from models.tyre.tyre_table import Cells, TyreTable, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
 
@@ -80,7 +89,7 @@ def test_both_formulas_as_their_books_write_them():
     k = np.array([0.0, 0.01, 0.07, 0.3, 0.9, 1.7])
     D, B, C, E = 0.935, 8.86, 1.19, -1.21
     bracket = (1.0 - E) * B * k + E * np.arctan(B * k)
-    assert Curve(D, B, C, E)(k) == pytest.approx(D * np.sin(C * np.arctan(bracket)), rel=1e-13)
+    assert MagicFormulaCurve(D, B, C, E)(k) == pytest.approx(D * np.sin(C * np.arctan(bracket)), rel=1e-13)
     least = np.array([0.0, 0.01, 0.07, 0.3, 0.9, 1.0])
     wanted = 0.857 * (1.0 - np.exp(-33.822 * least)) - 0.347 * least
     assert Burckhardt(0.857, 33.822, 0.347)(k) == pytest.approx(wanted, rel=1e-13)

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.profile_files import read_profile
-from models.contact.profiles import Profile, profile
+from models.contact.profiles import ContactProfile, profile
 from models.contact.simplified_theory import press
 from models.contact.standard_profiles import built_in, s1002, s1002_height, uic60
 from models.contact.wheel_on_rail import Track, Wheelset, rail_in_track, wheel_on_rail
@@ -62,13 +62,13 @@ def test_gauge_is_where_it_is_measured():
 def cone(radius):
     """A rail with a round head of this radius (m), symmetric."""
     y = np.linspace(-0.034, 0.034, 2001)
-    return Profile(y, radius - np.sqrt(radius**2 - y**2))
+    return ContactProfile(y, radius - np.sqrt(radius**2 - y**2))
 
 
 def coned_wheel(slope):
     """A wheel with a conical tread, no flange."""
     y = np.linspace(-0.07, 0.06, 2001)
-    return Profile(y, -slope * y)
+    return ContactProfile(y, -slope * y)
 
 
 @pytest.mark.grounds("closed form")
@@ -110,7 +110,7 @@ def test_contact_jumps_at_5_mm_and_the_flange_touches_from_6_5_mm():
 
 def test_patches_share_the_vertical_load():
     touches = wheel_on_rail(s1002(), uic60())
-    found = press([touch.patch for touch in touches], Pair(), load=1e4)
+    found = press([touch.patch for touch in touches], MaterialPair(), load=1e4)
     assert len(found.patches) == 2
     assert sum(part.load * math.cos(part.patch.lean) for part in found.patches) == pytest.approx(1e4, rel=1e-9)
 
@@ -119,7 +119,7 @@ def test_patches_share_the_vertical_load():
 def test_a_patch_that_only_just_touches_settles(load):
     """Beside one that carries hundreds of times as much, where one way of solving alone is caught in kinks."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=4e-3, yaw=0.03, track=Track(inclination=0.0))
-    found = press([touch.patch for touch in touches], Pair(), load=load)
+    found = press([touch.patch for touch in touches], MaterialPair(), load=load)
     assert found.load == pytest.approx(load, rel=1e-9) and found.patches[0].load > 50 * sum(
         part.load for part in found.patches[1:]
     )
@@ -225,7 +225,7 @@ BAD_PLACES = {
     "gauge": (lambda: wheel_on_rail(s1002(), uic60(), track=Track(gauge=1.0)), "lateral_shift"),
     "wheelset": (lambda: wheel_on_rail(s1002(), uic60(), wheelset=Wheelset(back_to_back=1.0)), "lateral_shift"),
     "shallow rail": (
-        lambda: rail_in_track(Profile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
+        lambda: rail_in_track(ContactProfile(np.linspace(-0.02, 0.02, 50), np.linspace(-0.02, 0.02, 50) ** 2), Track()),
         "the gauge is measured at 0.014 m",
     ),
 }

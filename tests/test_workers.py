@@ -13,7 +13,7 @@ from models.core.errors import InputError
 from models.ensemble.runner import Blocks, in_order, run_paths
 from models.ensemble.workers import Crew, processes
 from models.identification.fit import fit
-from models.identification.problem import Clock, Parameter, Problem, measured_channel
+from models.identification.problem import FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import profile, uncertainty
 from models.systems.braking.stops import Stops
 from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
@@ -55,7 +55,7 @@ def straight(values):
 
 def test_profiles_of_a_fit_are_the_same_by_two_workers(pool):
     times, random = np.linspace(0.0, 1.0, 200), np.random.default_rng(5)
-    clock = Clock(times)
+    clock = FitClock(times)
     channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(200)), clock)
     known = uncertainty(fit(Problem(straight, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
     shared = list(in_order(partial(profile, known), iter([0, 1]), pool))

@@ -105,15 +105,15 @@ def _check_how(scene: Any, how: Mapping[str, Any], options: Mapping[str, Any]) -
         raise InputError(scene.file, option, how[option], f"is not among {table}", tuple(getattr(scene, table)))
 
 
-def _engines(scene: Any, asked: str, optional: bool) -> tuple[str, tuple[str, ...]]:
+def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
     """The engine of a run, "" where the system chooses it, and those for which the scene is checked."""
     from studies.command.asked import engines_of
 
-    named = asked or getattr(getattr(scene, "run", None), "engine", None) or None
+    named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
     engines = engines_of(named, scene.system, "engine")
-    if asked and len(engines) != 1:
+    if requested_engine and len(engines) != 1:
         allowed = "a result is of one engine: run each, and lay two beside each other with twinrig.compare"
-        raise InputError("engine", "", asked, allowed, engines)
+        raise InputError("engine", "", requested_engine, allowed, engines)
     if len(engines) == 1:
         return engines[0], engines
     if optional or not engines:
@@ -299,8 +299,8 @@ def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
     return Report(tuple(printed.getvalue().splitlines()), {"folder": str(kept), "results": values}, failed)
 
 
-def _new_folder(wanted: str | Path | None, name: str) -> Path:
+def _new_folder(requested_folder: str | Path | None, name: str) -> Path:
     from models.core.result_folders import new_folder
 
     with _as_library(out="folder"):
-        return new_folder(None if wanted is None else Path(wanted), name)
+        return new_folder(None if requested_folder is None else Path(requested_folder), name)

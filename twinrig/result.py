@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core import result as saved
-from models.core.assumptions import Broken, assumed_of, broken_of
+from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
 from models.core.discretisation import Estimate, errors_of
 from models.core.errors import InputError
 from models.core.told import lines, remarks
@@ -45,7 +45,7 @@ class Result(saved.Result):
         return errors_of(self)
 
     @property
-    def broken(self) -> list[Broken]:
+    def broken(self) -> list[BrokenAssumption]:
         """Assumptions that the run broke, each with where, how long, how far, and the remedy."""
         return broken_of(self)
 

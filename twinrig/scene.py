@@ -81,10 +81,10 @@ def plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _dotted_values(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def _dotted_values(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys with their values."""
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
-            yield from _dotted_values(value, f"{before}{key}.")
+            yield from _dotted_values(value, f"{prefix}{key}.")
         else:
-            yield f"{before}{key}", value
+            yield f"{prefix}{key}", value

@@ -25,7 +25,7 @@ from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common import checks
 from validation.common.rows import Independence, Observed, Row, System, behaves, not_run
 from validation.common.scenes import VEHICLES, force_scene, road_scene
-from validation.hard_cases.case import Outcome, judge
+from validation.hard_cases.case import CaseOutcome, judge
 from validation.run import save, say
 
 SYSTEM: System = "pitch-plane"
@@ -291,7 +291,7 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
                 if isinstance(error, KeyError) and error.args[0] in built_in:
                     yield not_run(id, SYSTEM, quantity, "is about the engines and integrators that come with twinrig")
                     continue
-                outcome = Outcome("SILENT", float("inf"), f"{type(error).__name__}: {error}")
+                outcome = CaseOutcome("SILENT", float("inf"), f"{type(error).__name__}: {error}")
             good = outcome.word != "SILENT"
             yield behaves(
                 id,

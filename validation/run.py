@@ -134,7 +134,7 @@ def validate(
     folder: Path,
     quick: bool,
     command: str,
-    earlier: Saved | None = None,
+    earlier_report: Saved | None = None,
     resumed: bool = False,
     crew: Crew | None = None,
 ) -> int:
@@ -155,7 +155,7 @@ def validate(
             folder,
             rows,
             {**source, "seeds": _value_from_pool(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
-            earlier,
+            earlier_report,
         )
         path = _write_report(pool, folder)
     return say(rows, time.perf_counter() - start, path)
@@ -171,7 +171,8 @@ def _data() -> str:
 
 
 def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
-    """Rows and seconds of every case: first of those that may share the machine, then of the others."""
+    """Rows and computing time of every case; cases that may run in parallel come first, then those that need the
+    machine alone."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -221,12 +222,12 @@ def seeds() -> dict[str, int]:
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
-def save(folder: Path, rows: list[Row], source: Saved, earlier: Saved | None = None) -> None:
+def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | None = None) -> None:
     """results.json and results.csv; what changed since an earlier report is printed first."""
     table = [row.as_dict() for row in rows]
     content: Saved = {"provenance": source, "rows": table}
-    if earlier is not None:
-        content["against"] = against(earlier, table, source)
+    if earlier_report is not None:
+        content["against"] = against(earlier_report, table, source)
         print("\n".join(lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
     with whole_file(folder / "results.csv") as part, part.open("w", newline="") as file:

@@ -1,4 +1,4 @@
-"""What accuracy costs in a user's own model: which engine, integrator and step hold a coordinate to a tolerance.
+"""Cost of accuracy for a user's model: which engine, integrator and step keep a coordinate within a tolerance.
 
 The search is that of ``models.advice.price``. Exudyn marches the description, MuJoCo the file's own model, so that what
 its integrators do with joint damping is what the user would have. Coordinates are those of hinges, slides and the
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.meshed import chosen
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, recommend
@@ -72,10 +72,10 @@ class PricedModel:
         """What the run is."""
         return "from the random state of the paths; MuJoCo marches the file's own model, Exudyn the description"
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """Every method; MuJoCo's default step is the file's."""
         return [
-            Ladder(engine, method, STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method))
+            SettingLadder(engine, method, STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method))
             for engine, methods in METHODS.items()
             for method in methods
         ]
@@ -88,13 +88,13 @@ class PricedModel:
         wanted = defaults.get((engine, method), 0.0)
         return min(STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """MuJoCo's RK4, which is the fastest, with halved steps."""
-        return Ladder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
+        return SettingLadder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """A Runge-Kutta method of order 8 about the plain equations."""
-        return Setting("reference", REFERENCE_METHOD, last.value, 0)
+        return Setting("reference", REFERENCE_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
@@ -141,10 +141,10 @@ class PricedModel:
         states: np.ndarray = done.sol(times).T
         return states[:, self.columns]
 
-    def answer(self, solution: Any) -> Answer:
+    def answer(self, solution: Any) -> PricedRun:
         """The quantity with the force calls that it took."""
         times, values, calls = solution
-        return Answer(times, values, {"force calls": calls})
+        return PricedRun(times, values, {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
         """The setting as an engine is told it."""
@@ -175,7 +175,7 @@ def named_coordinates(twin: TwinModel) -> dict[str, int]:
 
 
 def _bare(name: str) -> str:
-    """A joint's name without what it is, as a user types it."""
+    """Name of a joint without its type, as a user types it."""
     return name.removeprefix("joint ").replace("'", "")
 
 

@@ -106,18 +106,18 @@ class RollingBicycle:
         return g * mass - front, front
 
 
-def _table(of: RollingBicycle) -> np.ndarray:
+def _table(bicycle: RollingBicycle) -> np.ndarray:
     """All numbers that the compiled forces read."""
-    c, patch, rows = of.control, net(of.tyre.cells), joints(of.vehicle)
-    counts = [len(body.freedoms) for body in of.vehicle.bodies for _ in body.freedoms]
+    c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
+    counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
-    places = {body.name: body.position for body in of.vehicle.bodies}
+    places = {body.name: body.position for body in bicycle.vehicle.bodies}
     points = [
         [joint, *np.subtract(places[wheel], places[below])]
         for joint, wheel, below in ((PITCH, "rear wheel", "frame"), (STEER, "front wheel", "steering"))
     ]
     control = [c.torque_gain * c.gain, c.until, c.friction, c.dry_friction, c.dry_rate, c.speed_gain, c.speed_bias]
-    sections = [np.column_stack([rows, counts]), points, _tyres(of), control, patch.cells, patch.strips]
+    sections = [np.column_stack([rows, counts]), points, _tyres(bicycle), control, patch.cells, patch.strips]
     flat = [np.asarray(section, float).ravel() for section in sections]
     ends = forces.HEADER + np.cumsum([section.size for section in flat])
     head = np.zeros(forces.HEADER)
@@ -127,19 +127,22 @@ def _table(of: RollingBicycle) -> np.ndarray:
     return np.concatenate([head, *flat])
 
 
-def _tyres(of: RollingBicycle) -> np.ndarray:
+def _tyres(bicycle: RollingBicycle) -> np.ndarray:
     """(2, PER_TYRE): numbers of both tyres, columns as of a car's, which names more of them."""
-    t, table = of.tyre, np.zeros((WHEELS, forces.PER_TYRE))
+    t, table = bicycle.tyre, np.zeros((WHEELS, forces.PER_TYRE))
     vertical, width = t.stiffness**2 * t.vertical, t.half_width / t.stiffness
-    wheels = (PITCH, REAR, "rear wheel", of.bicycle.rear_wheel), (STEER, FRONT, "front wheel", of.bicycle.front_wheel)
+    wheels = (
+        (PITCH, REAR, "rear wheel", bicycle.bicycle.rear_wheel),
+        (STEER, FRONT, "front wheel", bicycle.bicycle.front_wheel),
+    )
     for i, (joint, spin, name, wheel) in enumerate(wheels):
-        load = of.loads()[i]
+        load = bicycle.loads()[i]
         if not load > 0.0:
             raise InputError("", name, load, "carries no weight (N): it must press on the road at rest")
         bristles = t.stiffness * t.cornering * vertical / (shape_factor(t.cells) * wheel.radius * width)
         table[i, [forces.KNUCKLE, forces.ROTOR, forces.POINT, forces.STATIC]] = joint, spin, i, load
         table[i, [forces.RADIUS, forces.BRISTLES]] = wheel.radius, bristles
-    table[:, forces.HEIGHT] = [body.position[2] for body in of.vehicle.bodies if body.name.endswith("wheel")]
+    table[:, forces.HEIGHT] = [body.position[2] for body in bicycle.vehicle.bodies if body.name.endswith("wheel")]
     law = forces.VERTICAL, forces.VISCOUS, forces.HALF_WIDTH, forces.GRIP
     table[:, law] = vertical, t.stiffness * t.damping, width, t.friction
     return table

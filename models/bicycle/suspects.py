@@ -30,57 +30,60 @@ NO_WEAVE = -20.0 + 0.0j
 """Stands for a weave (1/s) that does not swing at all."""
 
 
-def predicted(bicycle: Whipple, control: Control, seen: Observation) -> np.ndarray:
+def predicted(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
     """(3,): real and imaginary part of the weave (1/s) and measured speed (m/s) of a model at a speed."""
-    weave = bicycle.weave(seen.speed, control.viscous(float(seen.slowness.mean())))
+    weave = bicycle.weave(observation.speed, control.viscous(float(observation.slowness.mean())))
     weave = weave if np.isfinite(weave) else NO_WEAVE
-    return np.array([weave.real, weave.imag, control.speed_gain * seen.speed + control.speed_bias])
+    return np.array([weave.real, weave.imag, control.speed_gain * observation.speed + control.speed_bias])
 
 
 def chosen(
-    bicycle: Whipple, base: Control, seen: Sequence[Observation], suspects: Sequence[str] = tuple(SUSPECTS)
+    bicycle: Whipple, base: Control, observations: Sequence[Observation], suspects: Sequence[str] = tuple(SUSPECTS)
 ) -> Choice:
     """Every subset of the suspects fitted and judged; InputError for fewer than two speeds, or a name that is none."""
     for name in suspects:
         if name not in SUSPECTS:
             raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTS))
-    if len(seen) < 2:
-        raise InputError("", "speeds", len(seen), "a choice of suspects needs two speeds or more")
-    sensor = _sensor_error(seen)
-    weights = [_whitener(observation, sensor) for observation in seen]
+    if len(observations) < 2:
+        raise InputError("", "speeds", len(observations), "a choice of suspects needs two speeds or more")
+    sensor = _sensor_error(observations)
+    weights = [_whitener(observation, sensor) for observation in observations]
 
     def left(values: dict[str, float]) -> np.ndarray:
         control = base.model_copy(update=values)
         return np.concatenate(
-            [w @ (o.mean - predicted(bicycle, control, o)) for w, o in zip(weights, seen, strict=True)]
+            [w @ (o.mean - predicted(bicycle, control, o)) for w, o in zip(weights, observations, strict=True)]
         )
 
     return chosen_of(left, {name: SUSPECTS[name] for name in suspects}, FRICTIONS)
 
 
-def forecast(bicycle: Whipple, base: Control, choice: Choice, seen: Observation) -> tuple[np.ndarray, np.ndarray]:
+def forecast(
+    bicycle: Whipple, base: Control, choice: Choice, observation: Observation
+) -> tuple[np.ndarray, np.ndarray]:
     """Damping and frequency (2,) that all subsets predict by their weights, and their standard deviations (2,)."""
-    return choice.forecast(lambda values: predicted(bicycle, base.model_copy(update=values), seen)[:2])
+    return choice.forecast(lambda values: predicted(bicycle, base.model_copy(update=values), observation)[:2])
 
 
-def deviations(bicycle: Whipple, base: Control, choice: Choice, seen: Observation) -> np.ndarray:
+def deviations(bicycle: Whipple, base: Control, choice: Choice, observation: Observation) -> np.ndarray:
     """(2,): forecast less measured damping and frequency in standard deviations, of windows and of the forecast."""
-    mean, deviation = forecast(bicycle, base, choice, seen)
-    return np.asarray((mean - seen.mean[:2]) / np.hypot(seen.deviation[:2], deviation))
+    mean, deviation = forecast(bicycle, base, choice, observation)
+    return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
-def _sensor_error(seen: Sequence[Observation]) -> float:
+def _sensor_error(observations: Sequence[Observation]) -> float:
     """Standard deviation (m/s) of the speed sensor's means about their line; 0 for two speeds, which tell none."""
-    if len(seen) < 3:
+    if len(observations) < 3:
         return 0.0
-    speeds, means = np.array([(o.speed, o.mean[2]) for o in seen]).T
+    speeds, means = np.array([(o.speed, o.mean[2]) for o in observations]).T
     left = means - np.polyval(np.polyfit(speeds, means, 1), speeds)
-    return float(np.sqrt(np.sum(left**2) / (len(seen) - 2)))
+    return float(np.sqrt(np.sum(left**2) / (len(observations) - 2)))
 
 
-def _whitener(seen: Observation, sensor: float) -> np.ndarray:
-    """(3, 3) that makes deviations into standard normal ones; the speed sensor errs by itself."""
+def _whitener(observation: Observation, sensor: float) -> np.ndarray:
+    """Matrix (3, 3) that turns deviations into independent standard normal ones; the error of the speed sensor is
+    independent."""
     covariance = np.zeros((3, 3))
-    covariance[:2, :2] = np.cov(seen.parts[:, :2].T)
-    covariance[2, 2] = seen.deviation[2] ** 2 / len(seen.weave) + sensor**2
+    covariance[:2, :2] = np.cov(observation.parts[:, :2].T)
+    covariance[2, 2] = observation.deviation[2] ** 2 / len(observation.weave) + sensor**2
     return np.linalg.inv(np.linalg.cholesky(covariance))

@@ -107,7 +107,7 @@ UNCONTROLLED = Control()
 """No control, no friction."""
 
 
-class Linear(NamedTuple):
+class LinearBicycle(NamedTuple):
     """Matrices (2, 2) of the linear equations: M (kg m^2), C1 (kg m), K0 (kg m), K2 (kg)."""
 
     M: np.ndarray
@@ -133,7 +133,7 @@ class Whipple(Strict):
         return read(Whipple, {name: getattr(self, name) for name in type(self).model_fields} | values, "", "bicycle")
 
     @cached_property
-    def linear(self) -> Linear:
+    def linear(self) -> LinearBicycle:
         """The matrices, by appendix A of the paper; InputError where the mass matrix is singular."""
         R, B, H, F, w = self.rear_wheel, self.body, self.front_frame, self.front_wheel, self.wheelbase
         sine, cosine = np.sin(self.tilt), np.cos(self.tilt)
@@ -166,7 +166,7 @@ class Whipple(Strict):
         )
         K0 = np.array([[mass * zT, -SA], [-SA, -SA * sine]])
         K2 = np.array([[0.0, (ST - mass * zT) * cosine / w], [0.0, (SA + SF * sine) * cosine / w]])
-        return Linear(M, C1, K0, K2)
+        return LinearBicycle(M, C1, K0, K2)
 
     def state_matrix(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
         """(4, 4): rates of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""

@@ -157,16 +157,16 @@ class Locks:
     longest: np.ndarray
 
 
-def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, above: float = 15.0 * KMH) -> Locks:
+def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, least_speed: float = 15.0 * KMH) -> Locks:
     """Locks above a speed (m/s): lengths (n,) of the samples in s, locked (n, W) whether a wheel stands, speeds (n,).
 
     UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
     """
-    counted = locked & (speeds > above)[:, None]
+    counted = locked & (speeds > least_speed)[:, None]
     longest, now = np.zeros(locked.shape[1]), np.zeros(locked.shape[1])
     for length, row in zip(lengths, counted, strict=True):
         now = np.where(row, now + length, 0.0)
         longest = np.maximum(longest, now)
     time = lengths @ counted
-    whole = float(lengths[speeds > above].sum())
+    whole = float(lengths[speeds > least_speed].sum())
     return Locks(time, time / whole if whole else time, longest)

@@ -61,7 +61,7 @@ def take_up(i, u, v, time, slope, lag, lagging):
 
 
 def longest_step(slope: float, lively: float, length: float) -> float:
-    """Step (s) above which a vehicle at rest rocks up on tyres of a relaxation length (m).
+    """Longest stable step (s) of a vehicle at rest on tyres with a relaxation length (m).
 
     slope : largest cornering coefficient (1/rad); lively : rate (m/s^2) at which side forces of slope 1 at 1 m/s damp
     its liveliest motion, g of a point mass. With w^2 = slope lively / length and c = 2 DAMPING w sqrt(lively / g), the

@@ -186,9 +186,9 @@ Moving = Callable[..., Iterator[tuple[int, float, float, float]]]
 """Function of commands, record, sample, braking, motion and all others of a ``Subject`` that begins its ``samples``."""
 
 
-def moved(go: Callable[..., Any]) -> Moving:
-    """``samples`` by one ``go``."""
-    march = _with(samples, some=_with(some_samples, go=go))
+def moved(step_function: Callable[..., Any]) -> Moving:
+    """``samples`` by one ``step_function``."""
+    march = _with(samples, some=_with(some_samples, go=step_function))
 
     def begun(commands, record, sample, braking, motion, *others):
         return march(Subject(commands, record, sample, braking, motion, others))
@@ -207,9 +207,9 @@ class CompiledSamples:
         return self.march(by_reference(commands, record, sample, braking, motion, others))
 
 
-def compiled(go: Callable[..., Any], name: str) -> CompiledSamples:
+def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
     """``moved`` by a compiled function, compiled."""
-    some = lean(named_closure(_with(some_samples, go=go), name))
+    some = lean(named_closure(_with(some_samples, go=step_function), name))
     return CompiledSamples(njit(cache=True, error_model="numpy")(named_closure(_with(samples, some=some), name)))
 
 

@@ -194,7 +194,7 @@ def _check_row(vehicle: SpatialVehicle) -> None:
 
 
 def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
-    """Bodies of a vehicle without those of what it tows."""
+    """The vehicle without the bodies that it tows."""
     return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 

@@ -207,7 +207,7 @@ def ended(q, units, fold):
 
 
 class OnEngine(NamedTuple):
-    """Data that a step of a vehicle on its suspension needs beside those of a step in the plane.
+    """Data that a step of a vehicle with suspension needs in addition to those of a step in the plane.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -237,7 +237,7 @@ def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> No
 
 
 def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """Move positions and rates (n,) on by its step; stands here for others, too."""
+    """Advance positions and rates (n,) by the engine's step; other engines replace this function."""
     q[:], v[:] = np.split(engine.march(q, v, 1, engine.step)[-1], 2)
     return True
 

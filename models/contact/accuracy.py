@@ -28,7 +28,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
-from models.contact.theories import Contact, Fastsim, Linear, Motion, OnEllipse, Rolled, Simplified
+from models.contact.theories import Fastsim, LinearTheory, Motion, OnEllipse, Rolled, RollingContact, Simplified
 
 SAFETY = 2.0
 """Factor on what step halving tells."""
@@ -81,10 +81,10 @@ class Error:
         return self.moment_cells + self.moment_theory
 
 
-def rolled(contact: Contact, motion: Motion, cells: int, *, fields: bool = False) -> tuple[Rolled, Error]:
+def rolled(contact: RollingContact, motion: Motion, cells: int, *, fields: bool = False) -> tuple[Rolled, Error]:
     """Forces and how far they are off."""
     fine = contact.roll(motion, cells, fields=fields)
-    if isinstance(contact, Linear):
+    if isinstance(contact, LinearTheory):
         force, moment = _of_linear(contact, motion, fine)
         return fine, Error(0.0, force, 0.0, moment)
     coarse = contact.roll(motion, coarser_cells(cells))
@@ -96,18 +96,18 @@ def rolled(contact: Contact, motion: Motion, cells: int, *, fields: bool = False
     return fine, Error(force, theory, moment, moment_theory, likely, turning)
 
 
-def remaining_errors(contact: Contact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
+def remaining_errors(contact: RollingContact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
     """Errors of force (N) and moment (N m) that the cells leave at most."""
     return _largest_errors(contact, cells, fine, contact.roll(motion, coarser_cells(cells)))
 
 
-def _by_friction(contact: Contact, *rolled: Rolled) -> list[Array]:
+def _by_friction(contact: RollingContact, *rolled: Rolled) -> list[Array]:
     """Forces divided by mu N, and moments divided by mu N times the lever, (3,) each."""
     limit = contact.friction * contact.pressing.load
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
 
-def _largest_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -116,7 +116,7 @@ def _largest_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) 
     return error, contact.lever * error
 
 
-def _likely_errors(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
+def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
     """Force and moment each by its own difference, LIKELY of it, with small shares of what two grids miss together."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
@@ -182,7 +182,7 @@ def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
     return np.minimum(1.0, 3.0 * np.divide(parts[2], whole, out=np.zeros_like(whole), where=whole > 0))
 
 
-def _of_theory(contact: Contact, motion: Motion, forces: Rolled) -> tuple[float, float]:
+def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple[float, float]:
     """Bands of force (N) and moment (N m) of the simplified theories; of the exact one there are none."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0 or not isinstance(contact, Fastsim | Simplified):

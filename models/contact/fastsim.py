@@ -45,7 +45,7 @@ from models.contact.inputs import (
     whole_number,
 )
 from models.contact.linear_theory import flexibilities as linear_flexibilities
-from models.contact.material import Falling, Pair
+from models.contact.material import Falling, MaterialPair
 from models.core.errors import InputError
 
 Flexibilities = Literal["blended", "one", "three"]
@@ -94,7 +94,7 @@ class Creep:
 
 def fastsim(
     ellipse: RollingEllipse,
-    pair: Pair,
+    material_pair: MaterialPair,
     *,
     cells: int = 21,
     bound: Bound = "intermediate",
@@ -106,7 +106,7 @@ def fastsim(
 
     Parameters
     ----------
-    pair : the two materials
+    material_pair : the two materials
     cells : in each strip; strips are as many, and more on an ellipse narrower than a/b = 1/2 (see ``fastsim_grid``)
     falling : friction that falls with the speed of slip; None for a constant one
 
@@ -115,7 +115,7 @@ def fastsim(
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
     check_choices(cells, bound, flexibilities, march, falling)
-    contacts, shape = contacts_of(ellipse, pair)
+    contacts, shape = contacts_of(ellipse, material_pair)
     forces = np.zeros(len(contacts), FORCES)
     for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
         marched, net_forces = (contacts[rows], *net.records, KINDS[flexibilities]), np.zeros(rows.size, FORCES)
@@ -143,7 +143,7 @@ class Ellipse:
     def __init__(
         self,
         ratio: float,
-        pair: Pair,
+        material_pair: MaterialPair,
         *,
         cells: int = 21,
         bound: Bound = "intermediate",
@@ -154,7 +154,7 @@ class Ellipse:
         self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
         size = 1e-3
-        flexible = linear_flexibilities(size, size / self.ratio, pair)
+        flexible = linear_flexibilities(size, size / self.ratio, material_pair)
         unit = (1.0 / self.ratio, *(float(value) / size for value in flexible))
         choices = self.net.middle, KINDS[flexibilities], MARCHES[march]
         self._fixed = unit, self.net.strips, self.net.cells, choices
@@ -171,7 +171,7 @@ class Ellipse:
         if not math.isfinite(forces[0] + forces[1] + forces[2]):
             for name, value in zip(("a", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
                 number(name, value, "finite")
-            contacts_of(RollingEllipse(a, a / self.ratio, load, mu, xi_x, xi_y, spin), Pair())
+            contacts_of(RollingEllipse(a, a / self.ratio, load, mu, xi_x, xi_y, spin), MaterialPair())
             raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
         return forces
 
@@ -190,13 +190,13 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
-def contacts_of(ellipse: RollingEllipse, pair: Pair) -> tuple[Array, tuple[int, ...]]:
+def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
     """CONTACT (n,) as the kernels read it, and the shape of what was given; those without load have axes of 0.1 m."""
     axis = "a semi-axis in m, zero or more"
     given = together(
         a=quantity("a", ellipse.a, axis, 0.0),
         b=quantity("b", ellipse.b, axis, 0.0),
-        load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
+        load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD),
         mu=quantity("mu", ellipse.mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
         **creepages(ellipse.xi_x, ellipse.xi_y, ellipse.spin),
     )
@@ -207,6 +207,8 @@ def contacts_of(ellipse: RollingEllipse, pair: Pair) -> tuple[Array, tuple[int, 
     for name in ("a", "b"):
         quantity(name, contacts[name][loaded], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
         contacts[name][~loaded] = 0.1
-    for name, value in zip(FLEXIBILITIES, linear_flexibilities(contacts["a"], contacts["b"], pair), strict=True):
+    for name, value in zip(
+        FLEXIBILITIES, linear_flexibilities(contacts["a"], contacts["b"], material_pair), strict=True
+    ):
         contacts[name] = value
     return contacts, given[0].shape

@@ -28,7 +28,7 @@ from models.contact.fastsim_many import (
 )
 from models.contact.fastsim_records import FORCES
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.machine.compiled import compiled
 
 
@@ -45,7 +45,7 @@ class Derivatives:
 
 def derivatives(
     ellipse: RollingEllipse,
-    pair: Pair,
+    material_pair: MaterialPair,
     *,
     cells: int = 21,
     bound: Bound = "intermediate",
@@ -60,7 +60,7 @@ def derivatives(
     load or friction all are zero.
     """
     check_choices(cells, bound, flexibilities, "second-order")
-    contacts, shape = contacts_of(ellipse, pair)
+    contacts, shape = contacts_of(ellipse, material_pair)
     forces, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
     for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
         net_forces, net_slopes = np.zeros(rows.size, FORCES), np.zeros((rows.size, 3, 3))

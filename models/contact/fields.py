@@ -9,7 +9,7 @@ from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_many import rigid_slip, strip_slip, strip_tractions
 from models.contact.fastsim_records import SLIP
 from models.contact.inputs import Array
-from models.contact.material import Falling, Pair
+from models.contact.material import Falling, MaterialPair
 from models.core.errors import InputError
 
 
@@ -34,7 +34,7 @@ class Fields:
 
 def fastsim_fields(
     ellipse: RollingEllipse,
-    pair: Pair,
+    material_pair: MaterialPair,
     *,
     cells: int = 21,
     bound: Bound = "intermediate",
@@ -48,7 +48,7 @@ def fastsim_fields(
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.
     """
     check_choices(cells, bound, flexibilities, march, falling)
-    contacts, shape = contacts_of(ellipse, pair)
+    contacts, shape = contacts_of(ellipse, material_pair)
     if shape:
         raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(shape), "must be plain numbers: one ellipse")
     contact = contacts[0]

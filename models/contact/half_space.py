@@ -13,19 +13,20 @@ import numpy as np
 from scipy import fft
 
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 
 X, Y, Z = 0, 1, 2
 """Indices of the axes in ``influence``."""
 
 
-def influence(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
+def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
     """Displacement difference (m) at a point by a unit traction (1 Pa) on a rectangle dx by dy (m).
 
     x, y : (...) coordinates of the point from the rectangle's centre (m), broadcast against each other.
     Returns (..., 3, 3): [i, j] is the displacement of body 1 relative to body 2 along i by a traction along j that acts
     on body 1 and with opposite sign on body 2; along z both are counted into their own body, so that pressure
-    and approach are positive. ``pair.mismatch`` (Kalker's K) couples z with x and y; it is zero for equal bodies.
+    and approach are positive. ``material_pair.mismatch`` (Kalker's K) couples z with x and y; it is zero for equal
+    bodies.
     """
     primitives = sum(
         sign_x * sign_y * _primitives(x + sign_x * dx / 2, y + sign_y * dy / 2)
@@ -33,14 +34,14 @@ def influence(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
         for sign_y in (1, -1)
     )
     x_part, y_part, cross, x_slope, y_slope = np.moveaxis(np.asarray(primitives), -1, 0)
-    nu, mismatch = pair.nu, pair.mismatch
+    nu, mismatch = material_pair.nu, material_pair.mismatch
     numbers = np.array(
         [
             [(1 - nu) * x_part + y_part, nu * cross, -mismatch * x_slope],
             [nu * cross, x_part + (1 - nu) * y_part, -mismatch * y_slope],
             [mismatch * x_slope, mismatch * y_slope, (1 - nu) * (x_part + y_part)],
         ]
-    ) / (np.pi * pair.G)
+    ) / (np.pi * material_pair.G)
     return np.moveaxis(numbers, (0, 1), (-2, -1))
 
 

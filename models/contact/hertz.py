@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, quantity, together
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.machine.compiled import njit
 
@@ -49,35 +49,37 @@ class Hertz:
     B: Array
 
 
-def by_load(A: Any, B: Any, load: Any, pair: Pair) -> Hertz:
+def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
     """Contact under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
     finite, magnitudes that are none in SI, or shapes that do not fit together.
     """
-    load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD)
+    load = quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", maximum=LARGEST_LOAD)
     A, B, load = together(**_curvatures(A, B), load=np.maximum(load, 0.0))
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
-    area = 1.5 * load * cosine / (math.pi * pair.modulus * np.maximum(A, B))  # l s^2
-    return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, pair)
+    area = 1.5 * load * cosine / (math.pi * material_pair.modulus * np.maximum(A, B))  # l s^2
+    return _contact(A, B, load, np.cbrt(area * ratio), ratio, cosine + sine, material_pair)
 
 
-def by_approach(A: Any, B: Any, approach: Any, pair: Pair) -> Hertz:
+def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
     """Contact of bodies brought nearer to each other by ``approach`` (m) from first touch; zero or less is a gap.
 
     Otherwise as ``by_load``.
     """
     allowed = f"an approach in m, at most {LARGEST_APPROACH:g}"
-    approach = np.maximum(quantity("approach", approach, allowed, most=LARGEST_APPROACH), 0.0)
+    approach = np.maximum(quantity("approach", approach, allowed, maximum=LARGEST_APPROACH), 0.0)
     A, B, approach = together(**_curvatures(A, B), approach=approach)
     ratio, cosine, sine = aspects(np.minimum(A, B) / np.maximum(A, B))
     short = np.sqrt(approach * cosine / (np.maximum(A, B) * (cosine + sine)))
-    load = 2.0 / 3.0 * math.pi * pair.modulus * approach * short / (ratio * (cosine + sine))
-    return _contact(A, B, load, short, ratio, cosine + sine, pair)
+    load = 2.0 / 3.0 * math.pi * material_pair.modulus * approach * short / (ratio * (cosine + sine))
+    return _contact(A, B, load, short, ratio, cosine + sine, material_pair)
 
 
-def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approach: float | None = None) -> Hertz:
+def by_axes(
+    a: float, b: float, material_pair: MaterialPair, *, load: float | None = None, approach: float | None = None
+) -> Hertz:
     """Contact of known semi-axes a, b (m), plain numbers, under a load (N) or at an approach (m), above 0.
 
     The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
@@ -93,17 +95,17 @@ def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approa
     cosine, sine = integrals(g)
     if approach is not None:
         approach = float(quantity("approach", approach, "an approach in m, above 0", LEAST_AXIS, LARGEST_APPROACH))
-        load = 2.0 / 3.0 * math.pi * a * b * approach * pair.modulus / (short * (cosine + sine))
+        load = 2.0 / 3.0 * math.pi * a * b * approach * material_pair.modulus / (short * (cosine + sine))
     load = float(quantity("load", load, "a load in N, above 0", LEAST_AXIS, LARGEST_LOAD))
-    curvature = 1.5 * load / (math.pi * a * b) * cosine / (pair.modulus * short)
+    curvature = 1.5 * load / (math.pi * a * b) * cosine / (material_pair.modulus * short)
     other = curvature * g * g * sine / cosine
-    return by_load(*((other, curvature) if a >= b else (curvature, other)), load, pair)
+    return by_load(*((other, curvature) if a >= b else (curvature, other)), load, material_pair)
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
     answer = {
-        name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)
+        name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
     }
     for name, value in answer.items():
@@ -125,14 +127,16 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     return answer
 
 
-def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, pair: Pair) -> Hertz:
+def _contact(
+    A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
+) -> Hertz:
     """The contact from its short axis; ``curvature_sum`` is K = B + D. Where it is zero, so is everything."""
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
     along = A <= B  # the long axis lies along the smaller curvature
     a, b = np.where(along, long, short), np.where(along, short, long)
-    fields = (a, b, p0, p0 * short * curvature_sum / pair.modulus, load, A, B)
+    fields = (a, b, p0, p0 * short * curvature_sum / material_pair.modulus, load, A, B)
     return Hertz(*(field[()] for field in fields))  # numbers from numbers
 
 

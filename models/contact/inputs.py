@@ -20,8 +20,8 @@ NEGLIGIBLE_BOUND = 1e-60
 """N: what friction holds below this is zero; the slip by its bound, squared, would be beyond all numbers."""
 
 
-def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> Array:
-    """``value`` as a floating-point array of any shape, every element finite and from ``least`` to ``most``.
+def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> Array:
+    """``value`` as a floating-point array of any shape, every element finite and from ``minimum`` to ``maximum``.
 
     Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
     numbers and masked elements are none, and nothing is guessed in their place.
@@ -33,7 +33,7 @@ def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: 
         numbers = np.asarray(raw, dtype=float)
     except (TypeError, ValueError):
         raise InputError("", name, value, f"must be a number or an array of numbers: {allowed}") from None
-    good = (numbers >= least) & (numbers <= most) & np.isfinite(numbers)
+    good = (numbers >= minimum) & (numbers <= maximum) & np.isfinite(numbers)
     if not good.all():
         first = np.unravel_index(int(np.argmin(good)), numbers.shape)
         place = f"{name}[{', '.join(map(str, first))}]" if first else name
@@ -41,18 +41,18 @@ def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: 
     return numbers
 
 
-def number(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> float:
+def number(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> float:
     """``quantity`` of a function that takes one number and no array."""
-    numbers = quantity(name, value, allowed, least, most)
+    numbers = quantity(name, value, allowed, minimum, maximum)
     if numbers.ndim:
         raise InputError("", name, value, f"must be one number, not an array: {allowed}")
     return float(numbers)
 
 
-def whole_number(name: str, value: Any, least: int, most: int) -> int:
-    """``value`` if it is a whole number from ``least`` to ``most``, else InputError."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise InputError("", name, value, f"must be a whole number from {least} to {most}")
+def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
+    """``value`` if it is a whole number from ``minimum`` to ``maximum``, else InputError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not minimum <= value <= maximum:
+        raise InputError("", name, value, f"must be a whole number from {minimum} to {maximum}")
     return int(value)
 
 

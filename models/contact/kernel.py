@@ -131,7 +131,7 @@ def _status(kind, values, numbers, any_shape):
 
 @compiled
 def _press(kind, values, out):
-    """Axes, approach and load by Hertz; whether the ellipse is one that the theories of rolling take."""
+    """Semi-axes, approach and load by Hertz, and whether the theories of rolling accept the ellipse."""
     x, y, elastic = values.shape_x, values.shape_y, values.G / (1.0 - values.nu)
     small, large = min(x, y), max(x, y)
     if kind in (BY_LOAD, BY_APPROACH):

@@ -54,7 +54,8 @@ def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
 
 @cache
 def _compiled() -> Any:
-    """A shell about ``contact``, whose machine code is kept on disk: compiled anew in each process, for it is short."""
+    """A short wrapper of ``contact``, compiled anew in each process; the machine code of ``contact`` itself is cached
+    on disk."""
 
     @cfunc(SIGNATURE, error_model="numpy")
     def twinrig_contact(kind, table, inputs, outputs):

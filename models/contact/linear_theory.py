@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array, quantity, together
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 
 STEPS = np.arange(1.0, 11.0) / 10.0
@@ -74,25 +74,25 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     return Coefficients(*(values[()] for values in answer))
 
 
-def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple[Array, Array, Array]:
+def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
     """Fx, Fy (N) and Mz (N m) on the wheel as long as nothing slips.
 
     a, b : semi-axes (m), zero where nothing touches; xi_x, xi_y : creepages (1); spin : 1/m; arrays of shapes that
     broadcast. Friction does not enter: the forces have no bound. Raises InputError, also for too unlike a pair.
     """
-    pair.require_likeness()
+    material_pair.require_likeness()
     a, b = _axes(a, b)
     spin = quantity("spin", spin, "a spin in 1/m")
     xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
     a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
     ratio = np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))  # 1 where nothing touches
-    c, area = coefficients(ratio, pair.nu), a * b
-    fy = -pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
-    mz = pair.G * (area**1.5 * c.c23 * xi_y - area**2 * c.c33 * spin)
-    return -pair.G * area * c.c11 * xi_x, fy, mz
+    c, area = coefficients(ratio, material_pair.nu), a * b
+    fy = -material_pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
+    mz = material_pair.G * (area**1.5 * c.c23 * xi_y - area**2 * c.c33 * spin)
+    return -material_pair.G * area * c.c11 * xi_x, fy, mz
 
 
-def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
+def flexibilities(a: Any, b: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
     """Flexibilities L1, L2, L3 (m^3/N) of the simplified theory for xi_x, xi_y and spin: displacement by traction.
 
     L1 = 8 a / (3 G C11), L2 = 8 a / (3 G C22), L3 = pi a sqrt(a/b) / (4 G C23) (Kalker 1982), and beyond a/b = 10.5
@@ -100,9 +100,9 @@ def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
     semi-axes (m) of shapes that broadcast; zero where nothing touches, and zero comes out. Raises InputError, also for
     too unlike a pair.
     """
-    pair.require_likeness()
+    material_pair.require_likeness()
     a, b = _axes(a, b)
-    answer = _flexible(a.flatten(), b.flatten(), pair.G, pair.nu).reshape(3, *a.shape)
+    answer = _flexible(a.flatten(), b.flatten(), material_pair.G, material_pair.nu).reshape(3, *a.shape)
     return answer[0][()], answer[1][()], answer[2][()]
 
 

@@ -42,7 +42,7 @@ STEEL = Material(E=2.1e11, nu=0.28)
 
 
 @dataclass(frozen=True)
-class Pair:
+class MaterialPair:
     """Two bodies in touch, ``wheel`` and ``rail``; a pair of equal materials has that material's constants."""
 
     wheel: Material = STEEL

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
 from models.contact.inputs import Array, number, quantity
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.core.errors import InputError, RunFailed
 
 TOLERANCE = 1e-9
@@ -28,7 +28,7 @@ UNEVEN = 4e-3
 
 
 @dataclass(frozen=True)
-class Pressed:
+class PressureGrid:
     """A pressure on a regular grid of cells.
 
     pressure : (ny, nx) in Pa, zero outside the contact. x, y : (nx,), (ny,) centres of the cells (m), evenly spaced.
@@ -80,7 +80,7 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class NormalSolution(Pressed):
+class NormalSolution(PressureGrid):
     """Solution of the normal problem.
 
     approach : rigid approach of the bodies from first touch at distance 0 (m).
@@ -104,7 +104,7 @@ AVERAGING_POINTS = 8
 """Points along each axis of a cell over which Hertz' pressure is averaged."""
 
 
-def hertzian(a: float, b: float, load: float, cells: int) -> Pressed:
+def hertzian(a: float, b: float, load: float, cells: int) -> PressureGrid:
     """Pressure of an ellipse with semi-axes a, b (m), the mean of each of ``cells`` x ``cells`` cells, scaled to the
     load (N).
     """
@@ -113,11 +113,17 @@ def hertzian(a: float, b: float, load: float, cells: int) -> Pressed:
         cells, AVERAGING_POINTS, cells, AVERAGING_POINTS
     )
     pressure, dx, dy = height.mean((1, 3)), 2 * a / cells, 2 * b / cells
-    return Pressed(pressure * load / (pressure.sum() * dx * dy), centres(cells, dx), centres(cells, dy))
+    return PressureGrid(pressure * load / (pressure.sum() * dx * dy), centres(cells, dx), centres(cells, dy))
 
 
 def solve_normal(
-    distance: Array, dx: float, dy: float, pair: Pair, *, load: float | None = None, approach: float | None = None
+    distance: Array,
+    dx: float,
+    dy: float,
+    material_pair: MaterialPair,
+    *,
+    load: float | None = None,
+    approach: float | None = None,
 ) -> NormalSolution:
     """Pressure and contact area of two bodies pressed together.
 
@@ -126,7 +132,7 @@ def solve_normal(
     distance : (ny, nx) undeformed distance (m) at the cells' centres; rows are y, columns x. Its zero is where the
         approach counts from. Several separate patches may lie in one grid.
     dx, dy : size of a cell (m)
-    pair : materials of the two bodies; a mismatch is neglected here (the tractions' effect on the pressure)
+    material_pair : materials of the two bodies; a mismatch is neglected here (the tractions' effect on the pressure)
     load : normal force (N), or
     approach : rigid approach (m); exactly one of the two
 
@@ -141,7 +147,7 @@ def solve_normal(
     if (load is not None and load <= 0) or (approach is not None and not np.any(distance < approach)):
         least = float(distance.min()) if approach is None else approach
         return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
-    kernel = influence(offsets(columns, dx), offsets(rows, dy)[:, None], dx, dy, pair)[..., Z, Z]
+    kernel = influence(offsets(columns, dx), offsets(rows, dy)[:, None], dx, dy, material_pair)[..., Z, Z]
     displace = Convolution(kernel[..., None, None])
     pressure, iterations = _conjugate_gradients(distance, displace, load, approach, dx * dy)
     contact = pressure > 0

@@ -120,7 +120,7 @@ def separate(distance: Distance) -> list[Patch]:
 
 
 def as_single_patch(distance: Distance) -> list[Patch]:
-    """The distance as one patch, whatever its valleys."""
+    """The undeformed distance treated as a single patch, even if it has several minima."""
     return [Patch(distance)]
 
 

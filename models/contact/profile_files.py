@@ -18,7 +18,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.profiles import Profile, profile
+from models.contact.profiles import ContactProfile, profile
 from models.core.errors import InputError, similar_file
 
 MM = 1e-3
@@ -36,7 +36,7 @@ OFF_TAPING = 5e-3
 """Largest |z| (m) of a wheel at y = 0: its radius is measured there."""
 
 
-def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> Profile:
+def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> ContactProfile:
     """The profile in a file, as the package has it (m, z down, flange or gauge corner at negative y).
 
     kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
@@ -60,7 +60,7 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
     return read
 
 
-def _check_taping(wheel: Profile, path: Path) -> None:
+def _check_taping(wheel: ContactProfile, path: Path) -> None:
     """Refuse a wheel whose y and z count from elsewhere, its flange's back or the axle."""
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
     if not abs(middle) <= OFF_TAPING:

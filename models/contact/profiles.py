@@ -27,7 +27,7 @@ TURNING = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class ContactProfile:
     """A profile as points.
 
     y, z : (n,) in m, y ascending. smoothing : wavelength (m) along the contour of which smoothing left half, 0 for
@@ -43,7 +43,7 @@ class Profile:
         """z(y), twice continuously differentiable."""
         return CubicSpline(self.y, self.z)
 
-    def turned(self, angle: float) -> "Profile":
+    def turned(self, angle: float) -> "ContactProfile":
         """The profile turned by an angle (rad), for a rail the inclination towards the middle of the track.
 
         The part that stays a curve over y is kept; z counts from its highest point again.
@@ -51,14 +51,14 @@ class Profile:
         y = self.y * np.cos(angle) + self.z * np.sin(angle)
         z = self.z * np.cos(angle) - self.y * np.sin(angle)
         keep = _ascending(y)
-        return Profile(y[keep], z[keep] - z[keep].min(), self.smoothing)
+        return ContactProfile(y[keep], z[keep] - z[keep].min(), self.smoothing)
 
 
-def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Profile:
+def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> ContactProfile:
     """A profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
-    smoothing : wavelength (m) of which half is left (see ``Profile``). Raises InputError for wrong shapes, values that
-    are not finite or not a profile's size in m, and a contour that does not run along y.
+    smoothing : wavelength (m) of which half is left (see ``ContactProfile``). Raises InputError for wrong shapes,
+    values that are not finite or not a profile's size in m, and a contour that does not run along y.
     """
     y, z = np.asarray(y, float), np.asarray(z, float)
     _check(y, z, smoothing, file)
@@ -71,7 +71,7 @@ def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Pr
     y, z = (_smoothed(length, values, even, smoothing) for values in (y, z))
     keep = _ascending(y)
     _check_rough(y, keep, file)
-    return Profile(y[keep], z[keep], smoothing)
+    return ContactProfile(y[keep], z[keep], smoothing)
 
 
 def _check(y: Array, z: Array, smoothing: float, file: object) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.contact.half_space import Convolution, Y, influence, offsets
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.rolling_kernels import factor, orthogonalise, substitute, turned
 from models.core.errors import RunFailed
 
@@ -29,11 +29,17 @@ class SlipOperator:
     """
 
     def __init__(
-        self, columns: int, rows: int, dx: float, dy: float, pair: Pair, weights: tuple[float, ...] = UPSTREAM
+        self,
+        columns: int,
+        rows: int,
+        dx: float,
+        dy: float,
+        material_pair: MaterialPair,
+        weights: tuple[float, ...] = UPSTREAM,
     ) -> None:
         x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
         ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
-        displacement = influence(ahead, y, dx, dy, pair)[..., : Y + 1, : Y + 1] * (pair.G / dx)
+        displacement = influence(ahead, y, dx, dy, material_pair)[..., : Y + 1, : Y + 1] * (material_pair.G / dx)
         parts = [weight * displacement[:, i : i + len(x)] for i, weight in enumerate(weights)]
         self.kernel = np.sum(parts, axis=0)
         self.rows, self.columns = rows, columns
@@ -64,25 +70,33 @@ class SlipOperator:
 Map = Callable[[Array], Array]
 
 
-def gmres(apply: Map, precondition: Map, wanted: Array, tolerance: float, most: int) -> Array:
-    """x with |apply(x) - wanted| <= tolerance |wanted|, vectors (n,); raises RunFailed after ``most`` products.
+def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: float, maximum_iterations: int) -> Array:
+    """x with |apply(x) - b| <= tolerance |b|, b the right-hand side (n,), by preconditioned GMRES.
+
+    Raises RunFailed after ``maximum_iterations`` products.
 
     GMRES (Saad and Schultz, 1986), preconditioned from the right. Its own loops instead of a library's, whose calls of
     threaded linear algebra on short vectors stall on busy cores.
     """
-    size = float(np.linalg.norm(wanted))
+    size = float(np.linalg.norm(right_hand_side))
     if size == 0.0:
-        return np.zeros_like(wanted)
-    basis, triangle, turns = np.empty((most + 1, wanted.size)), np.zeros((most, most)), np.empty((most, 2))
-    left = np.append(size, np.zeros(most))
-    basis[0] = wanted / size
-    for count in range(1, most + 1):
+        return np.zeros_like(right_hand_side)
+    basis, triangle, turns = (
+        np.empty((maximum_iterations + 1, right_hand_side.size)),
+        np.zeros((maximum_iterations, maximum_iterations)),
+        np.empty((maximum_iterations, 2)),
+    )
+    left = np.append(size, np.zeros(maximum_iterations))
+    basis[0] = right_hand_side / size
+    for count in range(1, maximum_iterations + 1):
         triangle[:count, count - 1] = turned(
             orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
         )
         if abs(left[count]) <= tolerance * size:
             return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
-    raise RunFailed("linear solver", f"residual {abs(left[most]) / size:.2g} after {most} products")
+    raise RunFailed(
+        "linear solver", f"residual {abs(left[maximum_iterations]) / size:.2g} after {maximum_iterations} products"
+    )
 
 
 class FreeSystem:
@@ -91,14 +105,14 @@ class FreeSystem:
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
 
-    def __init__(self, operator: SlipOperator, free: Array, stiff: Array) -> None:
+    def __init__(self, operator: SlipOperator, free_directions: Array, stiff: Array) -> None:
         """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
-        self.operator, self.free, self.stiff = operator, free, stiff[..., None]
+        self.operator, self.free, self.stiff = operator, free_directions, stiff[..., None]
         self.scale = 1.0 / (
             operator.own_slip.max() + self.stiff
         )  # a cell near the edge is many times stiffer than others
         self.factors = self._strips()
-        inside = np.any(free, axis=(2, 3))
+        inside = np.any(free_directions, axis=(2, 3))
         first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)
         self.spans = 2 * np.stack([first, np.where(inside.any(axis=1), last, first)], axis=1)
         factor(self.factors, self.spans)
@@ -115,11 +129,11 @@ class FreeSystem:
         system[:, index, :, index, :] += np.moveaxis((1.0 + stiff) * np.eye(2) - free, 1, 0)
         return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
 
-    def solve(self, wanted: Array, tolerance: float = INNER_TOLERANCE) -> Array:
+    def solve(self, right_hand_side: Array, tolerance: float = INNER_TOLERANCE) -> Array:
         """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
         # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
-        right = (self.scale * _times(self.free, _times(self.free, wanted))).ravel()
-        return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
+        right = (self.scale * _times(self.free, _times(self.free, right_hand_side))).ravel()
+        return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(right_hand_side.shape)
 
     def _apply(self, flat: Array) -> Array:
         change = flat.reshape(*self.scale.shape[:2], 2)

@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.contact.inputs import NEGLIGIBLE_BOUND, Array, creepages, number
-from models.contact.material import Pair
-from models.contact.normal_problem import Pressed
+from models.contact.material import MaterialPair
+from models.contact.normal_problem import PressureGrid
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import NO_SHIFT, UPSTREAM, FreeSystem, SlipOperator
 from models.core.errors import RunFailed
@@ -74,16 +74,18 @@ class RollingSolution:
     rounds: int
 
 
-def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair) -> RollingSolution:
+def solve_rolling(
+    normal_solution: PressureGrid, mu: float, xi_x: float, xi_y: float, spin: float, material_pair: MaterialPair
+) -> RollingSolution:
     """Tractions of steady rolling.
 
     Parameters
     ----------
-    pressed : pressure on its grid; a ``NormalSolution`` is one. Its x and y are the origin of spin and moment.
+    normal_solution : pressure on its grid; a ``NormalSolution`` is one. Its x and y are the origin of spin and moment.
     mu : coefficient of friction
     xi_x, xi_y : creepages
     spin : 1/m
-    pair : materials; too unlike ones are refused
+    material_pair : materials; too unlike ones are refused
 
     Raises
     ------
@@ -91,10 +93,12 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
     RunFailed : the conditions of stick and slip were not met to ``TOLERANCE``
     """
     motion = creepages(xi_x, xi_y, spin, number).values()
-    return _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, *motion), pair, UPSTREAM)
+    return _rubbed(normal_solution, mu, lambda x, y, length: rigid_slip(x, y, *motion), material_pair, UPSTREAM)
 
 
-def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: Pair) -> RollingSolution:
+def solve_shift(
+    normal_solution: PressureGrid, mu: float, shift_x: float, shift_y: float, material_pair: MaterialPair
+) -> RollingSolution:
     """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
 
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
@@ -104,30 +108,34 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
         number(name, value, "a shift in m, at most 0.1", -0.1, 0.1)
         for name, value in (("shift_x", shift_x), ("shift_y", shift_y))
     )
-    by_cell = _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, pair, NO_SHIFT)
-    return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
+    by_cell = _rubbed(
+        normal_solution, mu, lambda x, y, length: rigid_slip(x, y, way_x, way_y, 0.0) / length, material_pair, NO_SHIFT
+    )
+    return replace(by_cell, slip=by_cell.slip * normal_solution.dx, power=by_cell.power * normal_solution.dx)
 
 
-def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> RollingSolution:
+def _rubbed(
+    normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
+) -> RollingSolution:
     """Solution for a rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
-    pair.require_likeness()
-    shape = pressed.pressure.shape
+    material_pair.require_likeness()
+    shape = normal_solution.pressure.shape
     traction, slip = np.zeros((2, *shape, 2))
     stick = np.zeros(shape, bool)
-    if mu * pressed.load <= NEGLIGIBLE_BOUND:
+    if mu * normal_solution.load <= NEGLIGIBLE_BOUND:
         return RollingSolution(0.0, 0.0, 0.0, traction, slip, stick, 0.0, 0.0, 0)
-    contact = pressed.contact
+    contact = normal_solution.contact
     spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
     rows, columns = box = tuple(slice(span[0], span[-1] + 1) for span in spans)
-    bound = mu * pressed.pressure[box] / pair.G
-    cells = _Cells(pressed.x[columns], pressed.y[rows], pressed.dx, pressed.dy, bound)
-    state, rounds = _solve(cells, rigid, pair, weights)
+    bound = mu * normal_solution.pressure[box] / material_pair.G
+    cells = _Cells(normal_solution.x[columns], normal_solution.y[rows], normal_solution.dx, normal_solution.dy, bound)
+    state, rounds = _solve(cells, rigid, material_pair, weights)
     slips = ~state.stick & (state.bound > 0)
-    traction[box], stick[box], slip[box] = pair.G * state.traction, state.stick, state.slip * slips[..., None]
-    cell = pressed.dx * pressed.dy
+    traction[box], stick[box], slip[box] = material_pair.G * state.traction, state.stick, state.slip * slips[..., None]
+    cell = normal_solution.dx * normal_solution.dy
     fx, fy = (float(force) for force in traction.sum(axis=(0, 1)) * cell)
-    mz = float(np.sum(pressed.x * traction[..., 1] - pressed.y[:, None] * traction[..., 0]) * cell)
+    mz = float(np.sum(normal_solution.x * traction[..., 1] - normal_solution.y[:, None] * traction[..., 0]) * cell)
     power = float(-np.sum(traction * slip) * cell)
     return RollingSolution(fx, fy, mz, traction, slip, stick, power, state.residual, rounds)
 
@@ -184,15 +192,17 @@ class _Cells:
         )
 
 
-def _solve(cells: _Cells, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> tuple[_State, int]:
+def _solve(
+    cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
+) -> tuple[_State, int]:
     """Tractions that meet all conditions, and the rounds taken on these cells."""
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
-    operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, pair, weights)
+    operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST_CELLS:
         return _solve_tractions(nothing)
     coarse = cells.coarser()
-    known = _solve(coarse, rigid, pair, weights)[0].traction
+    known = _solve(coarse, rigid, material_pair, weights)[0].traction
     relative = _at_quarter_cells(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
     state = nothing.moved(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import root
 
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import (
     GRADIENT,
@@ -83,11 +83,11 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
 
 
 def solve_common_approach(
-    nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array
+    nets: Sequence[Net], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
 ) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
-    pushed = {(k, m): _displacement_by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
+    pushed = {(k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded}
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
     for i, k in enumerate(loaded):
         whole = np.sum([pushed[k, m] for m in loaded], axis=0)
@@ -105,12 +105,12 @@ def solve_common_approach(
     return stiffness, np.array(approach)
 
 
-def _displacement_by(source: Net, target: Net, pair: Pair) -> Array:
+def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
-        return displacement(source.pressure, *source.step, pair.modulus)
+        return displacement(source.pressure, *source.step, material_pair.modulus)
     answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
-    return answer.reshape(target.x.shape) / (np.pi * pair.modulus)
+    return answer.reshape(target.x.shape) / (np.pi * material_pair.modulus)
 
 
 def _product(net: Net, first: Array, second: Array, kind: int) -> float:
@@ -121,7 +121,11 @@ def _product(net: Net, first: Array, second: Array, kind: int) -> float:
 
 
 def solve_depths(
-    patches: Sequence[Patch], start: Array, load: float | None, pair: Pair, options: tuple[int, int, int]
+    patches: Sequence[Patch],
+    start: Array,
+    load: float | None,
+    material_pair: MaterialPair,
+    options: tuple[int, int, int],
 ) -> tuple[Array, Array, Array]:
     """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
 
@@ -135,7 +139,7 @@ def solve_depths(
     def state(over: Array) -> tuple[Array, Array, Array, Array]:
         *depths, approach = answer = zero + unit * over
         nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
-        stiffness, reached = solve_common_approach(nets, pair, kind, lows, answer[:-1])
+        stiffness, reached = solve_common_approach(nets, material_pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
         return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
@@ -153,12 +157,14 @@ def solve_depths(
     raise RunFailed("simplified theory", f"patches at an approach near {answer[-1]:.4g} m did not settle")
 
 
-def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, pair: Pair) -> Array:
+def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, material_pair: MaterialPair) -> Array:
     """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
     answer, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:
             forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
             places = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
-            answer += drag(*places[:2], forces, *places[2:], pair.nu).reshape(answer.shape) / (np.pi * pair.G)
+            answer += drag(*places[:2], forces, *places[2:], material_pair.nu).reshape(answer.shape) / (
+                np.pi * material_pair.G
+            )
     return answer

@@ -165,7 +165,7 @@ def slope_products(u, h, cover, dx, dy, along_y):
 
 @compiled
 def crude_fit(surface, cells, shape, kind, modulus):
-    """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
+    """Stiffness 1/W (Pa/m), rigid approach (m) and integral of W p over the area, for one patch at a penetration depth.
 
     The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
     """

@@ -38,7 +38,7 @@ from scipy.optimize import brentq
 
 from models.contact.fields import Fields
 from models.contact.inputs import Array, creepages, number, whole_number
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.patches import NO_DEPTH, Box, Patch, as_single_patch, no_bottom, separate
 from models.contact.several_patches import crude, dragged, solve_depths
 from models.contact.simplified_kernels import (
@@ -130,7 +130,7 @@ class NormalContact:
     area: float
     peak: float
     patches: tuple[PatchPressure, ...]
-    pair: Pair
+    pair: MaterialPair
     options: SimplifiedOptions
 
 
@@ -155,7 +155,7 @@ class Rolling:
 
 def press(
     bodies: Distance | Sequence[Patch],
-    pair: Pair,
+    material_pair: MaterialPair,
     *,
     load: float | None = None,
     approach: float | None = None,
@@ -179,40 +179,46 @@ def press(
     if load is not None:
         wanted = number("load", load, "a load in N, up to 1e9", -1e9, 1e9)
         if wanted <= 0.0:
-            return _gathered(lowest, (), pair, options)
-        return _by_load(patches, lowest, wanted, pair, options)
+            return _gathered(lowest, (), material_pair, options)
+        return _by_load(patches, lowest, wanted, material_pair, options)
     reached = number("approach", approach, "an approach in m, up to 0.1", -0.1, 0.1)
     if reached <= lowest:
-        return _gathered(reached, (), pair, options)
-    return _patches_at_common_approach(patches, reached, None, pair, options)
+        return _gathered(reached, (), material_pair, options)
+    return _patches_at_common_approach(patches, reached, None, material_pair, options)
 
 
-def load_at_depth(patch: Patch, depth: float, pair: Pair, options: SimplifiedOptions = PLAIN) -> PatchPressure:
+def load_at_depth(
+    patch: Patch, depth: float, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN
+) -> PatchPressure:
     """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
-    stiffness, approach, volume = crude_fit(patch.surface(depth), *options.numbers, pair.modulus)
+    stiffness, approach, volume = crude_fit(patch.surface(depth), *options.numbers, material_pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
 
 
-def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: SimplifiedOptions) -> NormalContact:
+def _by_load(
+    patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
+) -> NormalContact:
     """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
-            lambda d: along * load_at_depth(patch, d, pair, options).load, load, patch.low, patch.edge
+            lambda d: along * load_at_depth(patch, d, material_pair, options).load, load, patch.low, patch.edge
         )
-        alone = load_at_depth(patch, depth, pair, options)
-        return _gathered(alone.approach / along, (alone,), pair, options)
+        alone = load_at_depth(patch, depth, material_pair, options)
+        return _gathered(alone.approach / along, (alone,), material_pair, options)
 
     def alone_at(reached: float) -> float:
         depths = zip(patches, _shallow(patches, reached), strict=True)
-        return _total([load_at_depth(patch, depth, pair, options) for patch, depth in depths])
+        return _total([load_at_depth(patch, depth, material_pair, options) for patch, depth in depths])
 
-    return _patches_at_common_approach(patches, _depth_for_load(alone_at, load, lowest, np.inf), load, pair, options)
+    return _patches_at_common_approach(
+        patches, _depth_for_load(alone_at, load, lowest, np.inf), load, material_pair, options
+    )
 
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
@@ -244,26 +250,26 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
 
 
 def _patches_at_common_approach(
-    patches: list[Patch], approach: float, load: float | None, pair: Pair, options: SimplifiedOptions
+    patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
     """The patches at their common approach (m), or near it where a load (N) is given."""
     start = np.array([*_shallow(patches, approach), approach])
-    (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, pair, options.numbers)
+    (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
     parts = []
     for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
         if carried > 0.0:
             along = float(reached * np.cos(patch.lean))
             parts.append(PatchPressure(patch, depth, float(stiffness), along, float(carried), patch.box(depth)))
-    return _gathered(float(reached), tuple(parts), pair, options)
+    return _gathered(float(reached), tuple(parts), material_pair, options)
 
 
 def _gathered(
-    approach: float, parts: tuple[PatchPressure, ...], pair: Pair, options: SimplifiedOptions
+    approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
     """The sum of the patches; area and peak from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
-    return NormalContact(approach, _total(parts), area, peak, parts, pair, options)
+    return NormalContact(approach, _total(parts), area, peak, parts, material_pair, options)
 
 
 def _area(patch: PatchPressure, rows: int = 100) -> float:
@@ -273,7 +279,7 @@ def _area(patch: PatchPressure, rows: int = 100) -> float:
 
 
 def roll(
-    pressed: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS
+    normal_contact: NormalContact, friction: float, xi_x: float, xi_y: float, spin: float, *, cells: int = CELLS
 ) -> Rolling:
     """Forces of steady rolling: FASTSIM twice on the fine net of each patch, W_1 = W_2 refitted in between.
 
@@ -282,19 +288,19 @@ def roll(
     creepages differ. Raises InputError for what is not one finite number, a friction below zero, too few cells, or
     bodies too unlike for the slip that their pressure makes to be left out.
     """
-    pressed.pair.require_likeness()
+    normal_contact.pair.require_likeness()
     friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     motion = tuple(creepages(xi_x, xi_y, spin, number).values())
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
-    fine = [_fine_strips(part, pressed.options, cells) for part in pressed.patches]
+    fine = [_fine_strips(part, normal_contact.options, cells) for part in normal_contact.patches]
     tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
     crude_tractions = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
-    for part, net, traction in zip(pressed.patches, fine, tractions, strict=True):
+    for part, net, traction in zip(normal_contact.patches, fine, tractions, strict=True):
         march(net, friction, 1.0 / part.stiffness, motion, traction)
-        crude_tractions.append(gather(net, traction, part.box, pressed.options.net))
-    flexibilities = _refitted(pressed, crude_tractions)
+        crude_tractions.append(gather(net, traction, part.box, normal_contact.options.net))
+    flexibilities = _refitted(normal_contact, crude_tractions)
     rolled = [
         march(net, friction, flexibility, motion, traction)
         for net, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
@@ -313,15 +319,15 @@ def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -
     return net
 
 
-def _refitted(pressed: NormalContact, tractions: list[Array]) -> list[float]:
+def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[float]:
     """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
 
     W_3 where no traction can be fitted.
     """
-    options, pair = pressed.options, pressed.pair
-    nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in pressed.patches]
+    options, pair = normal_contact.options, normal_contact.pair
+    nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]
     flexibilities = []
-    for k, (part, net, traction) in enumerate(zip(pressed.patches, nets, tractions, strict=True)):
+    for k, (part, net, traction) in enumerate(zip(normal_contact.patches, nets, tractions, strict=True)):
         u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + dragged(nets, tractions, k, pair)
         fitted = float(tangential_fit(u, traction, net.cover, *net.step, FITS[options.fit]))
         flexibilities.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)

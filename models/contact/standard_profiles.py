@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.profiles import SPACING, Profile
+from models.contact.profiles import SPACING, ContactProfile
 from models.core.errors import InputError
 
 MM = 1e-3
@@ -73,14 +73,14 @@ def s1002_height(y: Array) -> Array:
 
 
 @cache
-def s1002() -> Profile:
+def s1002() -> ContactProfile:
     """The wheel profile S1002 from 0.5 mm inside its flange's back to 60 mm outside the taping line."""
     y = np.linspace(-69.5, 60.0, 20001)
     return _evenly_spaced(y, s1002_height(y))
 
 
 @cache
-def uic60() -> Profile:
+def uic60() -> ContactProfile:
     """The head of an upright UIC 60 rail, to 37 mm below its top."""
     y, z = _half_head()
     return _evenly_spaced(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
@@ -101,18 +101,18 @@ def _half_head() -> tuple[Array, Array]:
     return np.concatenate(y), np.concatenate([*z, depth])
 
 
-def _evenly_spaced(y: Array, z: Array) -> Profile:
+def _evenly_spaced(y: Array, z: Array) -> ContactProfile:
     """Points (mm) at even distances along the contour, in m."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)
-    return Profile(np.interp(even, length, y) * MM, np.interp(even, length, z) * MM)
+    return ContactProfile(np.interp(even, length, y) * MM, np.interp(even, length, z) * MM)
 
 
 WHEELS = {"S1002": s1002}
 RAILS = {"UIC60": uic60}
 
 
-def built_in(name: str) -> Profile:
+def built_in(name: str) -> ContactProfile:
     """The wheel or rail of this name; raises InputError that lists the names."""
     known = WHEELS | RAILS
     if name not in known:

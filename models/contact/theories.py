@@ -15,8 +15,8 @@ from models.contact import linear_theory
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import Fields, fastsim_fields
 from models.contact.hertz import Hertz
-from models.contact.material import Pair
-from models.contact.normal_problem import NormalSolution, Pressed, centres, hertzian, solve_normal
+from models.contact.material import MaterialPair
+from models.contact.normal_problem import NormalSolution, PressureGrid, centres, hertzian, solve_normal
 from models.contact.rolling_problem import solve_rolling
 from models.contact.simplified_theory import NormalContact, PatchPressure
 from models.contact.simplified_theory import roll as roll_simplified
@@ -53,13 +53,13 @@ class Pressing:
     approach: float
 
 
-class Contact(ABC):
+class RollingContact(ABC):
     """Two bodies pressed together, to be rolled by one theory; ``order``: of the error in the size of a cell."""
 
     order = 1.0
 
-    def __init__(self, pressing: Pressing, friction: float, pair: Pair) -> None:
-        self.pressing, self.friction, self.pair = pressing, friction, pair
+    def __init__(self, pressing: Pressing, friction: float, material_pair: MaterialPair) -> None:
+        self.pressing, self.friction, self.pair = pressing, friction, material_pair
 
     @property
     @abstractmethod
@@ -71,13 +71,13 @@ class Contact(ABC):
         """Forces at creepages and spin; with ``fields`` also what happens in every cell, patch by patch."""
 
 
-class OnEllipse(Contact):
+class OnEllipse(RollingContact):
     """Hertz' contact, with semi-axes a and b (m)."""
 
-    def __init__(self, hertz: Hertz, friction: float, pair: Pair) -> None:
+    def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair) -> None:
         self.hertz, self.a, self.b = hertz, float(hertz.a), float(hertz.b)
         pressing = Pressing(float(hertz.load), float(np.pi * self.a * self.b), float(hertz.p0), float(hertz.approach))
-        super().__init__(pressing, friction, pair)
+        super().__init__(pressing, friction, material_pair)
 
     @property
     def lever(self) -> float:
@@ -85,7 +85,7 @@ class OnEllipse(Contact):
         return max(self.a, self.b)
 
 
-class Linear(OnEllipse):
+class LinearTheory(OnEllipse):
     """Forces without slip, in proportion to the creepages and without a bound."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
@@ -109,8 +109,8 @@ def beyond_friction(used: np.ndarray) -> str:
 class Fastsim(OnEllipse):
     """The simplified theory of 1982; ``choices`` are those of ``fastsim``."""
 
-    def __init__(self, hertz: Hertz, friction: float, pair: Pair, **choices: Any) -> None:
-        super().__init__(hertz, friction, pair)
+    def __init__(self, hertz: Hertz, friction: float, material_pair: MaterialPair, **choices: Any) -> None:
+        super().__init__(hertz, friction, material_pair)
         self.choices = choices
         self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] != "elliptic" else 1.0
 
@@ -132,13 +132,15 @@ class ExactOnEllipse(OnEllipse):
         return _exact_sum([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
 
 
-class OnPatches(Contact):
+class OnPatches(RollingContact):
     """Patches of any shape, whose depths and loads are those of the theory of 1983; its load is along the normals."""
 
-    def __init__(self, pressed: NormalContact, friction: float, area: float, peak: float, approach: float) -> None:
-        load = sum(part.load for part in pressed.patches)
-        super().__init__(Pressing(load, area, peak, approach), friction, pressed.pair)
-        self.pressed = pressed
+    def __init__(
+        self, normal_contact: NormalContact, friction: float, area: float, peak: float, approach: float
+    ) -> None:
+        load = sum(part.load for part in normal_contact.patches)
+        super().__init__(Pressing(load, area, peak, approach), friction, normal_contact.pair)
+        self.pressed = normal_contact
 
     @property
     def lever(self) -> float:
@@ -154,8 +156,8 @@ class OnPatches(Contact):
 class Simplified(OnPatches):
     """The simplified theory of 1983 for any undeformed distance."""
 
-    def __init__(self, pressed: NormalContact, friction: float) -> None:
-        super().__init__(pressed, friction, pressed.area, pressed.peak, pressed.approach)
+    def __init__(self, normal_contact: NormalContact, friction: float) -> None:
+        super().__init__(normal_contact, friction, normal_contact.area, normal_contact.peak, normal_contact.approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
@@ -167,13 +169,13 @@ class Simplified(OnPatches):
 class Exact(OnPatches):
     """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
 
-    def __init__(self, pressed: NormalContact, friction: float, cells: int) -> None:
-        parts = pressed.patches
-        grids = [_solved(part, cells, pressed.pair) for part in parts]
+    def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
+        parts = normal_contact.patches
+        grids = [_solved(part, cells, normal_contact.pair) for part in parts]
         alone = grids[0].approach / float(np.cos(parts[0].patch.lean))
-        approach = alone if len(grids) == 1 else pressed.approach
+        approach = alone if len(grids) == 1 else normal_contact.approach
         peak = max(float(grid.pressure.max()) for grid in grids)
-        super().__init__(pressed, friction, sum(grid.area for grid in grids), peak, approach)
+        super().__init__(normal_contact, friction, sum(grid.area for grid in grids), peak, approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about each patch."""
@@ -182,11 +184,11 @@ class Exact(OnPatches):
         return replace(forces, fields=self.placed(forces.fields))
 
 
-def _exact_sum(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
+def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
     """The sum over patches that do not feel each other's tractions."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
     for grid in grids:
-        patch, (x, y) = solve_rolling(grid, friction, *motion, pair), np.meshgrid(grid.x, grid.y)
+        patch, (x, y) = solve_rolling(grid, friction, *motion, material_pair), np.meshgrid(grid.x, grid.y)
         forces += patch.fx, patch.fy, patch.mz
         stuck += np.count_nonzero(patch.stick & grid.contact) * grid.dx * grid.dy
         px, py = np.moveaxis(patch.traction, -1, 0)
@@ -201,7 +203,7 @@ MARGINS = (1.2, 1.6, 2.2)
 """Sides of the grid of the exact normal problem divided by those of the simplified theory's area, until it fits."""
 
 
-def _solved(patch: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
+def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
     """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:
@@ -209,7 +211,7 @@ def _solved(patch: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
         x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
         inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
         try:
-            return replace(solve_normal(known.at(*inside), dx, dy, pair, load=patch.load), x=x, y=y)
+            return replace(solve_normal(known.at(*inside), dx, dy, material_pair, load=patch.load), x=x, y=y)
         except InputError as error:  # the contact reaches the edge of the grid
             refused = error
     if not any(patch.patch.cut):

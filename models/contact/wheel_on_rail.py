@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 
 from models.contact.inputs import Array, quantity
 from models.contact.patches import Patch, ridges
-from models.contact.profiles import Profile
+from models.contact.profiles import ContactProfile
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
 
@@ -84,7 +84,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class TouchingPlace:
     """A place where wheel and rail touch, or would if they came closer.
 
     gap : vertical gap (m), 0 at the place that touches but for some nanometres. angle : of the rail's surface (rad),
@@ -105,8 +105,8 @@ class Touch:
 class WheelAndRail:
     """One wheel on one rail. rail : as it lies in the track, y from the middle of the track."""
 
-    wheel: Profile
-    rail: Profile
+    wheel: ContactProfile
+    rail: ContactProfile
     wheelset: Wheelset
 
     def centre(self, pose: Pose) -> Array:
@@ -123,7 +123,8 @@ class WheelAndRail:
         return points @ pose.turn.T + self.centre(pose)
 
     def gaps(self, pose: Pose) -> tuple[Array, Array]:
-        """Outline points (n, 3) that lie over the rail, and the vertical gap (m) below each."""
+        """Points of the wheel's outline (n, 3) above the rail, and the vertical gap (m) between each point and the
+        rail."""
         points = self.outline(pose)
         over = (points[:, 1] >= self.rail.y[0]) & (points[:, 1] <= self.rail.y[-1])
         over &= np.append(np.diff(points[:, 1]) > 0.0, True)
@@ -151,14 +152,14 @@ def _parabola(gap: Array, k: int) -> tuple[float, float]:
 
 
 def wheel_on_rail(
-    wheel: Profile,
-    rail: Profile,
+    wheel: ContactProfile,
+    rail: ContactProfile,
     *,
     lateral_shift: float = 0.0,
     yaw: float = 0.0,
     track: Track | None = None,
     wheelset: Wheelset | None = None,
-) -> list[Touch]:
+) -> list[TouchingPlace]:
     """Touching places of the right wheel, the one that touches first, others by their gap while this is below 0.2 mm.
 
     wheel, rail : profiles; the rail upright, ``track.inclination`` turns it (0 for one that is measured as it lies).
@@ -176,7 +177,7 @@ def wheel_on_rail(
     return touches
 
 
-def rail_in_track(rail: Profile, track: Track) -> Profile:
+def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
     """The rail as it lies to the right of the track: inclined, its top at z = 0, its gauge face at half the gauge."""
     inclined = rail.turned(track.inclination) if track.inclination else rail
     y, z = inclined.y, inclined.z - inclined.z.min()
@@ -190,7 +191,7 @@ def rail_in_track(rail: Profile, track: Track) -> Profile:
         )
     k = int(np.argmax(inner))  # the contour crosses the depth just before this point
     face = y[k] - (y[k] - y[k - 1]) * (track.gauge_depth - z[k]) / (z[k - 1] - z[k])
-    return Profile(y - face + track.gauge / 2.0, z, inclined.smoothing)
+    return ContactProfile(y - face + track.gauge / 2.0, z, inclined.smoothing)
 
 
 def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
@@ -220,7 +221,7 @@ def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRa
     return Pose(shift, yaw, roll, side.clearance(Pose(shift, yaw, roll, 0.0)))
 
 
-def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
+def touches_of(side: WheelAndRail, pose: Pose) -> list[TouchingPlace]:
     """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
     points, gap = side.gaps(pose)
     touches = []
@@ -231,9 +232,11 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[Touch]:
     return sorted(touches, key=lambda touch: touch.gap)
 
 
-def _touching_place(side: WheelAndRail, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
+def _touching_place(
+    side: WheelAndRail, pose: Pose, points: Array, gap: Array, indices: tuple[int, int, int]
+) -> TouchingPlace:
     """One touching place, where the parabola through three gaps is least, and the distance around it."""
-    first, k, last = at
+    first, k, last = indices
     share = _parabola_minimum(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
@@ -250,24 +253,28 @@ def _touching_place(side: WheelAndRail, pose: Pose, points: Array, gap: Array, a
     ahead, across, _ = pose.turn.T @ (lowest - side.centre(pose))
     patch = Patch(distance, cut, abs(angle), along)
     wheel_y = float(across) - side.wheelset.arm
-    return Touch(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
+    return TouchingPlace(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
 
 
-def distance_over(side: WheelAndRail, pose: Pose, place: Array, angle: float, ends: tuple[float, float]) -> Distance:
+def distance_over(
+    side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, contour_limits: tuple[float, float]
+) -> Distance:
     """Distance over the plane that touches the rail at a place, between two ends along the rail's contour.
 
-    place : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
+    contact_point : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
     """
     half = 1.2 * np.sqrt(2.0 * SURROUNDINGS_DISTANCE * side.wheelset.radius / np.cos(angle))
-    rail_s, rail_n = _rail_heights(side.rail, place, angle)
+    rail_s, rail_n = _rail_heights(side.rail, contact_point, angle)
     x = np.linspace(-half, half, NODES)
-    s = np.linspace(max(ends[0], rail_s[0]), min(ends[1], rail_s[-1]), NODES)
-    return Distance(x, s, CubicSpline(rail_s, rail_n)(s)[:, None] - _wheel_heights(side, pose, place, angle, x, s))
+    s = np.linspace(max(contour_limits[0], rail_s[0]), min(contour_limits[1], rail_s[-1]), NODES)
+    return Distance(
+        x, s, CubicSpline(rail_s, rail_n)(s)[:, None] - _wheel_heights(side, pose, contact_point, angle, x, s)
+    )
 
 
-def _rail_heights(rail: Profile, place: Array, angle: float) -> tuple[Array, Array]:
+def _rail_heights(rail: ContactProfile, contact_point: Array, angle: float) -> tuple[Array, Array]:
     """The rail over its tangent plane: s along it and n into the rail (m), where s ascends around the place."""
-    y, z = rail.y - place[1], rail.z - place[2]
+    y, z = rail.y - contact_point[1], rail.z - contact_point[2]
     s, n = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
     backward, here = np.flatnonzero(np.diff(s) <= 1e-9), int(np.argmin(np.abs(s)))
     low, high = backward[backward < here], backward[backward >= here]
@@ -275,12 +282,12 @@ def _rail_heights(rail: Profile, place: Array, angle: float) -> tuple[Array, Arr
     return s[keep], n[keep]
 
 
-def _wheel_heights(side: WheelAndRail, pose: Pose, place: Array, angle: float, x: Array, s: Array) -> Array:
+def _wheel_heights(side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, x: Array, s: Array) -> Array:
     """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
     ahead, along, into = np.array(
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
     )
-    base = place + x[None, :, None] * ahead + s[:, None, None] * along
+    base = contact_point + x[None, :, None] * ahead + s[:, None, None] * along
     base, into = (base - side.centre(pose)) @ pose.turn, into @ pose.turn
     curve, slope, arm = side.wheel.curve, side.wheel.curve.derivative(), side.wheelset.arm
     height = np.zeros((s.size, x.size))

@@ -54,7 +54,7 @@ class Assumption:
 
 
 @dataclass(frozen=True)
-class Broken:
+class BrokenAssumption:
     """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value.
 
     law : by which the share is told where no values over time are known; the worst value then is three deviations off.
@@ -99,7 +99,7 @@ class Broken:
         )
 
 
-def broken(run: Result, assumption: Assumption) -> Broken | None:
+def broken(run: Result, assumption: Assumption) -> BrokenAssumption | None:
     """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
     judged = [
         _longest_exceedance(run, assumption, where, values)
@@ -110,7 +110,7 @@ def broken(run: Result, assumption: Assumption) -> Broken | None:
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
-def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broken | None:
+def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
     beyond = (values < a.least) | (values > a.most)
     if not beyond.any():
         return None
@@ -118,10 +118,10 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
     timed = "time" in run.data.coords and len(values) == len(run.times)
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
-    return Broken(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
+    return BrokenAssumption(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
 
 
-def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
+def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
     """Where a Gaussian lies beyond a limit for more than ALLOWED_TIME_SHARE of the time, by the row where that is for
     longest."""
     from scipy.special import ndtr
@@ -138,7 +138,7 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
     place = f"{where} {values.rows[row]}" if values.rows else where
     share, law = float(shares[side, row]), " by the normal law"
-    return Broken(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
+    return BrokenAssumption(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
 
 
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
@@ -168,14 +168,14 @@ def watching(note: Callable[[Result], None]) -> Iterator[None]:
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
-    """Lines of ``twinrig show`` on what a scene assumes."""
+    """Lines of ``twinrig show`` that list the assumptions of a scene."""
     return [f"  {'assumes':<{width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
 
 
-def broken_of(run: Result) -> list[Broken]:
-    """Assumptions that a result says it broke."""
+def broken_of(run: Result) -> list[BrokenAssumption]:
+    """Assumptions that the run of a result broke, as the result lists them."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
-    return [Broken(**entry) for entry in said.get("broken", ())]
+    return [BrokenAssumption(**entry) for entry in said.get("broken", ())]
 
 
 def assumed_of(run: Result) -> list[str]:
@@ -185,9 +185,9 @@ def assumed_of(run: Result) -> list[str]:
 
 
 @contextmanager
-def breaches() -> Iterator[dict[str, Broken]]:
+def breaches() -> Iterator[dict[str, BrokenAssumption]]:
     """Assumptions that are broken by results which are judged inside: the worst of each by its name."""
-    worst: dict[str, Broken] = {}
+    worst: dict[str, BrokenAssumption] = {}
 
     def note(run: Result) -> None:
         for breach in broken_of(run):

@@ -104,8 +104,8 @@ def separator_line(text: str) -> str:
     return matched[1] if matched else ""
 
 
-def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[str]) -> str:
-    """Decimal sign of cells, the first of which are in ``line``; InputError where commas have two meanings."""
+def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequence[str]) -> str:
+    """Decimal sign of cells, the first of which are in ``line_number``; InputError where commas have two meanings."""
     commas, why = [cell for cell in cells if "," in cell], ""
     if not commas:
         return "."
@@ -117,7 +117,7 @@ def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[st
     elif separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
         why = "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else"
     if why:
-        raise InputError(path, f"line {line} and after", commas[0], why)
+        raise InputError(path, f"line {line_number} and after", commas[0], why)
     return ","
 
 
@@ -126,14 +126,18 @@ def is_number(cell: str) -> bool:
     return NUMBER.fullmatch(cell) is not None
 
 
-def find_head(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
+def find_head(lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
     """Headings above numbers by every separator that makes sense of the first line that has such; none where no line
     has."""
-    heads = ([head for sign in separators if (head := _head(lines, i, known, sign))] for i in range(len(lines)))
+    heads = (
+        [head for sign in separators if (head := _head(lines, i, is_known_heading, sign))] for i in range(len(lines))
+    )
     return next(filter(None, heads), [])
 
 
-def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
+def find_headings(
+    lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]
+) -> list[Head]:
     """The headings in the first line that has a known heading, whatever is beneath it: errors there are left to the
     reader of the rows."""
     for i, line in enumerate(lines):
@@ -141,17 +145,17 @@ def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separator
         heads = [
             Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
             for sign, names in parted.items()
-            if len(names) > 1 and any(map(known, names))
+            if len(names) > 1 and any(map(is_known_heading, names))
         ]
         if heads:
             return heads
     return []
 
 
-def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator: str) -> Head | None:
+def _head(lines: Sequence[Line], i: int, is_known_heading: Callable[[str], bool], separator: str) -> Head | None:
     """Headings in line ``i`` above a row of numbers; None where this is not so."""
     names = trimmed(split_cells(lines[i].text, separator))
-    place = next((k for k, name in enumerate(names) if known(name)), None)
+    place = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
     if place is None or len(names) < 2 or any(is_number(name) or TIMED.fullmatch(name) for name in names):
         return None
     for j in range(i + 1, min(i + 2 + BETWEEN, len(lines))):
@@ -162,7 +166,7 @@ def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator
             above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
             first = lines[j]
             return Head(lines[i], separator, tuple(names), len(cells), above, between, first.begin, first.number - 1)
-        if any(is_number(cell) or known(cell) for cell in cells):
+        if any(is_number(cell) or is_known_heading(cell) for cell in cells):
             return None
     return None
 
@@ -184,25 +188,25 @@ def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
     return _rewritten(path, lines, heads[0])
 
 
-def _rewritten(path: str | Path, lines: list[Line], head: Head) -> str:
+def _rewritten(path: str | Path, lines: list[Line], header: Head) -> str:
     """Text with the head and the rows in the plain form."""
-    rows = {line.number: split_cells(line.text, head.separator) for line in lines[head.line :]}
+    rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line :]}
     cells = [cell for row in rows.values() for cell in row]
-    sign = decimal_sign(path, head.line + 1, head.separator, cells)
-    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: head.line]}
-    new[head.header.number] = ",".join(_headings(head))
+    sign = decimal_sign(path, header.line + 1, header.separator, cells)
+    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line]}
+    new[header.header.number] = ",".join(_headings(header))
     for number, row in rows.items():
-        kept = row[: len(head.names)] if len(row) == head.width and not any(row[len(head.names) :]) else row
+        kept = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
         new[number] = ",".join(_plain(cell, sign) for cell in kept)
     return "\n".join(new[line.number] for line in lines)
 
 
-def _headings(head: Head) -> list[str]:
+def _headings(header: Head) -> list[str]:
     """Headings with the units of the row beneath them, where there is one."""
-    if len(head.between) != 1:
-        return list(head.names)
-    units = [cell.strip("[]() ") for cell in head.cells(head.between[0])]
-    return [name if heading(name)[1] else f"{name} [{unit}]" for name, unit in zip(head.names, units, strict=True)]
+    if len(header.between) != 1:
+        return list(header.names)
+    units = [cell.strip("[]() ") for cell in header.cells(header.between[0])]
+    return [name if heading(name)[1] else f"{name} [{unit}]" for name, unit in zip(header.names, units, strict=True)]
 
 
 def _plain(cell: str, sign: str) -> str:

@@ -56,11 +56,11 @@ class Estimate:
         """Whether a reader must be warned."""
         return not self.share <= WARNED
 
-    def advice(self, of: str) -> str:
-        """Advice on reducing the estimated error, ``of`` the unit of steps."""
+    def advice(self, step_unit: str) -> str:
+        """Advice on reducing the estimated error, ``step_unit`` the unit of steps."""
         if self.of:
             return f"use at least {self.step:g} {self.of}"
-        return f"use at most {self.step:g} {of}".rstrip() if self.step else "no shorter step mends it"
+        return f"use at most {self.step:g} {step_unit}".rstrip() if self.step else "no shorter step mends it"
 
     @property
     def refused(self) -> bool:
@@ -91,8 +91,8 @@ def estimate(
     coarser: np.ndarray | None = None,
     unit: str = "",
 ) -> Estimate:
-    """Error of ``fine`` (m, ...) by runs in steps twice and, over the first rows, four times as long, at rows that the
-    run in twice the step has.
+    """Estimated error of ``fine`` (m, ...) from runs with twice and (over the first rows) four times the step, at the
+    rows of the run with twice the step.
 
     coarse : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
     """
@@ -110,10 +110,10 @@ def _rms(values: np.ndarray) -> float:
         return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
 
 
-def rows_at(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
     """Rows of ``times`` (n,) that are nearest to the wanted ones (m,), both rising."""
-    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    return after - (wanted - times[after - 1] < times[after] - wanted)
+    after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
+    return after - (wanted_times - times[after - 1] < times[after] - wanted_times)
 
 
 class Series(NamedTuple):
@@ -225,11 +225,11 @@ def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
-def _whole_divisor(wanted: float) -> int:
-    """Least whole number from ``wanted`` on whose part of a step is a short decimal, so that it divides what the step
+def _whole_divisor(minimum: float) -> int:
+    """Least whole number from ``minimum`` on whose part of a step is a short decimal, so that it divides what the step
     divides."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))
-    return min((number for number in powers if number >= wanted), default=1)
+    return min((number for number in powers if number >= minimum), default=1)
 
 
 def of_tolerance(
@@ -253,36 +253,39 @@ def of_tolerance(
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
-def by_cells(error: float, size: float, unit: str, cells: int, order: float, most: int) -> Estimate:
+def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
     """Estimate of the error that a grid of ``cells`` leaves; ``step`` is the number of cells, at most so many, for
     GOAL."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
-    return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
+    return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS)
 
 
-def summed_error(first: Estimate, other: Estimate) -> Estimate:
+def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
     """An error on top of another, as that of an input on top of that of the run which it drives.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
-    larger = first if first.share >= other.share else other
-    step = min(first.step, other.step) if first.of == other.of == "" else larger.step
-    order = min(first.order, other.order)
-    return Estimate(first.error + other.error, first.unit, first.share + other.share, order, step, larger.of)
+    larger = first if first.share >= added_error.share else added_error
+    step = min(first.step, added_error.step) if first.of == added_error.of == "" else larger.step
+    order = min(first.order, added_error.order)
+    return Estimate(
+        first.error + added_error.error, first.unit, first.share + added_error.share, order, step, larger.of
+    )
 
 
-def stated(run: Result, estimates: Mapping[str, Estimate], method: str, of: str = "s") -> Result:
-    """The result that says its error, channel by channel, and how that was told; ``of``: the unit of steps or cells.
+def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
+    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: of steps or
+    cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     channels = {name: asdict(estimate) for name, estimate in estimates.items()}
-    run.data.attrs["error"] = json.dumps({"how": method, "of": of, "channels": channels})
+    run.data.attrs["error"] = json.dumps({"how": method, "of": step_unit, "channels": channels})
     worst = max(estimates, key=lambda name: estimates[name].share, default=None)
     if worst is not None and estimates[worst].refused:
         engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], estimates[worst]
-        why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(of)}"
+        why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(step_unit)}"
         fault = "cells are too few" if estimate.of else "steps are too long" if estimate.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
         failure.partial = run

@@ -99,7 +99,7 @@ class RunFailed(RuntimeError):
 
 
 class Refused(InputError):
-    """A scene that is well written but asks an engine for something it does not do correctly."""
+    """A valid scene that needs something which the engine does not compute correctly."""
 
     def __init__(self, engine: str, why: str, file: str = "") -> None:
         self.engine, self.why = engine, why

@@ -44,8 +44,8 @@ def lines(findings: Iterable[Finding]) -> list[str]:
 
 
 def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings, but where more than LISTED_FINDINGS of one check and weight were found only the worst, which says
-    so."""
+    """The findings; of more than LISTED_FINDINGS with the same check and weight only the worst, with the number of the
+    others."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)

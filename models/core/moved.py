@@ -11,7 +11,7 @@ MOVED_MODULES: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml"
 """Old names, of modules or of whole packages, and where their content is now."""
 
 
-class Moved(MetaPathFinder):
+class OldModuleFinder(MetaPathFinder):
     """Finder of imports by old module names, asked after all others."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> None:
@@ -22,5 +22,5 @@ class Moved(MetaPathFinder):
 
 def tell_new_names() -> None:
     """Have old names answered, once per process."""
-    if not any(isinstance(finder, Moved) for finder in sys.meta_path):
-        sys.meta_path.append(Moved())
+    if not any(isinstance(finder, OldModuleFinder) for finder in sys.meta_path):
+        sys.meta_path.append(OldModuleFinder())

@@ -15,37 +15,37 @@ RESULTS = Path("results")
 """Where results go unless the user says otherwise, within the folder in which the command runs."""
 
 
-def new_folder(wanted: Path | None, name: str) -> Path:
+def new_folder(requested_folder: Path | None, name: str) -> Path:
     """The folder that the user names, if it is empty, or the first free one under ``results/``.
 
     Raises InputError if the named folder holds anything or cannot be made. Two runs at the same time never
     get the same folder: it is made, or its first file is, in one step that only one of them can take.
     """
-    if wanted is None:
+    if requested_folder is None:
         return next(path for path in _candidates(name) if _make_folder(path))
     try:
-        if wanted.exists() and not wanted.is_dir():
-            raise InputError("--out", "", str(wanted), "is a file: name a folder")
-        free = _make_folder(wanted) or not any(wanted.iterdir())
+        if requested_folder.exists() and not requested_folder.is_dir():
+            raise InputError("--out", "", str(requested_folder), "is a file: name a folder")
+        free = _make_folder(requested_folder) or not any(requested_folder.iterdir())
     except OSError as error:
-        raise _unwritable_folder(wanted, "cannot be used", error) from None
-    if not free or not _take_folder(wanted):
+        raise _unwritable_folder(requested_folder, "cannot be used", error) from None
+    if not free or not _take_folder(requested_folder):
         allowed = "holds files already and is left as it is: name a new or empty folder"
-        raise InputError("--out", "", str(wanted), allowed)
-    return wanted
+        raise InputError("--out", "", str(requested_folder), allowed)
+    return requested_folder
 
 
-def resumed_folder(wanted: Path, blocks: str) -> Path:
+def resumed_folder(requested_folder: Path, blocks: str) -> Path:
     """The folder of an earlier run, with finished work in its folder ``blocks`` or nothing yet; else InputError.
 
     What the run left of files when it was killed is removed.
     """
-    begun = wanted.is_dir() and {path.name for path in wanted.iterdir()} <= {COMMAND}
-    if not begun and not (wanted / blocks).is_dir():
+    begun = requested_folder.is_dir() and {path.name for path in requested_folder.iterdir()} <= {COMMAND}
+    if not begun and not (requested_folder / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
-        raise InputError("--resume", "", str(wanted), allowed)
-    drop_parts(wanted)
-    return wanted
+        raise InputError("--resume", "", str(requested_folder), allowed)
+    drop_parts(requested_folder)
+    return requested_folder
 
 
 def _take_folder(folder: Path) -> bool:

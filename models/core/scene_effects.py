@@ -188,7 +188,7 @@ def _names(scene: Any, file: Path) -> bool:
 
 
 def absent_effects(scene: Any) -> tuple[str, ...]:
-    """Effects of its system that a scene does not name."""
+    """Effects of the scene's system that the scene does not name."""
     there = named_effects(scene)
     return tuple(name for name in names_of(scene.system) if name not in there)
 
@@ -218,16 +218,16 @@ def with_own(scene: Any) -> Any:
     return extended_scene
 
 
-def extended(built: Any, scene: Any) -> Any:
+def extended(system_object: Any, scene: Any) -> Any:
     """The object that a system built of a scene, extended by the scene's tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
-        built = _extend(name, module_of(scene.system, name), built, table)
-    return built
+        system_object = _extend(name, module_of(scene.system, name), system_object, table)
+    return system_object
 
 
-def _extend(name: str, module: Any, built: Any, table: Any) -> Any:
+def _extend(name: str, module: Any, system_object: Any, table: Any) -> Any:
     try:
-        result = module.extend(built, table)
+        result = module.extend(system_object, table)
     except (InputError, RunFailed):
         raise
     except Exception as error:

@@ -33,7 +33,7 @@ class System:
 
     @property
     def scene(self) -> str:
-        """Module of its scenes."""
+        """Module that defines the scenes of this system."""
         return f"{self.package}.scene"
 
     @property

@@ -202,35 +202,39 @@ def _header_wanted(columns: Columns) -> str:
 
 
 @lru_cache(CACHED_TEXTS)
-def _all_cells(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
-    """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
+def _all_cells(path: str | Path, text: str, gaps_allowed: tuple[bool, ...]) -> np.ndarray:
+    """All cells as an array (rows, columns), in the units of the file; NaN for gaps in the columns that allow gaps."""
     header, rows = _header_and_rows(path, text)
     headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
-        values[i] = _row(path, line, row, headings, free)
+        values[i] = _row(path, line, row, headings, gaps_allowed)
     return values
 
 
-def _row(path: str | Path, line: int, row: str, headings: list[str], free: tuple[bool, ...]) -> list[float]:
+def _row(
+    path: str | Path, line_number: int, row: str, headings: list[str], gaps_allowed: tuple[bool, ...]
+) -> list[float]:
     """The numbers of one row; raises InputError that names its line."""
     cells = row.split(",")
     if len(cells) != len(headings):
-        raise InputError(path, f"line {line}", row.strip(), f"{len(headings)} values are needed, found {len(cells)}")
+        raise InputError(
+            path, f"line {line_number}", row.strip(), f"{len(headings)} values are needed, found {len(cells)}"
+        )
     return [
-        math.nan if gap and cell.strip().lower() in GAPS else number(path, line, title, cell)
-        for title, cell, gap in zip(headings, cells, free, strict=True)
+        math.nan if gap and cell.strip().lower() in GAPS else number(path, line_number, title, cell)
+        for title, cell, gap in zip(headings, cells, gaps_allowed, strict=True)
     ]
 
 
-def number(path: str | Path, line: int, heading: str, cell: str) -> float:
+def number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
     """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        place = f"line {line}, column {heading.strip()!r}"
+        place = f"line {line_number}, column {heading.strip()!r}"
         raise InputError(path, place, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
     return value
 
@@ -245,7 +249,7 @@ def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarr
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Successive rows of a table.
 
     lines : (rows,) line of the file, counted from 1. values : name -> (rows,) in SI, NaN throughout a wrong row.
@@ -257,7 +261,7 @@ class Block:
     wrong: dict[int, str]
 
 
-def blocks(path: Path, columns: tuple[Columns, ...], rows: int = BLOCK) -> Iterator[Block]:
+def blocks(path: Path, columns: tuple[Columns, ...], rows: int = BLOCK) -> Iterator[RowBlock]:
     """Blocks of at most ``rows`` rows of a CSV table.
 
     columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
@@ -286,7 +290,9 @@ def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
-def _block(path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:
+def _block(
+    path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]
+) -> RowBlock:
     lines, wrong = [line for line, _ in block], {}
     values = _rows_at_once(block, len(names))
     if values is None:
@@ -297,7 +303,7 @@ def _block(path: Path, block: list[tuple[int, str]], names: list[str], factors: 
             except InputError as error:
                 wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
     values = values * factors
-    return Block(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
+    return RowBlock(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
 
 
 def _rows_at_once(block: list[tuple[int, str]], width: int) -> np.ndarray | None:

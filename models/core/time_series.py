@@ -43,16 +43,16 @@ def other_unit(lasts: float, needed: float) -> str:
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
-def sparse(count: int, period: float, needed: float, apart: float = WHEEL_SAMPLE_TIME) -> str:
+def sparse(count: int, period: float, needed: float, needed_period: float = WHEEL_SAMPLE_TIME) -> str:
     """Sentence on so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
-    ``apart`` (s) for what moves: their times may be of another unit; "" of others."""
+    ``needed_period`` (s) for what moves: their times may be of another unit; "" of others."""
     lasts = period * (count - 1)
-    if count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed or period < apart:
+    if count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed or period < needed_period:
         return ""
     return (
         f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, of which the run takes {needed:.4g} s; "
-        f"{'a wheel' if apart == WHEEL_SAMPLE_TIME else 'a chassis'} moves with up to {0.5 / apart:g} Hz. If their "
-        "times are in "
+        f"{'a wheel' if needed_period == WHEEL_SAMPLE_TIME else 'a chassis'} moves with up to "
+        f"{0.5 / needed_period:g} Hz. If their times are in "
         "milliseconds, head the column time [ms]."
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from models.core.assumptions import Broken, assumed_of, broken_of
+from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
 from models.core.discretisation import WARNED, error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
@@ -49,10 +49,10 @@ def _list_of_few(names: list[str]) -> str:
     )
 
 
-def breaches(results: Results) -> list[tuple[str, Broken]]:
+def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
     """Broken assumptions, the worst of each name over all results, with the names of the results that broke it."""
     where: dict[str, list[str]] = {}
-    worst: dict[str, Broken] = {}
+    worst: dict[str, BrokenAssumption] = {}
     for name, run in results.items():
         for breach in broken_of(run):
             where.setdefault(breach.name, []).append(name)

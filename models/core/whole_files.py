@@ -48,7 +48,7 @@ def drop_parts(folder: Path) -> None:
 
 
 def _at_work(process: int) -> bool:
-    """Whether another process of this number lives, where a system can be asked without harm."""
+    """Whether a process with this number is running; True where the operating system offers no harmless query."""
     if os.name != "posix":
         return True
     try:

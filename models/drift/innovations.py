@@ -23,7 +23,7 @@ FEWEST_INNOVATIONS = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a run beside the interval that holds it in all but a share of LEVEL of right runs."""
+    """A statistic of a run with its acceptance interval, which a correct run leaves with probability LEVEL."""
 
     name: str
     value: float

@@ -68,7 +68,8 @@ def held(numbers, time, q, v, f):
 
 @lean
 def set_held(block, t, n):
-    """``held`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Write the state that is constant over a step into a block of doubles at an address: forces f (set to zero), q and
+    v (n,), and the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -92,8 +93,8 @@ def bodies(plane: Plane) -> SpatialVehicle:
     return SpatialVehicle("braked", tuple(chain), (), (), ())
 
 
-class Carried:
-    """The chassis of a plane vehicle in an engine; ``advance`` stands in for the compiled one of that name."""
+class CarriedChassis:
+    """The chassis of a plane vehicle in an engine; ``advance`` replaces the compiled function of that name."""
 
     def __init__(self, engine: str, plane: Plane) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
@@ -126,10 +127,10 @@ class Carried:
         """March a braked vehicle as ``models.brake.samples.samples`` does, each step moved by the engine."""
         return moved(self.advance)(*given)
 
-    def _moved(self, before: np.ndarray, step: float) -> np.ndarray:
+    def _moved(self, state_before: np.ndarray, step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) after a step of the engine."""
-        carried = before.copy()
-        carried[:, 3:] = np.diff(before[:, 2:], axis=1)
+        carried = state_before.copy()
+        carried[:, 3:] = np.diff(state_before[:, 2:], axis=1)
         after = self._model.march(carried[0], carried[1], 1, step)[-1].reshape(2, -1)
         after[:, 2:] = np.cumsum(after[:, 2:], axis=1)
         return after

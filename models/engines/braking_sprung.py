@@ -62,7 +62,7 @@ def driven(vehicle: Sprung, engine: str) -> Driven:
 
 
 class OnSprings:
-    """The vehicle in an engine; ``advance`` stands in for the compiled one of that name, with all coordinates."""
+    """The vehicle in an engine; ``advance`` replaces the compiled function of that name, with all coordinates."""
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size

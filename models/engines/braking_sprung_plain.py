@@ -25,7 +25,7 @@ from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise
 
 if TYPE_CHECKING:
-    from models.brake.plain.relaxation import Lagging
+    from models.brake.plain.relaxation import LaggingTyres
     from models.brake.relaxation import Lag
 
 NAME = "reference"
@@ -46,7 +46,7 @@ class PlainOnSprings:
         step: float,
         steer: np.ndarray,
         vehicle: OnRoad,
-        lag: "Lagging | None" = None,
+        lag: "LaggingTyres | None" = None,
     ) -> tuple[int, float]:
         """Advance the vehicle in plain code as ``models.brake.advance.advance`` does, the state (2, n) having all
         coordinates and their rates.
@@ -69,7 +69,7 @@ class PlainOnSprings:
                 return AT_REST, time
         return FINE, time
 
-    def _moving(self, motion: PlaneMotion, lag: "Lagging | None") -> Moving:
+    def _moving(self, motion: PlaneMotion, lag: "LaggingTyres | None") -> Moving:
         """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
         return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations, lag)
 
@@ -87,9 +87,9 @@ class PlainOnSprings:
         Refused for a step that is too long, RunFailed as ``advance``."""
         torques, time, status, lagging = braking.torques, 0.0, FINE, None
         if lag is not None:
-            from models.brake.plain.relaxation import Lagging
+            from models.brake.plain.relaxation import LaggingTyres
 
-            lagging = Lagging(lag.length, vehicle.slope, lag.angle)
+            lagging = LaggingTyres(lag.length, vehicle.slope, lag.angle)
         step = sample / (len(torques) - 1)
         self.check_step(step)
         pressures = Pressures(braking.chambers, braking.brakes, sample, braking.air)

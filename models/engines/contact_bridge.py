@@ -28,7 +28,7 @@ from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.contact.kernel import BY_APPROACH, INPUT, INPUTS, OUTPUT, OUTPUTS, contact, net
 from models.contact.kernel_simplified import table
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.simplified_theory import press
 from models.contact.undeformed_distance import Distance, quadratic
 from models.core.errors import InputError, Refused
@@ -76,7 +76,7 @@ class Wheels:
     inertia: float = 100.0
     stiffness: tuple[float, float, float, float] = (5e6, 5e6, 1e6, 2e6)
     damping: tuple[float, float, float, float] = (1e4, 1e4, 2e4, 1e4)
-    pair: Pair = field(default_factory=Pair)
+    pair: MaterialPair = field(default_factory=MaterialPair)
 
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not isinstance(self.count, int) or not 1 <= self.count <= 1000:

@@ -24,9 +24,9 @@ CONTRACTIVITY, ITERATIONS = 0.99999, 1000
 ROUTES = ("generic object", "loads", "before each step")
 
 
-def listed(size: int, numbers: Array, fill: Callable[[int, float, int], Any]) -> Listed:
+def listed(size: int, numbers: Array, write_forces: Callable[[int, float, int], Any]) -> Listed:
     """``packed_forces`` of a compiled law that knows no time, behind a block with a table of numbers."""
-    packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), fill)
+    packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), write_forces)
     return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
@@ -65,7 +65,7 @@ class Rolling:
     def __init__(
         self,
         wheels: Wheels,
-        of: Listed | None,
+        listed: Listed | None,
         route: str = ROUTES[0],
         slopes: Callable[[Any, Any, float, float], Array] | None = None,
     ) -> None:
@@ -82,11 +82,11 @@ class Rolling:
                 )
             )
             self._nodes.append(node)
-        if of is not None:
-            {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](of)
+        if listed is not None:
+            {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](listed)
         self.mbs.Assemble()
 
-    def _object(self, of: Listed) -> None:
+    def _object(self, listed: Listed) -> None:
         slopes, more = self._slopes, dict[str, Any]()
         if slopes is not None:  # those of the left-hand side
             more["jacobianUserFunction"] = lambda mbs, t, item, q, v, by_q, by_v: -slopes(q, v, by_q, by_v)
@@ -94,7 +94,7 @@ class Rolling:
             items.ObjectGenericODE2(
                 nodeNumbers=self._nodes,
                 massMatrix=exu.MatrixContainer(),
-                forceUserFunction=lambda mbs, t, item, q, v: of(q, v),
+                forceUserFunction=lambda mbs, t, item, q, v: listed(q, v),
                 **more,
             )
         )
@@ -106,25 +106,25 @@ class Rolling:
             for i in range(FREEDOMS)
         ]
 
-    def _loads(self, of: Listed) -> None:
+    def _loads(self, listed: Listed) -> None:
         """The first load computes the forces of all."""
         data, loads = self.mbs.systemData, [0.0] * self.wheels.size
 
         def first(mbs: Any, t: float, load: float) -> float:
-            loads[:] = of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
+            loads[:] = listed(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
             return loads[0]
 
         for i, marker in enumerate(self._markers()):
             function = (lambda mbs, t, load, i=i: loads[i]) if i else first
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
-    def _before(self, of: Listed) -> None:
+    def _before(self, listed: Listed) -> None:
         """Compute the forces at the step's start, which are constant over the step."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
         def hold(mbs: Any, t: float) -> bool:
             data, write = mbs.systemData, mbs.SetLoadParameter
-            for load, value in zip(loads, of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True):
+            for load, value in zip(loads, listed(data.GetODE2Coordinates(), data.GetODE2Coordinates_t()), strict=True):
                 write(load, "load", value)
             return True
 

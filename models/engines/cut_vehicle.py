@@ -1,4 +1,4 @@
-"""A vehicle cut at its wheels in an engine: what is the same in every one.
+"""A vehicle cut at its wheels in an engine: the code that all engines share.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
 forces of ``models.multibody.cut_kernel``. "reference" solves the written-out equations instead, around the same forces;
@@ -165,9 +165,9 @@ class HubModel:
     def _times(self, steps: int) -> np.ndarray:
         return self.step * np.arange(steps + 1)
 
-    def _hold_forces(self, first: int, last: int) -> None:
+    def _hold_forces(self, first: int, last_step: int) -> None:
         """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
-        hub_inputs = self.hub_inputs.during(first, last)
+        hub_inputs = self.hub_inputs.during(first, last_step)
         if self.plain:
             self.plain.hub_inputs = hub_inputs
         else:
@@ -175,7 +175,7 @@ class HubModel:
             parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Contents of the built model: degrees of freedom, native items, callbacks."""
         return self.model.plan()
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:

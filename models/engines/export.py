@@ -31,7 +31,7 @@ class Exported:
 
 
 @dataclass(frozen=True)
-class Subject:
+class ExportSubject:
     """The system that an exported file describes. title : of the scene; source : the scene's file; axes : a sentence on
     directions and zero."""
 
@@ -39,7 +39,7 @@ class Subject:
     source: str
     axes: str
 
-    def comment(self, has: Sequence[str], left_out: Sequence[str]) -> str:
+    def comment(self, has: Sequence[str], omissions: Sequence[str]) -> str:
         """Comment lines for the head of an exported file."""
         from importlib.metadata import version
 
@@ -47,37 +47,45 @@ class Subject:
             f"{self.title}",
             f"From the scene {self.source} by twinrig {version('twinrig')}. SI units. {self.axes}",
             f"Has {', '.join(has)}.",
-            *(["Leaves out:"] if left_out else ["Leaves nothing out."]),
-            *(f"  {text}" for text in left_out),
+            *(["Leaves out:"] if omissions else ["Leaves nothing out."]),
+            *(f"  {text}" for text in omissions),
         ]
         return "\n".join(lines)
 
 
 def of_mujoco(
-    spec: "mujoco.MjSpec", model: "mujoco.MjModel", names: Mapping[str, str], subject: Subject, left_out: Sequence[str]
+    spec: "mujoco.MjSpec",
+    model: "mujoco.MjModel",
+    names: Mapping[str, str],
+    export_subject: ExportSubject,
+    omissions: Sequence[str],
 ) -> Exported:
     """A model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
     from models.engines.mujoco_export import counts, mjcf
 
-    has, missing = tuple(counts(model)), tuple(left_out)
-    return Exported(mjcf(spec, model, names, subject.title, subject.comment(has, missing)), has, missing)
+    has, missing = tuple(counts(model)), tuple(omissions)
+    return Exported(mjcf(spec, model, names, export_subject.title, export_subject.comment(has, missing)), has, missing)
 
 
-def of_exudyn(mbs: Any, coordinates: dict[str, int], subject: Subject, left_out: Sequence[str]) -> Exported:
+def of_exudyn(
+    mbs: Any, coordinates: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
+) -> Exported:
     """An assembled system; coordinates : their places in Exudyn's vectors by their names."""
     from models.engines.exudyn_export import counts, script
 
-    has, missing = tuple(counts(mbs)), tuple(left_out)
-    return Exported(script(mbs, coordinates, subject.comment(has, missing)), has, missing)
+    has, missing = tuple(counts(mbs)), tuple(omissions)
+    return Exported(script(mbs, coordinates, export_subject.comment(has, missing)), has, missing)
 
 
-def export_free_vehicle(engine: str, driven: Driven, subject: Subject, left_out: Sequence[str]) -> Exported:
+def export_free_vehicle(
+    engine: str, driven: Driven, export_subject: ExportSubject, omissions: Sequence[str]
+) -> Exported:
     """A free vehicle without what its kernel does."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
 
         coordinates = {name: i for i, name in enumerate(coordinate_names(driven.vehicle))}
-        return of_exudyn(FreeExudyn(driven).mbs, coordinates, subject, left_out)
+        return of_exudyn(FreeExudyn(driven).mbs, coordinates, export_subject, omissions)
     from models.engines.free_vehicle_mujoco import compiled, specified
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
@@ -86,7 +94,7 @@ def export_free_vehicle(engine: str, driven: Driven, subject: Subject, left_out:
     driven = replace(driven, vehicle=vehicle)
     spec = specified(driven)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
-    return of_mujoco(spec, compiled(spec, driven), names_of(vehicle), subject, [*left_out, *lowered])
+    return of_mujoco(spec, compiled(spec, driven), names_of(vehicle), export_subject, [*omissions, *lowered])
 
 
 def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
@@ -96,12 +104,12 @@ def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
     return bodies | {f"{numbers[name]} {freedom}": f"{name} {freedom}" for name, freedom in vehicle.coordinates()}
 
 
-def masses_of_shown_bodies(vehicle: SpatialVehicle, built: Iterable[str]) -> dict[str, float]:
+def masses_of_shown_bodies(vehicle: SpatialVehicle, shown_bodies: Iterable[str]) -> dict[str, float]:
     """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
     return {
         str(i): body.mass
         for i, body in enumerate(vehicle.bodies)
-        if str(i) in set(built) and body.mass > LIGHTEST_SHOWN_BODY
+        if str(i) in set(shown_bodies) and body.mass > LIGHTEST_SHOWN_BODY
     }
 
 

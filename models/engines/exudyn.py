@@ -14,7 +14,7 @@ import numpy as np
 
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
-from models.engines.exudyn_clock import Clock
+from models.engines.exudyn_clock import SignalClock
 from models.engines.exudyn_system import (
     KINDS,
     items,
@@ -93,13 +93,13 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
     return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
 
 
-def _to_ground(built: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
+def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
     """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
-    built.callbacks += len(keywords)
-    built.mbs.AddObject(
+    build.callbacks += len(keywords)
+    build.mbs.AddObject(
         items.CoordinateSpringDamper(
-            markerNumbers=[ground_marker(built.mbs), built.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.places[place]],
             stiffness=element.stiffness,
             damping=element.damping,
             **keywords,
@@ -107,7 +107,7 @@ def _to_ground(built: Build, place: tuple[str, str], element: Strut | PitchSprin
     )
 
 
-def _pitch_spring(built: Build, spring: PitchSpring) -> None:
+def _pitch_spring(build: Build, spring: PitchSpring) -> None:
     """A spring to the ground, with a law of its own where it has a dead band.
 
     Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
@@ -117,19 +117,19 @@ def _pitch_spring(built: Build, spring: PitchSpring) -> None:
         (k, d, _), beyond = law, abs(angle) - spring.dead_band
         return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
 
-    _to_ground(built, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
+    _to_ground(build, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
 
 
-def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
+def _pushing_tyre(build: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
     """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
     within a step."""
 
-    def force(mbs: Any, t: float, item: int, place: float, speed: float, *law: float) -> float:
+    def force(mbs: Any, t: float, item: int, position: float, speed: float, *law: float) -> float:
         k, d, _ = law
-        pressed = k * (place - height(mbs, t, 0.0))
+        pressed = k * (position - height(mbs, t, 0.0))
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 
-    _to_ground(built, (str(tyre.upper.body), "z"), tyre, force)
+    _to_ground(build, (str(tyre.upper.body), "z"), tyre, force)
 
 
 def _linear(assembly: Assembly) -> Build:
@@ -163,31 +163,31 @@ def native(assembly: Assembly) -> Build:
     return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
 
 
-def columns(built: Build, vehicle: Vehicle) -> list[int]:
+def columns(build: Build, vehicle: Vehicle) -> list[int]:
     """Place of each of the four coordinates within Exudyn's vector, once the system is assembled."""
     if vehicle.geometry == "linear":
         return [0, 1, 2, 3]
-    start = {name: built.mbs.GetNodeODE2Index(node) for name, node in built.nodes.items()}
+    start = {name: build.mbs.GetNodeODE2Index(node) for name, node in build.nodes.items()}
     return [start[body] + (1 if kind == "z" else 2) for body, kind in vehicle.coordinates()]
 
 
-def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
+def _drive(build: Build, assembly: Assembly, clock: SignalClock) -> None:
     """Put the input onto the wheels (and the chassis, for forces along its own axis)."""
     if clock.held:
-        built.mbs.SetPreStepUserFunction(clock.advance)
-        built.callbacks += 1
+        build.mbs.SetPreStepUserFunction(clock.advance)
+        build.callbacks += 1
     tyres = {tyre.upper.body: tyre for tyre in assembly.vehicle.tyres}
     for i, axle in enumerate(assembly.vehicle.axles):
         if assembly.mode == "road":
             tyre = tyres[axle.wheel]
             if tyre.pushes_only:
                 continue
-            _load(built, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
-            _load(built, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
+            _load(build, (axle.wheel, "z"), clock.reader(i, tyre.stiffness))
+            _load(build, (axle.wheel, "z"), clock.reader(2 + i, tyre.damping))
         elif assembly.mode == "force-body":
-            _body_fixed(built, axle.wheel, axle.x, clock.reader(i, 1.0))
+            _body_fixed(build, axle.wheel, axle.x, clock.reader(i, 1.0))
         else:
-            _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
+            _load(build, (axle.wheel, "z"), clock.reader(i, -1.0))
 
 
 def _flat_road(mbs: Any, t: float, load: float) -> float:
@@ -195,38 +195,38 @@ def _flat_road(mbs: Any, t: float, load: float) -> float:
     return 0.0
 
 
-def _load(built: Build, place: tuple[str, str], function: Any) -> None:
-    built.mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[place], load=0.0, loadUserFunction=function))
-    built.callbacks += 1
+def _load(build: Build, place: tuple[str, str], function: Any) -> None:
+    build.mbs.AddLoad(items.LoadCoordinate(markerNumber=build.places[place], load=0.0, loadUserFunction=function))
+    build.callbacks += 1
 
 
-def _body_fixed(built: Build, wheel: str, x: float, force: Reader) -> None:
+def _body_fixed(build: Build, wheel: str, x: float, force: Reader) -> None:
     """A force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
-    node = built.nodes["chassis"]
+    node = build.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:
         return mbs.GetNodeOutput(node, KINDS.Coordinates)[2]
 
-    _load(built, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
-    _load(built, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
+    _load(build, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
+    _load(build, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
 
 
-def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> list[Any]:
+def _prescribe(build: Build, assembly: Assembly, settings: Settings) -> list[Any]:
     """Prescribed coordinates as constraints with their Lagrange multipliers; returns the constraints."""
     if not assembly.guided or assembly.input is None:
         return []
     table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
     places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
     paths, rates = table[2 : 2 + len(places)], table[2 + len(places) :]
-    return [_constraint(built, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
+    return [_constraint(build, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
 
 
-def _constraint(built: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
+def _constraint(build: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
     """A coordinate that follows a path given at half steps."""
-    built.callbacks += 2
-    return built.mbs.AddObject(
+    build.callbacks += 2
+    return build.mbs.AddObject(
         items.CoordinateConstraint(
-            markerNumbers=[ground_marker(built.mbs), built.places[place]],
+            markerNumbers=[ground_marker(build.mbs), build.places[place]],
             offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
             offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
         )
@@ -240,7 +240,7 @@ class ExudynModel:
         self.assembly, self.settings = assembly, settings
         self.built = native(assembly)
         if assembly.input is not None:
-            self.clock = Clock(assembly.input, settings)
+            self.clock = SignalClock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
             flat = assembly.input is None
@@ -249,7 +249,7 @@ class ExudynModel:
             )
             _pushing_tyre(self.built, tyre, height, rate)
         if assembly.moment is not None:
-            _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
+            _load(self.built, ("chassis", "pitch"), SignalClock(assembly.moment, settings).reader(0, 1.0))
         self.constraints = _prescribe(self.built, assembly, settings)
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]

@@ -10,7 +10,7 @@ from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 
 
-class Clock:
+class SignalClock:
     """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
 
     def __init__(self, signal: Signal, settings: Settings) -> None:

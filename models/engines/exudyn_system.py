@@ -22,7 +22,7 @@ UserFunction = Callable[[Any, float, int, Any, Any], Any]
 """Forces as Exudyn asks for them: of system, time (s), item, lists of positions and of rates, as a list."""
 
 
-def packed_forces(size: int, block: np.ndarray, fill: Callable[[int, float, int], Any]) -> UserFunction:
+def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, float, int], Any]) -> UserFunction:
     """``fill(address, time, size)`` of a block of doubles: forces, positions, rates (size,), then a table.
 
     Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
@@ -33,7 +33,7 @@ def packed_forces(size: int, block: np.ndarray, fill: Callable[[int, float, int]
 
     def forces(mbs: Any, time: float, item: int, positions: Any, rates: Any) -> Any:
         pack(raw, 0, *positions, *rates)
-        fill(address, time, size)
+        write_forces(address, time, size)
         return answer()
 
     return forces
@@ -131,8 +131,8 @@ def march_settings(settings: Settings) -> Any:
 
 
 def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
-    """March by an integrator, with Exudyn's ``options`` or those of ``march_settings``; a phrase on what the solver
-    reported, empty if nothing."""
+    """March by an integrator, with Exudyn's ``options`` or those of ``march_settings``; returns the solver's message,
+    empty if there is none."""
     options = options or march_settings(settings)
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0

@@ -123,25 +123,25 @@ class Link:
     centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
-    def load(self, body: Body, at: np.ndarray) -> None:
+    def load(self, body: Body, mass_centre: np.ndarray) -> None:
         """Add a body's mass with its centre there."""
         mass = self.mass + body.mass
-        centre = (self.mass * self.centre + body.mass * at) / mass if mass else at
+        centre = (self.mass * self.centre + body.mass * mass_centre) / mass if mass else mass_centre
         self.inertia = (
             self.inertia
             + steiner(self.mass, self.centre - centre)
             + np.array(body.inertia, float)
-            + steiner(body.mass, at - centre)
+            + steiner(body.mass, mass_centre - centre)
         )
         self.mass, self.centre = mass, centre
 
 
-def add_tree(built: Build, bodies: list[Body]) -> None:
+def add_tree(build: Build, bodies: list[Body]) -> None:
     """A body without parent and its riders: a link per coordinate, mass on the last one of each body.
 
     A rider without freedoms adds its mass to the last link of what it rides on.
     """
-    part = replace(built.vehicle, bodies=tuple(bodies))
+    part = replace(build.vehicle, bodies=tuple(bodies))
     rows, places, ends = joints(part), part.coordinates(), {body.name: anchor(part, body.name) for body in bodies}
     links, zero = [Link() for _ in places], [0.0] * len(places)
     axes, below = frames(part), rows[:, 1].astype(int)
@@ -149,7 +149,7 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
     for body in bodies:
         last, origin = ends[body.name]
         links[last].load(body, np.subtract(body.position, origin))
-    node = built.mbs.AddNode(
+    node = build.mbs.AddNode(
         items.NodeGenericODE2(
             referenceCoordinates=zero,
             initialCoordinates=zero,
@@ -157,10 +157,10 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
             numberOfODE2Coordinates=len(links),
         )
     )
-    tree = built.mbs.AddObject(
+    tree = build.mbs.AddObject(
         items.ObjectKinematicTree(
             nodeNumber=node,
-            gravity=[0, 0, -built.vehicle.gravity],
+            gravity=[0, 0, -build.vehicle.gravity],
             jointTypes=[JOINTS[freedom] for _, freedom in places],
             linkParents=below.tolist(),
             jointTransformations=lists.Matrix3DList([b.T @ a for a, b in zip(axes, base, strict=True)]),
@@ -170,24 +170,24 @@ def add_tree(built: Build, bodies: list[Body]) -> None:
             linkMasses=[link.mass for link in links],
         )
     )
-    built.links |= {name: (tree, *end) for name, end in ends.items()}
-    built.frames |= {name: axes[end[0]] for name, end in ends.items()}
-    built.places |= {place: (node, i) for i, place in enumerate(places)}
+    build.links |= {name: (tree, *end) for name, end in ends.items()}
+    build.frames |= {name: axes[end[0]] for name, end in ends.items()}
+    build.places |= {place: (node, i) for i, place in enumerate(places)}
 
 
-def add_slider(built: Build, body: Body) -> None:
+def add_slider(build: Build, body: Body) -> None:
     """A body of one slide on the ground that carries nothing: with trees of one link a car takes 1.6 times as long."""
     still, (freedom,) = [0.0], body.freedoms
-    node = built.mbs.AddNode(
+    node = build.mbs.AddNode(
         items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)
     )
-    mass = built.mbs.AddObject(
+    mass = build.mbs.AddObject(
         items.Mass1D(
             nodeNumber=node, mass=body.mass, referencePosition=list(body.position), referenceRotation=SLIDES[freedom]
         )
     )
-    built.links[body.name], built.places[body.name, freedom] = (mass, None, body.position), (node, 0)
-    if freedom == "z" and built.vehicle.gravity:
-        built.mbs.AddLoad(
-            items.LoadCoordinate(markerNumber=built.coordinate(node, 0), load=-body.mass * built.vehicle.gravity)
+    build.links[body.name], build.places[body.name, freedom] = (mass, None, body.position), (node, 0)
+    if freedom == "z" and build.vehicle.gravity:
+        build.mbs.AddLoad(
+            items.LoadCoordinate(markerNumber=build.coordinate(node, 0), load=-body.mass * build.vehicle.gravity)
         )

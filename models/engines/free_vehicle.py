@@ -1,4 +1,4 @@
-"""A free vehicle in an engine: what is the same in every engine.
+"""A free vehicle in an engine: the code that all engines share.
 
 The engine has the bodies, their joints and weights, and the springs that it is handed; all other forces come from one
 compiled kernel of (numbers, time, positions, rates, forces), the last three pointers to doubles in the order of the

@@ -61,7 +61,7 @@ def _options(begin: float, settings: Settings) -> Any:
 
 
 def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
-    """States (steps + 1, 2 n) of plain equations, and what it took."""
+    """States (steps + 1, 2 n) of plain equations by an adaptive scipy solver, and its counts."""
     from scipy.integrate import solve_ivp
 
     tolerance = max(settings.tolerance, FINEST_TOLERANCE)

@@ -56,8 +56,8 @@ def _chunks(steps: int) -> Iterator[tuple[int, int]]:
 class Marcher:
     """Runs of one model in one thread or more."""
 
-    def __init__(self, built: mujoco.MjModel, threads: int = 1) -> None:
-        self.model, self._data = built, [mujoco.MjData(built) for _ in range(threads)]
+    def __init__(self, compiled_model: mujoco.MjModel, threads: int = 1) -> None:
+        self.model, self._data = compiled_model, [mujoco.MjData(compiled_model) for _ in range(threads)]
 
     def run(self, states: np.ndarray, steps: int) -> np.ndarray:
         """States (n, steps, 2 m) of n runs from ``states`` (n, 2 m); RunFailed unless all of it is finite."""

@@ -39,9 +39,9 @@ LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
 """What names of objects begin with, and what stands between the names of several elements in it."""
 
 
-def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
+def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
     """All parts into a system whose one tree has its coordinates in ``node``."""
-    coordinates, trees, axial = Coordinates(built, node), _Trees(built, node), list[Axial]()
+    coordinates, trees, axial = Coordinates(build, node), _Trees(build, node), list[Axial]()
     for part in parts:
         if isinstance(part.travel, CoordinateTravel):
             coordinates.add(part.element, part.travel)
@@ -51,9 +51,9 @@ def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
         trees.add(group)
 
 
-def add_rotors(built: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
+def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
     """Inertias of what turns with a sum of coordinates alone, as one mass matrix beside the tree's."""
-    size = built.size(node)
+    size = build.size(node)
     mass = np.zeros((size, size))
     for _, travel, inertia in rotors:
         row = np.zeros(size)
@@ -63,26 +63,26 @@ def add_rotors(built: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTr
         names = ROTORS + NEXT.join(_plain(name) for name, _, _ in rotors)
         nothing = np.zeros((size, size))
         matrices = {"massMatrix": mass, "stiffnessMatrix": nothing, "dampingMatrix": nothing}
-        built.mbs.AddObject(
+        build.mbs.AddObject(
             items.ObjectGenericODE2(name=names, nodeNumbers=[node], forceVector=np.zeros(size), **matrices)
         )
 
 
-def add_ground_spring(built: Build, spring: GroundSpring) -> None:
+def add_ground_spring(build: Build, spring: GroundSpring) -> None:
     """A connector along the axes of space, and a load."""
-    foot, tip = built.marker(None, spring.anchor), built.marker(spring.body, spring.point)
+    foot, tip = build.marker(None, spring.anchor), build.marker(spring.body, spring.point)
     if any(spring.stiffness + spring.damping):
-        built.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
+        build.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
     if np.any(spring.load):
-        built.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
+        build.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
 
 
-def add_line_spring(built: Build, spring: LineSpring) -> None:
+def add_line_spring(build: Build, spring: LineSpring) -> None:
     """A connector along the line between two points; Exudyn wants a length above 0, and has a constant force beside."""
     length = spring.length if spring.length > 0.0 else 1.0
-    built.mbs.AddObject(
+    build.mbs.AddObject(
         items.SpringDamper(
-            markerNumbers=[built.marker(*end) for end in spring.ends],
+            markerNumbers=[build.marker(*end) for end in spring.ends],
             referenceLength=length,
             stiffness=spring.stiffness,
             damping=spring.damping,
@@ -91,24 +91,24 @@ def add_line_spring(built: Build, spring: LineSpring) -> None:
     )
 
 
-def add_body_load(built: Build, load: BodyLoad) -> None:
+def add_body_load(build: Build, load: BodyLoad) -> None:
     """A force and a moment along the axes of a body."""
-    marker, axes = built.marker(load.body, load.point, True), {"bodyFixed": True}
-    force, moment = (built.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
+    marker, axes = build.marker(load.body, load.point, True), {"bodyFixed": True}
+    force, moment = (build.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
     if force.any():
-        built.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=force, **axes))
+        build.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=force, **axes))
     if moment.any():
-        built.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
+        build.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment, **axes))
 
 
-def add_turning_spring(built: Build, spring: TurningSpring) -> None:
+def add_turning_spring(build: Build, spring: TurningSpring) -> None:
     """A connector between frames of both bodies, of rotations alone, whose rotation is a vector and no angles."""
     ends = zip(spring.bodies, spring.axes, strict=True)
-    places = {body: (0.0, 0.0, 0.0) if body is None else built.vehicle.body(body).position for body in spring.bodies}
+    places = {body: (0.0, 0.0, 0.0) if body is None else build.vehicle.body(body).position for body in spring.bodies}
     turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
-    built.mbs.AddObject(
+    build.mbs.AddObject(
         items.RigidBodySpringDamper(
-            markerNumbers=[built.frame_marker(body, places[body], axes) for body, axes in ends],
+            markerNumbers=[build.frame_marker(body, places[body], axes) for body, axes in ends],
             stiffness=spring.stiffness * turning,
             damping=spring.damping * turning,
             useIntrinsicFormulation=True,
@@ -116,15 +116,15 @@ def add_turning_spring(built: Build, spring: TurningSpring) -> None:
     )
 
 
-def add_connection(built: Build, connection: Connection) -> None:
+def add_connection(build: Build, connection: Connection) -> None:
     """A spherical joint, or one that leaves no freedom between frames of both bodies."""
     if connection.axes is None:
-        markers = [built.marker(*end) for end in connection.ends]
-        built.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
+        markers = [build.marker(*end) for end in connection.ends]
+        build.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
         return
     ends = zip(connection.ends, connection.axes, strict=True)
-    markers = [built.frame_marker(*end, axes) for end, axes in ends]
-    built.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
+    markers = [build.frame_marker(*end, axes) for end, axes in ends]
+    build.mbs.AddObject(items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[1] * 6))
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
@@ -179,8 +179,8 @@ def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
 class Coordinates:
     """Connectors and constraints between coordinates of one node."""
 
-    def __init__(self, built: Build, node: Any) -> None:
-        self.built, self.node, self.markers = built, node, dict[int, Any]()
+    def __init__(self, build: Build, node: Any) -> None:
+        self.built, self.node, self.markers = build, node, dict[int, Any]()
 
     def add(self, element: Element, travel: CoordinateTravel) -> None:
         """One connector, or a matrix where more than two coordinates count."""
@@ -253,8 +253,8 @@ class Coordinates:
 class _Trees:
     """Second trees, one for each body in which axes are fixed, and connectors from the ground to them."""
 
-    def __init__(self, built: Build, node: Any) -> None:
-        self.built, self.node, self.trees = built, node, dict[str, Any]()
+    def __init__(self, build: Build, node: Any) -> None:
+        self.built, self.node, self.trees = build, node, dict[str, Any]()
 
     def add(self, group: Sequence[Axial]) -> None:
         """One connector, from the place of the foot on the ground to the tip."""

@@ -1,4 +1,5 @@
-"""The pitch plane in any engine, what is refused there, and the guard that every run of every system passes.
+"""The engine protocol of the pitch plane, the scenes that it refuses, and the guard that every run of every system
+passes.
 
 An engine is a module with ``build(assembly, settings) -> Model``.
 """

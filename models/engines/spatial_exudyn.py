@@ -31,7 +31,7 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 
 
 class SpatialExudyn:
-    """One vehicle in one Exudyn system."""
+    """A spatial vehicle in an Exudyn system."""
 
     def __init__(
         self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None

@@ -63,29 +63,29 @@ class RoadRows:
                 each.rows = rows
 
 
-def _spring(built: Build, spring: SpringDamper) -> None:
+def _spring(build: Build, spring: SpringDamper) -> None:
     """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
-    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], built.held.parts[spring.name]
+    axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.held.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
     first, two = (
-        built.marker(end, point, not upright)
+        build.marker(end, point, not upright)
         for end, point in zip(ends, (spring.first_point, spring.second_point), strict=True)
     )
     rest = np.subtract(spring.second_point, spring.first_point)
     curved = spring.travel_force or spring.rate_force or spring.friction
-    if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
-        return built.connect(f"spring {spring.name!r}", first, two, _law(spring, axis, rest, held))
+    if curved or not (upright or any(not build.vehicle.turns(end) for end in ends)):
+        return build.connect(f"spring {spring.name!r}", first, two, _law(spring, axis, rest, held))
     sunk = held / spring.stiffness if spring.stiffness else 0.0
     if upright:
         diagonal = axis**2
         law = {"stiffness": spring.stiffness * diagonal, "damping": spring.damping * diagonal}
-        return built.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
-    sign = -1 if built.vehicle.turns(spring.first_body) else 1  # the axis is one of the first marker's body
-    built.mbs.AddObject(
+        return build.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
+    sign = -1 if build.vehicle.turns(spring.first_body) else 1  # the axis is one of the first marker's body
+    build.mbs.AddObject(
         items.LinearSpringDamper(
             name=f"spring {spring.name!r}",
             markerNumbers=[first, two][::sign],
-            axisMarker0=sign * built.in_body_axes(ends[::sign][0], axis),
+            axisMarker0=sign * build.in_body_axes(ends[::sign][0], axis),
             stiffness=spring.stiffness,
             damping=spring.damping,
             offset=float(axis @ rest) - sunk,
@@ -116,17 +116,17 @@ def _law(
     return law
 
 
-def _bar(built: Build, bar: AntiRollBar) -> None:
+def _bar(build: Build, bar: AntiRollBar) -> None:
     """Vertical forces between the two points, and the moment on the body's roll coordinate."""
-    left, right = built.marker(bar.left, bar.point_left), built.marker(bar.right, bar.point_right)
-    roll, turning = built.reader(bar.body, "rx"), built.reader(bar.body, "rx", KINDS.Coordinates_t)
-    rest, held, track, read = bar.point_right[2] - bar.point_left[2], built.held.parts[bar.name], bar.track, built.mbs
+    left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
+    roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
+    rest, held, track, read = bar.point_right[2] - bar.point_left[2], build.held.parts[bar.name], bar.track, build.mbs
     k, c = bar.stiffness, bar.damping
 
-    def moment(apart: float, rate: float) -> float:
+    def moment(height_difference: float, rate: float) -> float:
         """Moment of a bar by the height of its right point above the left, and the rate of that."""
         twisting = c * (rate / track + turning()) if c else 0.0
-        return held + k * ((apart - rest) / track + roll()) + twisting
+        return held + k * ((height_difference - rest) / track + roll()) + twisting
 
     def on_body(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
         heights = [read.GetMarkerOutput(marker, KINDS.Position)[2] for marker in (right, left)]
@@ -134,57 +134,57 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
         return moment(heights[0] - heights[1], rates[0] - rates[1])
 
     name = f"anti-roll bar {bar.name!r}"
-    built.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
-    if (bar.body, "rx") in built.places:
-        node, index = built.places[bar.body, "rx"]
-        still = built.coordinate(built.mbs.AddNode(items.NodePointGround()), 0)
-        rolling = built.coordinate(node, index)
-        built.mbs.AddObject(
+    build.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
+    if (bar.body, "rx") in build.places:
+        node, index = build.places[bar.body, "rx"]
+        still = build.coordinate(build.mbs.AddNode(items.NodePointGround()), 0)
+        rolling = build.coordinate(node, index)
+        build.mbs.AddObject(
             items.CoordinateSpringDamper(
                 name=f"{name}, on {bar.body!r}", markerNumbers=[still, rolling], springForceUserFunction=on_body
             )
         )
-        built.callbacks += 1
+        build.callbacks += 1
 
 
-def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """A spring-damper to the flat ground, and what the road adds as a load; ``by_road`` (2 w,): what it adds (N)."""
-    marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
+    marker, held = build.marker(tyre.body, tyre.point), build.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
-    built.spring(built.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
+    build.spring(build.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
     force = road.forces(np.outer(by_road, (0.0, 0.0, 1.0)))
-    built.mbs.AddLoad(
+    build.mbs.AddLoad(
         items.LoadForceVector(
             name=f"road under the tyre {tyre.name!r}, flat here",
             markerNumber=marker,
             loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)],
         )
     )
-    built.callbacks += 1
+    build.callbacks += 1
 
 
-def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
+def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
     """All tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
     by_road : (2 w, tyres), what the road adds to each (N).
     """
     lifts = [
-        [built.places[name, "z"] for name in built.vehicle.chain(tyre.body) if (name, "z") in built.places]
+        [build.places[name, "z"] for name in build.vehicle.chain(tyre.body) if (name, "z") in build.places]
         for tyre in tyres
     ]
     nodes = list(dict.fromkeys(node for places in lifts for node, _ in places))
     if not nodes:
         return
-    sizes = [built.size(node) for node in nodes]
+    sizes = [build.size(node) for node in nodes]
     first = dict(zip(nodes, np.cumsum([0, *sizes]), strict=False))
     rows = np.zeros((len(tyres), sum(sizes)))
     for row, places in zip(rows, lifts, strict=True):
         for node, index in places:
             row[first[node] + index] = 1.0
-    stiffness, damping, held = np.array([(t.stiffness, t.damping, built.held.tyres[t.name]) for t in tyres]).T
+    stiffness, damping, held = np.array([(t.stiffness, t.damping, build.held.tyres[t.name]) for t in tyres]).T
     force = road.forces(by_road @ rows)
-    built.mbs.AddObject(
+    build.mbs.AddObject(
         items.ObjectGenericODE2(
             name=f"tyres {', '.join(repr(tyre.name) for tyre in tyres)}",
             nodeNumbers=nodes,
@@ -195,46 +195,46 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
             forceUserFunction=lambda mbs, t, item, q, v: force.rows[round(t * road.per_time)],
         )
     )
-    built.callbacks += 1
+    build.callbacks += 1
 
 
-def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
+def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
     """A tyre that may leave the road: one law of all of it; ``by_road`` (2 w, 2): the height and the rate under it."""
-    k, c, held, rest = tyre.stiffness, tyre.damping, built.held.tyres[tyre.name], tyre.point[2]
+    k, c, held, rest = tyre.stiffness, tyre.damping, build.held.tyres[tyre.name], tyre.point[2]
     under = road.forces(by_road)
 
-    def law(mbs: Any, t: float, item: int, place: Any, speed: Any, *_: Any) -> list[float]:
+    def law(mbs: Any, t: float, item: int, position: Any, speed: Any, *_: Any) -> list[float]:
         height, rate = under.rows[round(t * road.per_time)]
-        elastic = held + k * (height - place[2] + rest)
+        elastic = held + k * (height - position[2] + rest)
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 
-    on_road = built.marker(None, (tyre.point[0], tyre.point[1], 0.0))
+    on_road = build.marker(None, (tyre.point[0], tyre.point[1], 0.0))
     name = f"tyre {tyre.name!r}, which only pushes"
-    built.spring(on_road, built.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
+    build.spring(on_road, build.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
-def _tyres(built: Build, road: RoadRows) -> None:
+def _tyres(build: Build, road: RoadRows) -> None:
     """All tyres."""
-    tyres, turns, count = built.vehicle.tyres, built.vehicle.turns, len(built.vehicle.tyres)
+    tyres, turns, count = build.vehicle.tyres, build.vehicle.turns, len(build.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
     steady = [i for i, tyre in enumerate(tyres) if not (tyre.pushes_only or turns(tyre.body))]
     if steady:
-        _steady_tyres(built, [tyres[i] for i in steady], by_road[:, steady], road)
+        _steady_tyres(build, [tyres[i] for i in steady], by_road[:, steady], road)
     for i, tyre in enumerate(tyres):
         if tyre.pushes_only:
-            _pushing_tyre(built, tyre, np.eye(2 * count)[:, [i, count + i]], road)
+            _pushing_tyre(build, tyre, np.eye(2 * count)[:, [i, count + i]], road)
         elif i not in steady:
-            _turning_tyre(built, tyre, by_road[:, i], road)
+            _turning_tyre(build, tyre, by_road[:, i], road)
 
 
-def _side_force(built: Build, force: SideForce, speed: float) -> None:
-    roll, yaw = (built.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
+def _side_force(build: Build, force: SideForce, speed: float) -> None:
+    roll, yaw = (build.reader(force.chassis, freedom) for freedom in ("rx", "rz"))
 
     def law(apart: Any, rate: Any) -> list[float]:
         return [0.0, force.stiffness * (rate[1] / speed - force.roll_steer * roll() - yaw()), 0.0]
 
-    built.connect(
-        f"side force {force.name!r}", built.marker(None, force.point), built.marker(force.body, force.point), law
+    build.connect(
+        f"side force {force.name!r}", build.marker(None, force.point), build.marker(force.body, force.point), law
     )
 
 

@@ -314,7 +314,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 
 
 def packed(
-    vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
+    vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
     """Counts of bodies, elements and points, and all their numbers for the callback."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
@@ -322,9 +322,9 @@ def packed(
     bodies, points = list[list[float]](), list[list[float]]()
     for name in moving:
         before = len(points)
-        points += _points_of(acting, vehicle, name)
+        points += _points_of(elements, vehicle, name)
         bodies.append([*_body(vehicle, name, moving, model, numbers), before, len(points)])
-    laws = [_element(element, vehicle, numbers) for element in acting]
+    laws = [_element(element, vehicle, numbers) for element in elements]
     return (len(bodies), len(laws), len(points)), [float(value) for value in chain(*bodies, *points, *laws)]
 
 
@@ -339,12 +339,12 @@ def _body(
     return [parent, number, first, first + sliding, first + count]
 
 
-def _points_of(acting: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
+def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
     """Where the elements act on a body that may turn."""
     centre = vehicle.body(name).position
     return [
         [i, *np.subtract(point, centre), *axis]
-        for i, element in enumerate(acting)
+        for i, element in enumerate(elements)
         for body, point, axis in element.points
         if body == name and vehicle.turns(name)
     ]

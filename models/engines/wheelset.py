@@ -54,18 +54,18 @@ class EngineWheelset(Equations):
         return free_model(self.ENGINE, driven_by(self))
 
     def rates(self, state: Array) -> Array:
-        """Rates (10,) of a state (10,) by the engine."""
+        """Time derivatives (10,) of a state (10,), computed by the engine."""
         joints = to_joints(np.asarray(state, float))
         return rates_of(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
-    def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
+    def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States by the engine's RK4, and the contacts of those that are kept."""
         joints = to_joints(state)
         states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        return states[::every], self.at(states[::every])[1]
+        return states[::stride], self.at(states[::stride])[1]
 
 
 class ExudynWheelset(EngineWheelset):

@@ -60,7 +60,7 @@ BLOCKS = Blocks()
 """As paths are cut where nothing else is asked for."""
 
 
-class Job(Protocol):
+class PathJob(Protocol):
     """The computation that an ensemble repeats for each path; it must survive pickling to run in other processes."""
 
     def __call__(self, paths: range) -> Arrays:
@@ -83,7 +83,7 @@ class PathFailed(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Progress:
+class EnsembleProgress:
     """Progress of an ensemble: paths done of all, paths per second, seconds left (infinite before the first block)."""
 
     done: int
@@ -129,27 +129,27 @@ class _Counted:
 
     paths: int
     done: int
-    tell: Callable[[Progress], None]
+    tell: Callable[[EnsembleProgress], None]
     begun: float = field(default_factory=time.perf_counter)
     before: int = 0
 
     def __post_init__(self) -> None:
         self.before = self.done
-        self.tell(Progress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
+        self.tell(EnsembleProgress(self.done, self.paths, 0.0, math.inf if self.done < self.paths else 0.0))
 
     def add(self, paths: int) -> None:
         self.done += paths
         rate = (self.done - self.before) / (time.perf_counter() - self.begun)
-        self.tell(Progress(self.done, self.paths, rate, (self.paths - self.done) / rate))
+        self.tell(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
 
 
 def run_paths(
-    job: Job,
+    job: PathJob,
     paths: int,
     folder: Path | None = None,
     executor: Executor | None = None,
     blocks: Blocks = BLOCKS,
-    progress: Callable[[Progress], None] = lambda state: None,
+    progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
@@ -161,12 +161,12 @@ def run_paths(
 
 
 def each_block(
-    job: Job,
+    job: PathJob,
     paths: int,
     folder: Path | None = None,
     executor: Executor | None = None,
     blocks: Blocks = BLOCKS,
-    progress: Callable[[Progress], None] = lambda state: None,
+    progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
     """Arrays of the blocks of paths 0 to ``paths`` - 1, in their order, each as soon as those before it are there.

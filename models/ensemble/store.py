@@ -153,16 +153,16 @@ def named_files(value: Any, folder: Path) -> dict[str, str]:
     return hashes
 
 
-def _collect(value: Any, folder: Path, hashes: dict[str, str], seen: set[Path]) -> None:
+def _collect(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
     if isinstance(value, dict | list | tuple):
         for inner in value.values() if isinstance(value, dict) else value:
-            _collect(inner, folder, hashes, seen)
-    elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in seen:
-        seen.add(path.resolve())
+            _collect(inner, folder, hashes, paths_seen)
+    elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in paths_seen:
+        paths_seen.add(path.resolve())
         content = path.read_bytes()
         hashes[value] = hashes.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
-            _collect(_table(content), path.parent, hashes, seen)
+            _collect(_table(content), path.parent, hashes, paths_seen)
 
 
 def _file(text: str, folder: Path) -> Path | None:

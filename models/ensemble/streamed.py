@@ -49,7 +49,7 @@ class Moments:
         return deviation_of(self.count, float(self.second[place]) / self.count, float(self.fourth[place]) / self.count)
 
 
-class Covariance:
+class StreamedCovariance:
     """Mean (..., p) and covariance (..., p, p) of values (n, ..., p)."""
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ class Covariance:
 
 
 class Tally:
-    """How often each value came, of values that lie on a grid: as many numbers as it has places. No value is nan."""
+    """Counts of values on a grid, a count per grid point. No value is nan."""
 
     def __init__(self) -> None:
         self._counts: Counter[float] = Counter()

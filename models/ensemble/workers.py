@@ -138,7 +138,7 @@ class Crew:
 
     @classmethod
     def given(cls, workers: int | None = None, cluster: str | None = None, usual: int = DEFAULT_WORKERS) -> "Crew":
-        """The crew that is asked for; ``usual`` processes, one per core at most, where none is."""
+        """The requested pool of workers; without a request, ``usual`` processes but at most one per core."""
         return cls(workers or min(usual, os.cpu_count() or 1), cluster)
 
     @classmethod

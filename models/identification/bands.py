@@ -70,11 +70,11 @@ class Bands:
         return np.array([row[part].mean() for row, part in zip(values, used, strict=True)])
 
 
-def bands(problem: Problem, known: Uncertainty, errors: list[ErrorModel]) -> Bands:
+def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
     """Bands of a stretch: ``problem`` is that of the fit with the drive and the measurement of the stretch."""
-    values = known.fit.values
+    values = uncertainty.fit.values
     predicted = problem.predicted(values)
     slopes = problem.jacobian(values, problem.predicted)
-    variance = np.einsum("cnp,pq,cnq->cn", slopes, known.covariance, slopes)
+    variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
     own = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
     return Bands(problem, predicted, np.sqrt(own**2 + LEVEL**2 * np.clip(variance, 0.0, None)))

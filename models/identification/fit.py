@@ -68,9 +68,13 @@ def fit(
     return Fit(problem, values, problem.residuals(values), cost, stage + 1, converged)
 
 
-def _done_share(stage: int, before: float, cost: float) -> float:
+def _done_share(stage: int, previous_cost: float, cost: float) -> float:
     """Which part of a fit may be done: stages grow few as the cost settles."""
-    settled = 0.0 if not np.isfinite(before) else min(1.0, -np.log10(max(1.0 - cost / before, COST_DECREASE)) / 4.0)
+    settled = (
+        0.0
+        if not np.isfinite(previous_cost)
+        else min(1.0, -np.log10(max(1.0 - cost / previous_cost, COST_DECREASE)) / 4.0)
+    )
     return 0.9 * max(settled, stage / MOST_STAGES)
 
 

@@ -38,7 +38,8 @@ class Identified:
 
 
 def identified(first: Any, second: Any, search: Search, progress: Progress = lambda text, share: None) -> Identified:
-    """Fit on the first stretch, errors on parts left out of it, prediction of the second with bands."""
+    """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
+    with bands."""
     problem = _problem(first, search)
     solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
@@ -76,7 +77,7 @@ def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
     return answer
 
 
-def _inside(solved: Fit) -> np.ndarray:
-    low, high = solved.problem.bounds
-    margin = 1e-3 * solved.problem.scale
-    return np.clip(solved.values, low + margin, high - margin)
+def _inside(fit: Fit) -> np.ndarray:
+    low, high = fit.problem.bounds
+    margin = 1e-3 * fit.problem.scale
+    return np.clip(fit.values, low + margin, high - margin)

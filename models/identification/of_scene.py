@@ -14,7 +14,7 @@ from models.core.result import Result
 from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS, of_table
-from models.identification.problem import Clock, Curve, Measured, Parameter, Problem, measured_channel
+from models.identification.problem import ChannelOnClock, Curve, FitClock, Parameter, Problem, measured_channel
 from models.measured.channel import Source
 from models.measured.curve import curve
 from models.measured.formats import open_source
@@ -183,13 +183,13 @@ def problem_of(
     first = over_time(model.result(np.array([each.start for each in asked])))
     read = curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
     clock = _clock([first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement)
-    channels: list[Measured] = [
+    channels: list[ChannelOnClock] = [
         measured_channel(name, first[name][0], samples, clock, str(measurement)) for name, samples in read.items()
     ]
     return Problem(model, asked, channels, clock)
 
 
-def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path) -> Clock:
+def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path) -> FitClock:
     """Times that the run and every channel of the measurement share, as close as the closest of the measurement."""
     begin = max(float(times[0]) for times in (*ours, *theirs))
     end = min(float(times[-1]) for times in (*ours, *theirs))
@@ -200,4 +200,4 @@ def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, me
     if low_pass and not 0.0 < low_pass < 0.5 / period:
         allowed = f"must be below {0.5 / period:g} Hz, half the sampling rate of the measurement, or 0 for none"
         raise InputError("--low-pass", "", low_pass, allowed)
-    return Clock(begin + period * np.arange(int((end - begin) / period + 1e-6) + 1), low_pass)
+    return FitClock(begin + period * np.arange(int((end - begin) / period + 1e-6) + 1), low_pass)

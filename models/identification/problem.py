@@ -55,7 +55,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Clock:
+class FitClock:
     """times (n,) : s, even; edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the samples
     that residuals keep."""
 
@@ -69,7 +69,7 @@ class Clock:
 
     @property
     def stride(self) -> int:
-        """Every how-many-th sample is kept: what a low-pass has left does not change in between."""
+        """Number of samples per sample that is kept: after the low-pass the signal hardly changes in between."""
         return max(1, int(1.0 / (OVERSAMPLED * self.edge * self.period) + 1e-9)) if self.edge > 0.0 else 1
 
     def filtered(self, values: np.ndarray) -> np.ndarray:
@@ -80,7 +80,7 @@ class Clock:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class ChannelOnClock:
     """One channel on the clock: values (n,), low-passed; used (n,) : which of them count; left_out : samples of the
     file that were spikes or not measured."""
 
@@ -96,7 +96,7 @@ class Measured:
         return float(np.sqrt(np.mean(self.values[self.used] ** 2)))
 
 
-def measured_channel(name: str, unit: str, curve: Curve, clock: Clock, place: str = "") -> Measured:
+def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place: str = "") -> ChannelOnClock:
     """A channel of a file on the clock; InputError where next to nothing of it lies there, or it does not move."""
     times, raw = curve
     values = without_outliers(raw)
@@ -111,7 +111,7 @@ def measured_channel(name: str, unit: str, curve: Curve, clock: Clock, place: st
     smooth = clock.filtered(np.interp(clock.times, times[known], values[known]))
     if not np.any(smooth[used]):
         raise InputError(place, name, 0.0, "does not move: nothing can be identified by it")
-    return Measured(name, unit, smooth, used, int(len(raw) - known.sum()))
+    return ChannelOnClock(name, unit, smooth, used, int(len(raw) - known.sum()))
 
 
 def _nearest(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -125,8 +125,8 @@ class Problem:
 
     model: Model
     parameters: Sequence[Parameter]
-    channels: Sequence[Measured]
-    clock: Clock
+    channels: Sequence[ChannelOnClock]
+    clock: FitClock
     taking_part: np.ndarray | None = None
 
     @property
@@ -145,7 +145,7 @@ class Problem:
         return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
-        """(channels, n): what the model says at all times of the clock, low-passed as the measurement is; read-only."""
+        """Output of the model (channels, n) at all times of the clock, low-passed like the measurement; read-only."""
         key, kept = values.tobytes(), self._latest_predictions
         if key not in kept:
             prediction = self._march(values)
@@ -196,7 +196,8 @@ class Problem:
     def jacobian(
         self, values: np.ndarray, of: Callable[[np.ndarray], np.ndarray] | None = None, executor: Executor | None = None
     ) -> np.ndarray:
-        """(channels, m, p): derivatives by parameters in their scales, forward, or backward where that fails.
+        """Jacobian (channels, m, p) by forward differences in the parameters' scales, or backward differences where
+        forward ones fail.
 
         of : what is derived, the residuals if nothing else is named; executor : computes its columns.
         """

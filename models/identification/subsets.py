@@ -26,7 +26,7 @@ Deviations = Callable[[dict[str, float]], np.ndarray]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A parameter that may be called for: where its fit starts, its lowest value, the scale of steps."""
+    """A parameter that a fit may include: start value, lower bound, and scale of steps."""
 
     start: float
     lowest: float = -np.inf
@@ -79,7 +79,8 @@ class Subset:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """All subsets by rising criterion, their weights (probabilities among them), the inflation c of chi^2.
+    """All subsets of parameters in the order of their criterion, their weights (probabilities), and the inflation
+    factor c of chi^2.
 
     calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart; blind : parameters
     on which no measured number depends.

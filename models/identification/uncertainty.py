@@ -34,7 +34,7 @@ PROFILE = (-2.0, -1.0, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What a fit says of its parameters, each in its scale: covariance (p, p), information H (p, p).
+    """Uncertainty of fitted parameters, each in its scale: covariance (p, p), information matrix H (p, p).
 
     free (p,) : estimates that lie at no bound; the others have no covariance.
     """
@@ -47,7 +47,8 @@ class Uncertainty:
 
     @cached_property
     def deviations(self) -> np.ndarray:
-        """Standard errors (p,) in the units of the parameters; infinite of what the data do not tell."""
+        """Standard errors (p,) in the units of the parameters; infinite for parameters that the data do not
+        determine."""
         spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
         return np.where(self.free, spread, np.nan)
 
@@ -76,22 +77,22 @@ class Uncertainty:
         return answer
 
 
-def uncertainty(solved: Fit, executor: Executor | None = None) -> Uncertainty:
+def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
     """Covariance of the estimates by the fit's own residuals; executor : computes the columns of their Jacobian."""
-    problem = solved.problem
-    jacobian = problem.jacobian(solved.values, executor=executor)
-    free = ~solved.at_bound
+    problem = fit.problem
+    jacobian = problem.jacobian(fit.values, executor=executor)
+    free = ~fit.at_bound
     inner = np.einsum("cmp,cmq->pq", jacobian, jacobian)
-    scores = np.einsum("cmp,cm->mp", jacobian, solved.residuals)
-    lags, staying = _longest_lags(solved.residuals)
+    scores = np.einsum("cmp,cm->mp", jacobian, fit.residuals)
+    lags, staying = _longest_lags(fit.residuals)
     covariance = np.zeros_like(inner)
     part = np.ix_(free, free)
     if free.any():
         inverse = _inverse(inner[part])
-        both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], solved.residuals, lags)
+        both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], fit.residuals, lags)
         covariance[part] = inverse @ _larger_covariance(*both) @ inverse
         covariance[part] += _untold(inner[part])
-    return Uncertainty(solved, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
+    return Uncertainty(fit, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
@@ -153,7 +154,7 @@ def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class LikelihoodProfile:
     """values (k,) of one parameter, and by how much the misfit rises there, the others fitted anew: (k,) in units of
     which 3.84 is the limit of 95 %; ``parabola`` (k,) : what the standard error says."""
 
@@ -168,22 +169,22 @@ class Profile:
         return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
 
 
-def profile(known: Uncertainty, k: int) -> Profile:
+def profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
     """Profile likelihood of parameter ``k``; the misfit is weighted as its covariance is, so that residuals that stay
     alike do not count as many."""
-    solved, problem = known.fit, known.fit.problem
+    solved, problem = uncertainty.fit, uncertainty.fit.problem
     scale, parameter = problem.scale[k], problem.parameters[k]
-    spread = known.deviations[k] if np.isfinite(known.deviations[k]) else scale
+    spread = uncertainty.deviations[k] if np.isfinite(uncertainty.deviations[k]) else scale
     spread = min(spread, 0.5 * scale)
-    naive = _inverse(known.information)[k, k] * scale**2
-    weight = naive / known.deviations[k] ** 2 if np.isfinite(known.deviations[k]) and naive > 0.0 else 1.0
+    naive = _inverse(uncertainty.information)[k, k] * scale**2
+    weight = naive / uncertainty.deviations[k] ** 2 if np.isfinite(uncertainty.deviations[k]) and naive > 0.0 else 1.0
     values = [v for v in solved.values[k] + spread * np.array(PROFILE) if parameter.low < v < parameter.high]
     rises = []
     for value in values:
         there = fit(_held_inside(problem, k, value, solved.values))
         rises.append(2.0 * (there.cost - solved.cost) * weight)
-    parabola = ((np.array(values) - solved.values[k]) / known.deviations[k]) ** 2
-    return Profile(parameter.name, np.array(values), np.array(rises), parabola)
+    parabola = ((np.array(values) - solved.values[k]) / uncertainty.deviations[k]) ** 2
+    return LikelihoodProfile(parameter.name, np.array(values), np.array(rises), parabola)
 
 
 def _held_inside(problem: Problem, k: int, value: float, values: np.ndarray) -> Problem:

@@ -48,7 +48,8 @@ def lean(function: Callable) -> Any:
 
 
 def inlined(function: Callable) -> Any:
-    """``lean``, and written out in whatever calls it: an array given as an argument costs as much as ten numbers."""
+    """Decorator like ``lean`` that also inlines the function into its callers: an array argument costs as much as ten
+    numbers."""
     return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
 
 

@@ -23,28 +23,28 @@ Clock = Callable[[], float]
 def interleave(
     jobs: Sequence[Callable[[], Any]],
     rounds: int,
-    least: float = 0.02,
+    minimum_seconds: float = 0.02,
     lasted: Sequence[float] | np.ndarray | None = None,
-    every: Sequence[int] | None = None,
+    round_interval: Sequence[int] | None = None,
     clock: Clock = time.perf_counter,
 ) -> np.ndarray:
     """Seconds of every job in every round, shape (jobs, rounds), NaN in those that it is not in; single thread, warmed
     up.
 
-    least : a job is repeated within its turn until it lasts about this long (s);
+    minimum_seconds : a job is repeated within its turn until it lasts about this long (s);
     lasted : seconds of a run of each job that has been, 0 where there was none; every : a job is in one of so many
     rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [
-        1 if duration > LONG_JOB_RATIO * least else _repeats(job, least, clock)
+        1 if duration > LONG_JOB_RATIO * minimum_seconds else _repeats(job, minimum_seconds, clock)
         for job, duration in zip(jobs, known, strict=True)
     ]
     order = np.random.default_rng(SEED)
     seconds = np.full((len(jobs), rounds), np.nan)
     for i in range(rounds):
         for j in order.permutation(len(jobs)):
-            each = 1 if every is None else every[j]
+            each = 1 if round_interval is None else round_interval[j]
             if i == 0 and each > 1 and known[j] > 0.0:
                 seconds[j, i] = known[j]
             elif i % each == 0:
@@ -52,12 +52,12 @@ def interleave(
     return seconds
 
 
-def _repeats(job: Callable[[], Any], least: float, clock: Clock) -> int:
+def _repeats(job: Callable[[], Any], minimum_seconds: float, clock: Clock) -> int:
     """Number of repeats of a job that fill one timed turn: measured on the warm-up, or after it where that was
     short."""
-    if _timed(job, 1, clock) >= least:
+    if _timed(job, 1, clock) >= minimum_seconds:
         return 1
-    return max(1, math.ceil(0.9 * least / max(_timed(job, 1, clock), 1e-9)))
+    return max(1, math.ceil(0.9 * minimum_seconds / max(_timed(job, 1, clock), 1e-9)))
 
 
 def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
@@ -75,7 +75,7 @@ def describe(seconds: Sequence[float]) -> dict[str, float]:
 
 
 def interval(samples: np.ndarray) -> tuple[float, float, float]:
-    """A value and its 95 % interval from bootstrapped ones: median, 2.5 % and 97.5 % quantile."""
+    """Median and 95 % interval (2.5 % and 97.5 % quantile) of bootstrapped values."""
     low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975))
     return float(middle), float(low), float(high)
 

@@ -35,7 +35,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Block:
+class SampleBlock:
     """Successive samples of some channels of one group.
 
     first : index of the first one. times (n,) : s since ``Source.start``, as in the file, whatever their order;
@@ -60,7 +60,7 @@ class Source(Protocol):
 
     @property
     def start(self) -> datetime | None:
-        """When time was 0, with its zone; None where the file does not say."""
+        """Date and time at time 0, with its zone; None where the file does not give it."""
 
     @property
     def comment(self) -> str:
@@ -70,7 +70,7 @@ class Source(Protocol):
     def noticed(self) -> tuple[Finding, ...]:
         """Findings on opening the file: cut off, repeated names, channels left out, how numbers are written."""
 
-    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
+    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.
 
         Raises InputError that names the file and the byte, line or sample where it cannot be read.

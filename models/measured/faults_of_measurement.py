@@ -73,17 +73,17 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
 
 
 def measured(
-    faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, every: int, seed: int, path: int = 0
+    faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
 ) -> np.ndarray:
-    """Samples (m, signals) of every ``every``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
+    """Samples (m, signals) of every ``stride``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
 
     seed and path name the noise: the same ones give the same samples, whoever asks.
     """
-    period = step * every
+    period = step * stride
     columns = []
     for signal, true in zip(signals, truth.T, strict=True):
         late = amount(faults.delay, signal)
-        values = (1.0 + amount(faults.gain, signal)) * _delayed_samples(true, step, every, late) + amount(
+        values = (1.0 + amount(faults.gain, signal)) * _delayed_samples(true, step, stride, late) + amount(
             faults.bias, signal
         )
         values = values + amount(faults.noise, signal) * _stream(signal.channel, seed, path, len(values), TRANSDUCERS)
@@ -115,11 +115,11 @@ def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period
     return lost
 
 
-def _delayed_samples(true: np.ndarray, step: float, every: int, delay: float) -> np.ndarray:
-    """Every ``every``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
+def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -> np.ndarray:
+    """Every ``stride``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
     if delay == 0.0:
-        return true[::every].copy()
-    at = np.maximum(step * every * np.arange(len(true[::every])) - delay, 0.0)
+        return true[::stride].copy()
+    at = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
     from scipy.interpolate import make_interp_spline
 
     return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(at))

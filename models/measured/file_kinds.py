@@ -121,35 +121,37 @@ KINDS = (
 WORKBOOK, ARRAYS = KINDS[0], next(kind for kind in KINDS if ".npz" in kind.extensions)
 
 
-def format_of(path: Path, head: bytes) -> str:
+def format_of(path: Path, first_bytes: bytes) -> str:
     """Format of a file by its first bytes; raises InputError that names what cannot be read, with what to do."""
-    form = next((form for magic, form in READABLE.items() if head.startswith(magic)), "")
+    form = next((form for magic, form in READABLE.items() if first_bytes.startswith(magic)), "")
     if form:
         return form
-    if head[:32].split(b"\0")[0].strip() == b"FORMAT":
+    if first_bytes[:32].split(b"\0")[0].strip() == b"FORMAT":
         return "RPC III"
-    kind = next((kind for kind in KINDS if re.match(kind.begins, head.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)), None)
+    kind = next(
+        (kind for kind in KINDS if re.match(kind.begins, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)), None
+    )
     if kind is not None:
         if kind.extensions == (".zip",):
             kind = _of_archive(path) or kind
         raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN_FORMATS}")
-    if is_text(head):
+    if is_text(first_bytes):
         return "CSV"
     allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN_FORMATS}"
-    raise InputError(path, "byte 0", head[:8].hex(" "), allowed)
+    raise InputError(path, "byte 0", first_bytes[:8].hex(" "), allowed)
 
 
-def is_text(head: bytes) -> bool:
+def is_text(first_bytes: bytes) -> bool:
     """Whether the first bytes of a file can be text: UTF-16 has its mark, all else no zero byte."""
-    return head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in head
+    return first_bytes.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in first_bytes
 
 
-def usual_of(suffix: str, form: str) -> str:
-    """Text on what files of an extension usually are; ``form``, the kind of this file, where tables have that
+def usual_of(suffix: str, format_name: str) -> str:
+    """Text on what files of an extension usually are; ``format_name``, the kind of this file, where tables have that
     extension, too."""
     if suffix in EXTENSIONS or suffix == ".asc":
-        return EXTENSIONS.get(suffix, form)
-    return next((kind.name for kind in KINDS if suffix in kind.extensions), form)
+        return EXTENSIONS.get(suffix, format_name)
+    return next((kind.name for kind in KINDS if suffix in kind.extensions), format_name)
 
 
 def by_extension(path: Path) -> str:

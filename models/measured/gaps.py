@@ -121,12 +121,12 @@ def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int)
 
 
 def _conditional_mean(
-    law: np.ndarray, known: np.ndarray, lost: np.ndarray, values: np.ndarray
+    law: np.ndarray, known_samples: np.ndarray, lost: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Mean (m,) of the lost samples given the known ones, and the largest standard deviation."""
-    among = law[np.abs(known[:, None] - known)]
-    among[np.diag_indices(len(known))] *= 1 + 1e-9
-    between = law[np.abs(lost[:, None] - known)]
+    among = law[np.abs(known_samples[:, None] - known_samples)]
+    among[np.diag_indices(len(known_samples))] *= 1 + 1e-9
+    between = law[np.abs(lost[:, None] - known_samples)]
     weights = np.linalg.solve(among, between.T)
     left = law[0] - np.sum(between.T * weights, axis=0)
     return values @ weights, float(np.sqrt(np.maximum(left, 0.0).max()))

@@ -46,15 +46,15 @@ def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
 
 
 def sentence(
-    ratio: float, signal: Signal, against: str, remedies: Mapping[Wrong, str] | None = None
+    ratio: float, signal: Signal, reference: str, remedies: Mapping[Wrong, str] | None = None
 ) -> tuple[Wrong, str]:
-    """The cause of a wrong factor and a sentence about it; ``against`` names the source of the true value.
+    """The cause of a wrong factor and a sentence about it; ``reference`` names the source of the true value.
 
     remedies : what to do about each, None for those of a channel map.
     """
     kind, unit = probable_mistake(ratio, signal)
-    reads = f"{signal.name} reads {ratio:.4g} times {against}"
-    reading = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
+    reads = f"{signal.name} reads {ratio:.4g} times {reference}"
+    reading = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {reference}"
     texts: dict[Wrong, str] = {
         "sign": f"{reads}: its sign is wrong",
         "unit": f"{reads}, as {unit} does",

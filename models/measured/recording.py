@@ -17,7 +17,7 @@ Progress = Callable[[str, float], None]
 
 
 def no_progress(*told: Any) -> None:
-    """Progress that nobody is told of."""
+    """Progress function that reports nothing."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,12 @@ class Recording:
         """Time (s) of the last sample."""
         return self.period * (self.count - 1)
 
-    def find(self, quantity: str, at: str = "", component: str = "") -> tuple[Signal, ...]:
+    def find(self, quantity: str, location: str = "", component: str = "") -> tuple[Signal, ...]:
         """Signals of a quantity, of one place or component if named, in the order of the map."""
         return tuple(
-            s for s in self.signals if s.quantity == quantity and at in ("", s.at) and component in ("", s.component)
+            s
+            for s in self.signals
+            if s.quantity == quantity and location in ("", s.at) and component in ("", s.component)
         )
 
     def samples(self, signal: Signal) -> np.ndarray:

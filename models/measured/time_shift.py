@@ -16,7 +16,7 @@ SHIFT_RESOLUTION = 1e-4
 
 
 @dataclass(frozen=True)
-class Pair:
+class ChannelPair:
     """One channel of a run and of a measurement: times (n,) and values (n,) of the one, times (m,) and values (m,) of
     the other, NaN where nothing was measured; s, and the same unit."""
 
@@ -35,7 +35,7 @@ class Shift:
     correlation: float
 
 
-def time_shift(pairs: Sequence[Pair]) -> Shift:
+def time_shift(pairs: Sequence[ChannelPair]) -> Shift:
     """The shift at which channels correlate best, means and scales aside, to a fraction of a sample."""
     moving = [pair for pair in pairs if _varies(pair.run) and _varies(pair.values)]
     if not moving:
@@ -50,7 +50,7 @@ def _varies(values: np.ndarray) -> bool:
     return bool(len(finite) > 2 and np.var(finite) > CONSTANT_VARIANCE * np.mean(finite**2))
 
 
-def _search_step(pairs: Sequence[Pair]) -> float:
+def _search_step(pairs: Sequence[ChannelPair]) -> float:
     """Step (s) of the search: that of the finer clock, unless the grid would be too long."""
     clocks = [times for pair in pairs for times in (pair.run_times, pair.times)]
     finest = min(float(np.median(np.diff(times))) for times in clocks)
@@ -58,7 +58,7 @@ def _search_step(pairs: Sequence[Pair]) -> float:
     return max(finest, longest / MOST_SAMPLES)
 
 
-def _coarse_shift(pairs: Sequence[Pair], step: float) -> float:
+def _coarse_shift(pairs: Sequence[ChannelPair], step: float) -> float:
     """The shift (s), a whole number of steps beside the two starts, at which the mean correlation is largest."""
     first = min(float(pair.run_times[0]) for pair in pairs)
     begin = min(float(pair.times[0]) for pair in pairs)
@@ -72,12 +72,18 @@ def _grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
     return first + step * np.arange(int((times[-1] - first) / step) + 1)
 
 
-def _on_grid(pair: Pair, first: float, begin: float, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _on_grid(
+    channel_pair: ChannelPair, first: float, begin: float, step: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run (n,), measurement (m,) and whether it was measured (m,), on even times from two starts (s)."""
-    grid, ours, measured = _grid(pair.times, begin, step), _grid(pair.run_times, first, step), np.isfinite(pair.values)
-    there = np.interp(grid, pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
-    values = np.interp(grid, pair.times[measured], pair.values[measured])
-    return np.interp(ours, pair.run_times, pair.run), np.where(there, values, 0.0), there
+    grid, ours, measured = (
+        _grid(channel_pair.times, begin, step),
+        _grid(channel_pair.run_times, first, step),
+        np.isfinite(channel_pair.values),
+    )
+    there = np.interp(grid, channel_pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
+    values = np.interp(grid, channel_pair.times[measured], channel_pair.values[measured])
+    return np.interp(ours, channel_pair.run_times, channel_pair.run), np.where(there, values, 0.0), there
 
 
 def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -98,7 +104,7 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
     return np.where(enough, likeness, -1.0)
 
 
-def _refined_shift(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
+def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> Shift:
     """The shift within a step of a coarse one at which the mean correlation is largest, the run read by splines."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
@@ -115,12 +121,16 @@ def _refined_shift(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
     return Shift(seconds, -apart(seconds))
 
 
-def _correlation_at_shift(pair: Pair, curve: Callable[[np.ndarray], np.ndarray], seconds: float) -> float:
+def _correlation_at_shift(
+    channel_pair: ChannelPair, curve: Callable[[np.ndarray], np.ndarray], seconds: float
+) -> float:
     """Correlation of a channel at a shift (s)."""
-    times = pair.times - seconds
-    inside = np.isfinite(pair.values) & (times >= pair.run_times[0]) & (times <= pair.run_times[-1])
+    times = channel_pair.times - seconds
+    inside = (
+        np.isfinite(channel_pair.values) & (times >= channel_pair.run_times[0]) & (times <= channel_pair.run_times[-1])
+    )
     if np.count_nonzero(inside) < 3:
         return -1.0
-    pairs = np.array([pair.values[inside], curve(times[inside])])
+    pairs = np.array([channel_pair.values[inside], curve(times[inside])])
     spread = pairs.std(axis=1)
     return float(np.corrcoef(pairs)[0, 1]) if spread.min() > 0.0 else -1.0

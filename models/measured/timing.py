@@ -87,9 +87,9 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
     """The timing of values that can be times."""
     findings, whole = list[Finding](), len(times)
 
-    def say(check: str, weight: Weight, text: str, size: float, unit: str, at: Iterable[float]) -> None:
+    def say(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
         findings.append(
-            Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, at)))
+            Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
         )
 
     keep, order = np.arange(whole), None

@@ -81,18 +81,18 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
     return float(_registry().Quantity(1.0, parsed).to(_si(quantity)).magnitude)
 
 
-def factor_between(unit: str, wanted: str, file: object, place: str) -> float:
-    """Factor of a unit to another one: value in ``wanted`` = value * factor.
+def factor_between(unit: str, target_unit: str, file: object, place: str) -> float:
+    """Factor of a unit to another one: value in ``target_unit`` = value * factor.
 
     Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
     number.
     """
-    goal = _parsed(wanted, "force")
+    goal = _parsed(target_unit, "force")
     accelerates = goal is not None and goal.is_compatible_with(_si("acceleration"))
     given = _parsed(unit, "acceleration" if accelerates else "force")
     if given is None or goal is None or not given.is_compatible_with(goal) or _has_angle(given) != _has_angle(goal):
         told = "no such unit is known" if given is None else "is the unit of another quantity"
-        raise InputError(file, place, unit, f"{told}: the channel is in {wanted or '-'}")
+        raise InputError(file, place, unit, f"{told}: the channel is in {target_unit or '-'}")
     return float(_registry().Quantity(1.0, given).to(goal).magnitude)
 
 

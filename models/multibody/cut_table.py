@@ -50,10 +50,10 @@ class HubInputs:
         ends = [0, *changes.tolist(), len(begins)]
         return list(itertools.pairwise(ends))
 
-    def during(self, first: int, last: int) -> "HubInputs":
+    def during(self, first: int, last_step: int) -> "HubInputs":
         """The hub inputs of one span of steps, whose time begins with it."""
-        hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last - first) + 1, axis=0)
-        return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last + 1])
+        hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last_step - first) + 1, axis=0)
+        return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last_step + 1])
 
 
 @dataclass(frozen=True)

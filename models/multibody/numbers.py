@@ -182,7 +182,8 @@ class _Points:
 
 
 def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
-    """Rows of all coordinates, with their counts in a body; those that turn what nothing else is on are loose.
+    """Table rows of all coordinates, with their number within the body; a rotation of a body that carries nothing else
+    is marked loose.
 
     held : coordinates that are the last to move a point where something acts.
     """

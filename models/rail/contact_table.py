@@ -22,9 +22,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.inputs import Array, quantity
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.wheel_on_rail import Pose, Touch, WheelAndRail, touches_of, touching_pose
+from models.contact.wheel_on_rail import Pose, TouchingPlace, WheelAndRail, touches_of, touching_pose
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
@@ -107,7 +107,7 @@ class PatchReport:
 
 
 @dataclass(frozen=True)
-class Placed:
+class WheelsetPlacement:
     """Contact at one lateral displacement (m) and yaw (rad): roll (rad), speed of spin (rad/s), the patches."""
 
     shift: float
@@ -119,7 +119,7 @@ class Placed:
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class LoadedWheel:
     """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
@@ -128,7 +128,7 @@ class Carried:
     """
 
     pose: Pose
-    touches: list[Touch]
+    touches: list[TouchingPlace]
     creepages: list[Triple]
     pressed: NormalContact
     approach: float
@@ -145,14 +145,14 @@ class Carried:
             return [share.load for share in self.shares]
         return [0.0 if part is None else part.load for part in map(self.part, self.touches)]
 
-    def part(self, touch: Touch) -> PatchPressure | None:
+    def part(self, touch: TouchingPlace) -> PatchPressure | None:
         """The pressure on one patch by the simplified theory; None where that theory leaves the patch without
         contact."""
         return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class WheelsetContact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
     0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
 
@@ -160,10 +160,10 @@ class Contact:
     load: float
     speed: float
     friction: float = 0.0
-    pair: Pair = Pair()  # noqa: RUF009 - a frozen value
+    pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
     coarser: float = 1.0
 
-    def at(self, shift: float, yaw: float = 0.0) -> Placed:
+    def at(self, shift: float, yaw: float = 0.0) -> WheelsetPlacement:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
 
         Raises InputError as wheel_on_rail, and RunFailed where the load presses the bodies into each other beyond all
@@ -186,39 +186,39 @@ class Contact:
                 break
             rolling = self._free_spin(wheels)
             wheels = [self._at_other_spin(wheel, rolling) for wheel in wheels]
-        return _standing(Placed(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
+        return _standing(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
 
-    def _both_wheels(self, pose: Pose, spin: float) -> list[Carried]:
+    def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
         """The right wheel, and the left one in its mirror, each lowered until it touches and pressed on its rail.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
         return [self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin) for sign in SIGNS]
 
-    def _wheel(self, seen: Pose, spin: float) -> Carried:
-        pose = replace(seen, fall=self.side.clearance(seen))
+    def _wheel(self, wheel_pose: Pose, spin: float) -> LoadedWheel:
+        pose = replace(wheel_pose, fall=self.side.clearance(wheel_pose))
         touches = touches_of(self.side, pose)
         creepages = [self._creepage(pose, touch, spin) for touch in touches]
 
-        def by_normal(normal: float) -> Carried:
+        def by_normal(normal: float) -> LoadedWheel:
             pressed = press([touch.patch for touch in touches], self.pair, load=normal)
-            return Carried(pose, touches, creepages, pressed, pressed.approach, normal)
+            return LoadedWheel(pose, touches, creepages, pressed, pressed.approach, normal)
 
         return self._balanced(by_normal, self.load)
 
-    def _with_exact_normal(self, near: Carried) -> Carried:
+    def _with_exact_normal(self, approximate: LoadedWheel) -> LoadedWheel:
         """The pressed wheel, its normal contact solved exactly in place of the simplified theory."""
-        patches = [touch.patch for touch in near.touches]
+        patches = [touch.patch for touch in approximate.touches]
 
-        def by_normal(normal: float) -> Carried:
+        def by_normal(normal: float) -> LoadedWheel:
             shares, approach = press_exactly(
-                patches, near.pressed.patches, normal, near.approach, self.pair, self.coarser
+                patches, approximate.pressed.patches, normal, approximate.approach, self.pair, self.coarser
             )
-            return replace(near, shares=shares, approach=approach, normal=normal)
+            return replace(approximate, shares=shares, approach=approach, normal=normal)
 
-        return self._balanced(by_normal, near.normal)
+        return self._balanced(by_normal, approximate.normal)
 
-    def _balanced(self, by_normal: Callable[[float], Carried], normal: float) -> Carried:
+    def _balanced(self, by_normal: Callable[[float], LoadedWheel], normal: float) -> LoadedWheel:
         """A wheel whose normal and creep forces carry the load, by the vertical part (N) of the normal forces."""
         for _ in range(ITERATIONS):
             wheel = self._rolled(by_normal(normal))
@@ -227,8 +227,9 @@ class Contact:
             normal *= self.load / (normal - wheel.lifted)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
-    def _free_spin(self, wheels: Sequence[Carried]) -> float:
-        """Speed of spin (rad/s) at which the creep forces have no moment about the axle, pressed as the wheels are."""
+    def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
+        """Rotational speed (rad/s) of a free wheelset, at which its creep forces have no moment about the axle, under
+        the present normal forces."""
 
         def moment(spin: float) -> float:
             return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
@@ -236,12 +237,12 @@ class Contact:
         rolling = -self.speed / self.side.wheelset.radius
         return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
 
-    def _at_other_spin(self, wheel: Carried, spin: float) -> Carried:
+    def _at_other_spin(self, wheel: LoadedWheel, spin: float) -> LoadedWheel:
         """A wheel that is pressed as it was and turns at another speed (rad/s)."""
         creepages = [self._creepage(wheel.pose, touch, spin) for touch in wheel.touches]
         return self._rolled(replace(wheel, creepages=creepages))
 
-    def _rolled(self, wheel: Carried) -> Carried:
+    def _rolled(self, wheel: LoadedWheel) -> LoadedWheel:
         """The wheel with the creep forces of each patch, those without contact have none."""
         forces = []
         for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
@@ -257,7 +258,7 @@ class Contact:
         moment = sum(float(axle @ _moments(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
         return replace(wheel, forces=forces, lifted=lifted, moment=moment)
 
-    def _creepage(self, pose: Pose, touch: Touch, spin: float) -> Triple:
+    def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
         """Creepages and spin (1/m) at a place of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
@@ -267,15 +268,15 @@ class Contact:
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
-    def _radius(self, touch: Touch) -> float:
+    def _radius(self, touch: TouchingPlace) -> float:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
-    def _arm(self, pose: Pose, touch: Touch) -> Array:
+    def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a place of first touch, in the track (m)."""
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 
-    def _patch_reports(self, wheel: Carried) -> tuple[PatchReport, ...]:
+    def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
         """The reports of a wheel's patches, those that carry something; patches that have grown together as one."""
         rows = [
             row
@@ -285,7 +286,9 @@ class Contact:
         pieces = dict.fromkeys(share.piece for *_, share in rows)
         return tuple(self._joined_report(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
 
-    def _joined_report(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> PatchReport:
+    def _joined_report(
+        self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, Triple, Triple, Share]]
+    ) -> PatchReport:
         """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
@@ -327,7 +330,7 @@ class Contact:
         )
 
 
-def _standing(placed: Placed) -> Placed:
+def _standing(placed: WheelsetPlacement) -> WheelsetPlacement:
     """The contact itself, unless a wheel stands on the top of its flange."""
     for name, places in (("right", placed.right), ("left", placed.left)):
         least = min(place.below_tip for place in places)
@@ -340,19 +343,19 @@ def _standing(placed: Placed) -> Placed:
     return placed
 
 
-def rolling_radius_difference(placed_at: Placed) -> float:
+def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
     """Rolling radius of the right wheel less that of the left one (m), each at the patch that carries most."""
     right, left = (max(places, key=lambda place: place.normal) for places in (placed_at.right, placed_at.left))
     return right.rolling_radius - left.rolling_radius
 
 
-def _axes(touch: Touch) -> tuple[Array, Array]:
+def _axes(touch: TouchingPlace) -> tuple[Array, Array]:
     """Directions along the rail's surface and into the rail, in the track."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _moments(lever: Array, touch: Touch, force: Triple) -> Array:
+def _moments(lever: Array, touch: TouchingPlace, force: Triple) -> Array:
     """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
     across, into = _axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into

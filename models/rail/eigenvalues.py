@@ -36,7 +36,7 @@ def uncertainty(kind: type[Equations], wheelset: Wheelset, speed: float) -> floa
 
 
 def growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
-    """Largest real part (1/s) at a speed (m/s), for ``linear.critical_speed``."""
+    """Largest real part (1/s) of the eigenvalues at a speed (m/s), for ``linear.critical_speed``."""
     return float(values(kind, wheelset, speed).real.max())
 
 

@@ -53,7 +53,7 @@ class Ledger:
 
 
 def ledger(equations: Equations, path: WheelsetPath) -> Ledger:
-    """The ledger of a path by RK4, of any implementation, whose every step was kept."""
+    """Energy balance of a path that an implementation computed by RK4 with every step recorded."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
     for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):

@@ -319,32 +319,32 @@ class Equations:
         """Largest rate (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
-    def run(self, state: Array, duration: float, step: float, every: int = 1) -> WheelsetPath:
-        """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
+    def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:
+        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``stride``-th step is kept.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
         contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
-        count = self._steps(state, duration, step, every)
-        states, contacts = self._marched(np.array(state, float), count, step, every)
-        path = WheelsetPath(np.arange(len(states)) * step * every, states, contacts=contacts)
-        self.check(path, step, every)
+        count = self._steps(state, duration, step, stride)
+        states, contacts = self._marched(np.array(state, float), count, step, stride)
+        path = WheelsetPath(np.arange(len(states)) * step * stride, states, contacts=contacts)
+        self.check(path, step, stride)
         return path
 
-    def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
-        """States and contacts of a path at every ``every``-th step; ``state`` (10,) is moved."""
-        kept = count // every + 1
+    def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
+        """States and contacts of a path at every ``stride``-th step; ``state`` (10,) is moved."""
+        kept = count // stride + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
-        done = march(state, self.parameters, (step, count, every), states, contacts)
+        done = march(state, self.parameters, (step, count, stride), states, contacts)
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
         return states, contacts
 
-    def check(self, path: WheelsetPath, step: float, every: int) -> None:
+    def check(self, path: WheelsetPath, step: float, stride: int) -> None:
         """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
         self.check_loads(path, step)
-        if every == 1:
+        if stride == 1:
             w = self.wheelset
             inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
             check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
@@ -361,7 +361,7 @@ class Equations:
                     path.times[k],
                 )
 
-    def _steps(self, state: Array, duration: float, step: float, every: int) -> int:
+    def _steps(self, state: Array, duration: float, step: float, stride: int) -> int:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
@@ -376,8 +376,8 @@ class Equations:
         if not divides(step, number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
         count = round(duration / step)
-        if isinstance(every, bool) or not isinstance(every, int) or not 1 <= every <= count or count % every:
-            raise InputError("", "every", every, f"must be a whole number that divides the {count} steps")
+        if isinstance(stride, bool) or not isinstance(stride, int) or not 1 <= stride <= count or count % stride:
+            raise InputError("", "every", stride, f"must be a whole number that divides the {count} steps")
         return count
 
 

@@ -74,22 +74,22 @@ class KlingelWave:
 
 
 def equivalent_conicity(
-    displacements: Array, differences: Array, amplitude: float, *, near: float | None = None
+    displacements: Array, differences: Array, amplitude: float, *, guess: float | None = None
 ) -> float:
     """Equivalent conicity by EN 15302 at an amplitude, which is half of peak to peak; see ``klingel_wave``.
 
     displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
     amplitude : above 0. All in one unit of length.
     """
-    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, near=near).conicity
+    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, guess=guess).conicity
 
 
-def klingel_wave(table: RollingRadiusTable, amplitude: float, *, near: float | None = None) -> KlingelWave:
+def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> KlingelWave:
     """Klingel's wave of an amplitude (the table's unit, half of peak to peak).
 
-    near : where the centre is looked for, if several waves have this amplitude. Raises InputError where there is no
+    guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there is no
     wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the table; or
-    where there are several and ``near`` is not given.
+    where there are several and ``guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
     first, last = table.ends
@@ -101,11 +101,11 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, near: float | N
     waves = [wave for low in _turning_points(table, amplitude) if (wave := _wave(table, low, amplitude)) is not None]
     if not waves:
         return _without_wave(table, amplitude)
-    if len(waves) > 1 and near is None:
+    if len(waves) > 1 and guess is None:
         centres = ", ".join(f"{wave.centre:.6g}" for wave in waves)
         allowed = f"has {len(waves)} waves, about {centres}: smooth the table, or choose one by near"
         raise InputError(table.source, "amplitude", amplitude, allowed)
-    return min(waves, key=lambda wave: abs(wave.centre - (near or 0.0)))
+    return min(waves, key=lambda wave: abs(wave.centre - (guess or 0.0)))
 
 
 def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
@@ -129,10 +129,10 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
     return [points[k] for k in apart]
 
 
-def _roots(begin: float, middle: float, end: float) -> list[float]:
-    """Zeros from 0 to 1 of the parabola with these values at 0, 1/2 and 1; none of one that is zero throughout."""
-    bend, slope = 2.0 * (begin - 2.0 * middle + end), 4.0 * middle - 3.0 * begin - end
-    scale = max(abs(begin), abs(middle), abs(end))
+def _roots(begin: float, middle_value: float, end: float) -> list[float]:
+    """Roots between 0 and 1 of the parabola with given values at 0, 1/2 and 1; none for the zero parabola."""
+    bend, slope = 2.0 * (begin - 2.0 * middle_value + end), 4.0 * middle_value - 3.0 * begin - end
+    scale = max(abs(begin), abs(middle_value), abs(end))
     if scale == 0.0:
         return []
     if abs(bend) <= 1e-14 * abs(slope):
@@ -250,14 +250,14 @@ class ConicityRow:
     spacing_error: float
 
 
-def conicity_row(table: RollingRadiusTable, amplitude: float, *, near: float | None = None) -> ConicityRow:
+def conicity_row(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> ConicityRow:
     """Both conicities of a table at an amplitude; InputError as ``klingel_wave``."""
-    wave = klingel_wave(table, amplitude, near=near)
+    wave = klingel_wave(table, amplitude, guess=guess)
     harmonic = harmonic_linearised_conicity(
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.thinned(), amplitude, near=wave.centre).conicity
+        coarse = klingel_wave(table.thinned(), amplitude, guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import label
 
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.normal_problem import centres, solve_normal
 from models.contact.patches import Box, Patch
 from models.contact.simplified_theory import PatchPressure
@@ -48,45 +48,45 @@ class Share:
 
 def press_exactly(
     patches: Sequence[Patch],
-    near: Sequence[PatchPressure],
+    approximate_patches: Sequence[PatchPressure],
     load: float,
     approach: float,
-    pair: Pair,
+    material_pair: MaterialPair,
     coarser: float = 1.0,
 ) -> tuple[list[Share], float]:
     """The patches' shares under a vertical load (N), and the vertical approach (m).
 
-    near : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs (m);
-    coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of the
-    grid.
+    approximate_patches : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs
+    (m); coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of
+    the grid.
     """
     for margin in MARGINS[:-1]:
         try:
-            return _pressed(patches, near, load, approach, pair, margin, coarser)
+            return _pressed(patches, approximate_patches, load, approach, material_pair, margin, coarser)
         except InputError:  # the contact reaches the edge of the grid
             continue
-    return _pressed(patches, near, load, approach, pair, MARGINS[-1], coarser)
+    return _pressed(patches, approximate_patches, load, approach, material_pair, MARGINS[-1], coarser)
 
 
 def _pressed(
     patches: Sequence[Patch],
-    near: Sequence[PatchPressure],
+    approximate_patches: Sequence[PatchPressure],
     load: float,
     approach: float,
-    pair: Pair,
+    material_pair: MaterialPair,
     margin: float,
     coarser: float,
 ) -> tuple[list[Share], float]:
-    x, y = _grid(near, margin, coarser)
+    x, y = _grid(approximate_patches, margin, coarser)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_height(patch, x, y) for patch in patches])
-    leading = float(np.cos(max(near, key=lambda part: part.load).patch.lean))
+    leading = float(np.cos(max(approximate_patches, key=lambda part: part.load).patch.lean))
     cell, whole = (x[1] - x[0]) * (y[1] - y[0]), load / leading
     alike = bool((cosines == leading).all())  # the heights are then the same at any approach
     for _ in range(ITERATIONS):
         lowered = heights + approach * (leading - cosines)[:, None, None]
         owner = np.argmin(lowered, axis=0)
-        solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], pair, load=whole)
+        solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], material_pair, load=whole)
         forces = np.array([solved.pressure[owner == k].sum() * cell for k in range(len(patches))])
         vertical, reached = float(forces @ cosines), solved.approach / leading
         close = abs(vertical / load - 1.0) < PRECISION and (alike or abs(reached / approach - 1.0) < PRECISION)
@@ -100,13 +100,13 @@ def _pressed(
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
 
-def _grid(near: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
+def _grid(approximate_patches: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
     """Centres (m) of the cells along x and along the contour."""
-    x0, x1 = min(part.box[0] for part in near), max(part.box[1] for part in near)
-    y0 = min(part.box[2] + part.patch.contour_position for part in near)
-    y1 = max(part.box[3] + part.patch.contour_position for part in near)
+    x0, x1 = min(part.box[0] for part in approximate_patches), max(part.box[1] for part in approximate_patches)
+    y0 = min(part.box[2] + part.patch.contour_position for part in approximate_patches)
+    y1 = max(part.box[3] + part.patch.contour_position for part in approximate_patches)
     high = margin * (y1 - y0)
-    narrowest = min(part.box[3] - part.box[2] for part in near)
+    narrowest = min(part.box[3] - part.box[2] for part in approximate_patches)
     rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / coarser)
     columns = round(CELLS_X / coarser)
     along = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
@@ -122,7 +122,7 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     return heights
 
 
-def _pressure_share(pressure: Array, x: Array, y: Array, place: float, cell: float, pieces: Array) -> Share:
+def _pressure_share(pressure: Array, x: Array, y: Array, contour_position: float, cell: float, pieces: Array) -> Share:
     """Share of a patch at a place on the contour (m), of which ``pressure`` is zero elsewhere."""
     total = float(pressure.sum())
     if total == 0.0:
@@ -131,7 +131,7 @@ def _pressure_share(pressure: Array, x: Array, y: Array, place: float, cell: flo
     return Share(
         total * cell,
         float((pressure.sum(axis=0) @ x) / total),
-        float((pressure.sum(axis=1) @ y) / total) - place,
+        float((pressure.sum(axis=1) @ y) / total) - contour_position,
         float(np.count_nonzero(pressure) * cell),
         box,
         float(pressure.max()),
@@ -139,7 +139,7 @@ def _pressure_share(pressure: Array, x: Array, y: Array, place: float, cell: flo
     )
 
 
-def _outer_sides(at: Array, inside: Array) -> tuple[float, float]:
+def _outer_sides(cells: Array, inside: Array) -> tuple[float, float]:
     """Outer sides (m) of the first and the last cell inside."""
-    half = (at[1] - at[0]) / 2.0
-    return float(at[inside][0] - half), float(at[inside][-1] + half)
+    half = (cells[1] - cells[0]) / 2.0
+    return float(cells[inside][0] - half), float(cells[inside][-1] + half)

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
-from models.contact.profiles import Profile
+from models.contact.profiles import ContactProfile
 from models.contact.standard_profiles import RAILS, WHEELS
 from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, rail_in_track, touching_pose
 from models.core.errors import InputError
@@ -76,7 +76,7 @@ class Profiles(Strict):
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
-def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
+def _profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
     known = BUILT_IN[kind]
     if name in known:
         return known[name]()
@@ -134,22 +134,22 @@ def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Arra
     return float(places[np.argmin(gap)]), places, gap
 
 
-def _ridge(side: WheelAndRail, before: tuple[float, float], after: tuple[float, float]) -> float | None:
+def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]) -> float | None:
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
-    while abs(after[1] - before[1]) > CONTACT_JUMP:
-        middle = (before[0] + after[0]) / 2.0
+    while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
+        middle = (touch_before[0] + touch_after[0]) / 2.0
         touch = _first_contact(side, middle)
         if touch is None:
             return None
         here, places, gap = touch
-        low, high = sorted((before[1], after[1]))
-        if after[0] - before[0] < DISPLACEMENT_STEP:
+        low, high = sorted((touch_before[1], touch_after[1]))
+        if touch_after[0] - touch_before[0] < DISPLACEMENT_STEP:
             between = (places > low) & (places < high)
             return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
-        if abs(here - before[1]) > abs(here - after[1]):
-            after = middle, here
+        if abs(here - touch_before[1]) > abs(here - touch_after[1]):
+            touch_after = middle, here
         else:
-            before = middle, here
+            touch_before = middle, here
     return None
 
 

@@ -160,21 +160,30 @@ def branch(first: Orbit, amplitudes: Iterable[float], executor: Executor | None 
         yield last
 
 
-def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int, executor: Executor | None) -> Orbit:
+def _onwards(
+    earlier_orbit: Orbit, latest_orbit: Orbit, amplitude: float, halvings: int, executor: Executor | None
+) -> Orbit:
     """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
-    way = last.amplitude - before.amplitude
-    share = (amplitude - last.amplitude) / way
-    state = last.state + share * (last.state - before.state)
+    way = latest_orbit.amplitude - earlier_orbit.amplitude
+    share = (amplitude - latest_orbit.amplitude) / way
+    state = latest_orbit.state + share * (latest_orbit.state - earlier_orbit.state)
     state[Y] = amplitude
-    ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
-    guess = replace(last, equations=ahead, state=state, period=last.period + share * (last.period - before.period))
+    ahead = replace(
+        latest_orbit.equations, speed=latest_orbit.speed + share * (latest_orbit.speed - earlier_orbit.speed)
+    )
+    guess = replace(
+        latest_orbit,
+        equations=ahead,
+        state=state,
+        period=latest_orbit.period + share * (latest_orbit.period - earlier_orbit.period),
+    )
     try:
         return solved_orbit(guess, "speed", executor=executor)
     except RunFailed:
         if halvings == 0:
             raise
-    middle = _onwards(before, last, (last.amplitude + amplitude) / 2.0, halvings - 1, executor)
-    return _onwards(last, middle, amplitude, halvings - 1, executor)
+    middle = _onwards(earlier_orbit, latest_orbit, (latest_orbit.amplitude + amplitude) / 2.0, halvings - 1, executor)
+    return _onwards(latest_orbit, middle, amplitude, halvings - 1, executor)
 
 
 def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:

@@ -83,25 +83,25 @@ class RollingRadiusTable:
         ends = self.difference(low, "right"), self.difference(high, "left")
         return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
 
-    def difference(self, place: float, side: Any = "right") -> float:
+    def difference(self, displacement: float, side: Any = "right") -> float:
         """The difference at a displacement; at a jump the value to its left or right."""
-        i, share = self._row_before(place, side)
+        i, share = self._row_before(displacement, side)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
-    def integral(self, place: float) -> float:
+    def integral(self, displacement: float) -> float:
         """The potential at a displacement."""
-        i, share = self._row_before(place, "right")
+        i, share = self._row_before(displacement, "right")
         y, dr = self.displacements, self.differences
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _row_before(self, place: float, side: Any) -> tuple[int, float]:
+    def _row_before(self, displacement: float, side: Any) -> tuple[int, float]:
         """The row before a displacement, and the share of the way from there to the next one."""
         y = self.displacements
-        i = int(np.clip(np.searchsorted(y, place, side) - 1, 0, y.size - 2))
+        i = int(np.clip(np.searchsorted(y, displacement, side) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
-        return i, float((place - y[i]) / width) if width > 0.0 else 0.0
+        return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
     def thinned(self) -> "RollingRadiusTable":
         """The table without every other row, both ends kept: what its spacing costs."""
@@ -119,7 +119,10 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
 
 def rolling_radii_of(
-    right: WheelAndRail, left: WheelAndRail, displacements: Array, told: Callable[[float], Any] = lambda share: None
+    right: WheelAndRail,
+    left: WheelAndRail,
+    displacements: Array,
+    report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
     """The table of two wheels on their rails; the left one is described as a right one seen in a mirror.
 
@@ -129,7 +132,7 @@ def rolling_radii_of(
     shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
     rows = []
     for k, shift in enumerate(shifts.tolist()):
-        told(k / shifts.size)
+        report_progress(k / shifts.size)
         try:
             rows.append((shift, *_radii(right, left, shift)))
         except InputError:

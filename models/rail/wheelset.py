@@ -6,7 +6,7 @@ from pydantic import Field, ValidationError, model_validator
 from scipy.optimize import brentq
 
 from models.contact.hertz import Hertz, by_load
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.core.strict import Strict, message, quantity
 from models.rail.laid_profiles import Profiles
 
@@ -61,9 +61,9 @@ class Wheelset(Strict):
         return self
 
     @property
-    def pair(self) -> Pair:
+    def pair(self) -> MaterialPair:
         """Wheel and rail, of one material."""
-        return Pair(self.material, self.material)
+        return MaterialPair(self.material, self.material)
 
     @property
     def slant(self) -> tuple[float, float]:

@@ -25,7 +25,7 @@ FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 
 
 @dataclass(frozen=True)
-class Covariance:
+class StationaryCovariance:
     """State and outputs in the stationary state.
 
     P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
@@ -51,7 +51,7 @@ class Covariance:
         return np.sqrt(self.variance)
 
 
-def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
+def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryCovariance:
     """Covariance of a system that meets unit white noise, axle after axle.
 
     ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
@@ -77,7 +77,7 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     if (error[finite] > UNCERTAIN).any():
         _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
-    return Covariance(
+    return StationaryCovariance(
         system.names,
         V @ P @ V.T,
         np.where(finite, variance, np.inf),

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle, Rows
+from models.vehicles.linear_vehicle import LinearVehicle, OutputRows
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def first_order(
     return _system(vehicle, excitation, speed, A, B, C, _direct(read, q, v, B, noise)), q
 
 
-def _direct(read: Rows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
+def _direct(read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
     seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
     size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
@@ -172,7 +172,7 @@ def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     if not len(matrix):
         return right
     if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:
-        raise InputError("", "effects", None, "nothing holds what is left without mass")
+        raise InputError("", "effects", None, "a massless body has no spring or damper that holds it")
     return np.linalg.solve(matrix, right)
 
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from models.core.whole_files import whole_file
-from models.ride.covariance import Covariance
+from models.ride.covariance import StationaryCovariance
 from models.ride.excited import DelayedSystem
 
 if TYPE_CHECKING:
     import control
 
 
-def matrices(system: DelayedSystem, covariance: Covariance) -> dict[str, Any]:
+def matrices(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
     """A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and standard deviations."""
     named: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
@@ -27,7 +27,7 @@ def matrices(system: DelayedSystem, covariance: Covariance) -> dict[str, Any]:
     }
 
 
-def save(system: DelayedSystem, covariance: Covariance, stem: Path) -> list[Path]:
+def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) -> list[Path]:
     """Write ``stem``.npz and ``stem``.mat; returns their paths."""
     from scipy.io import savemat
 

@@ -1,4 +1,4 @@
-"""Spectra of a vehicle's outputs, and variances as integrals over them: a route of its own beside the covariance.
+"""Spectra of a vehicle's outputs, and variances as integrals over them: independent of the covariance equation.
 
 Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency by frequency; the road is put in front
 as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by

@@ -32,10 +32,10 @@ def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float,
     return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(above))
 
 
-def _slope(curve: Curve, at: float) -> float:
+def _slope(curve: Curve, x: float) -> float:
     """Slope away from rest, to the right of a corner."""
     _, slope, corners, bends = curve.hinges()
-    return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if at >= corner)
+    return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
 
 
 def of_friction(friction: float, friction_rate: float, deviation: float) -> float:

@@ -251,16 +251,23 @@ def growth(
 
 
 def _of_zeros(
-    N: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray, least: float, most: np.ndarray
+    N: np.ndarray,
+    G: np.ndarray,
+    G_size: np.ndarray,
+    C: np.ndarray,
+    C_size: np.ndarray,
+    lower_bound: float,
+    upper_bound: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins; a rate above ``most`` counts."""
+    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins; rates above ``upper_bound``
+    count."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
     for level in range(len(N)):
         factor = C @ step / factorial(level)
-        told = (abs(factor) * factorial(level) > least * (C_size @ step_size)).any(axis=1)
+        told = (abs(factor) * factorial(level) > lower_bound * (C_size @ step_size)).any(axis=1)
         real = (abs(factor) > ROUNDING * (C_size @ step_size)).any(axis=1)
-        told |= (level == 0) & real & ((factor**2).sum(axis=1) > most)
+        told |= (level == 0) & real & ((factor**2).sum(axis=1) > upper_bound)
         rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
         power[told] = 2 * level + 1
         step, step_size = N @ step, abs(N) @ step_size
@@ -268,9 +275,16 @@ def _of_zeros(
 
 
 def _of_undamped(
-    T: np.ndarray, G: np.ndarray, G_size: np.ndarray, C: np.ndarray, C_size: np.ndarray, least: float, most: np.ndarray
+    T: np.ndarray,
+    G: np.ndarray,
+    G_size: np.ndarray,
+    C: np.ndarray,
+    C_size: np.ndarray,
+    lower_bound: float,
+    upper_bound: np.ndarray,
 ) -> np.ndarray:
-    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency; one above ``most`` counts."""
+    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency; those above ``upper_bound``
+    count."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G
@@ -278,8 +292,8 @@ def _of_undamped(
         same = abs(values - value) < 1e-6 * abs(value)
         first = bool(same[: np.flatnonzero(values == value)[0]].any())
         amplitude = right[:, same] @ left[same]
-        told = (abs(amplitude) > least * (C_size @ G_size)).any(axis=1)
+        told = (abs(amplitude) > lower_bound * (C_size @ G_size)).any(axis=1)
         real = (abs(amplitude) > ROUNDING * (C_size @ G_size)).any(axis=1)
-        told |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > most)
+        told |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > upper_bound)
         rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
     return rate

@@ -155,22 +155,22 @@ class CopiesMarch:
         self.sums = np.zeros((POWERS, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def over(self, roads: np.ndarray, first: int, every: int = STEPS_PER_READING) -> None:
+    def over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
         """Go on over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step ``first``."""
         if self.states is None:
             self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
-        march(self.states, roads, self.step, first, every, self.laws, self.sums)
+        march(self.states, roads, self.step, first, stride, self.laws, self.sums)
 
 
-def usual_step(vehicle: SpatialVehicle, speed: float, replaced: LinearVehicle) -> float:
-    """Step (s) for a vehicle that ``replaced`` stands for, by statistical linearisation."""
-    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(replaced)).max()), followed(vehicle, speed))
+def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
+    """Step (s) for a vehicle that ``equivalent`` stands for, by statistical linearisation."""
+    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), followed(vehicle, speed))
 
 
-def forgotten(replaced: LinearVehicle) -> float:
+def forgotten(equivalent: LinearVehicle) -> float:
     """Time (s) after which copies have forgotten their beginning."""
-    decay = abs(poles(replaced).real)
+    decay = abs(poles(equivalent).real)
     return SETTLE / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
@@ -180,9 +180,9 @@ def followed(vehicle: SpatialVehicle, speed: float) -> float:
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _steps_to_first_output(settling: int, completed: int, every: int = STEPS_PER_READING) -> int:
+def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
-    return settling - completed if completed <= settling else (settling - completed) % every
+    return settling - completed if completed <= settling else (settling - completed) % stride
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:

@@ -95,12 +95,12 @@ class Responses:
     Between the points of the profile only: on a step the path must be a polynomial of time.
     """
 
-    def __init__(self, form: RoadInPath, profile: SpeedProfile) -> None:
-        F, G = form.excitation.F, form.excitation.G
-        self.form, self.profile, self.path = form, profile, profile.path
-        self.n, self.axles, self.m = form.inputs.shape
+    def __init__(self, road_in_path: RoadInPath, profile: SpeedProfile) -> None:
+        F, G = road_in_path.excitation.F, road_in_path.excitation.G
+        self.form, self.profile, self.path = road_in_path, profile, profile.path
+        self.n, self.axles, self.m = road_in_path.inputs.shape
         self.decay, self.noise = series(F, np.eye(self.m)), series(F, G)
-        self.motion = [series(form.A, form.inputs[:, axle]) for axle in range(self.axles)]
+        self.motion = [series(road_in_path.A, road_in_path.inputs[:, axle]) for axle in range(self.axles)]
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
     def transition(self, start: float, end: float) -> np.ndarray:

@@ -64,10 +64,10 @@ class SpeedProfile:
         return self.times[piece] + since
 
 
-def _check(values: np.ndarray, good: np.ndarray, place: str, allowed: str, file: str) -> None:
+def _check(values: np.ndarray, valid: np.ndarray, place: str, allowed: str, file: str) -> None:
     """Name the first value that is not good."""
-    if not good.all():
-        at = int(np.argmin(good))
+    if not valid.all():
+        at = int(np.argmin(valid))
         raise InputError(file, f"{place}.{at}", float(values[at]), allowed)
 
 
@@ -112,14 +112,14 @@ def steps(
     return np.concatenate(ends)
 
 
-def nodes(profile: SpeedProfile, ends: np.ndarray, distances: Sequence[float]) -> Nodes:
+def nodes(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
     """Points on cells that end with every step and wherever an axle passes the place of a step's end.
 
     ``distances`` (m) of axles behind others: at such a place the other one's speed may bend, or it may have stood.
     Towards a place of standstill, where its time goes like the root of the distance, cells shrink.
     """
-    path, ends_after = profile.path(ends), ends[ends >= profile.times[0]]
-    stops = _passing(profile, path[profile.speed(ends) == 0.0], distances)
+    path, ends_after = profile.path(step_ends), step_ends[step_ends >= profile.times[0]]
+    stops = _passing(profile, path[profile.speed(step_ends) == 0.0], distances)
     shrinking = (stops[:, None] + np.diff(ends_after).max() * SHRINKING).ravel()
     more = np.sort(np.concatenate([_passing(profile, path, distances), shrinking]))
     more = more[(more > ends_after[0]) & (more < ends_after[-1])]
@@ -131,7 +131,7 @@ def nodes(profile: SpeedProfile, ends: np.ndarray, distances: Sequence[float]) -
     weight = np.diff(cuts)[:, None] * WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
-    return Nodes(time, weight, np.searchsorted(ends, time, side="right") - 1)
+    return Nodes(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
 def _passing(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:

@@ -16,11 +16,11 @@ from itertools import pairwise
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.ride.covariance import Covariance, stationary
+from models.ride.covariance import StationaryCovariance, stationary
 from models.ride.excited import DelayedSystem, excited
 from models.ride.gaussian_laws import of_rate, of_travel
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 
@@ -70,7 +70,7 @@ class StatisticallyLinear:
 
     vehicle: LinearVehicle
     system: DelayedSystem
-    covariance: Covariance
+    covariance: StationaryCovariance
     mean: np.ndarray
     springs: dict[str, BentSpring]
     left_out: np.ndarray
@@ -239,9 +239,9 @@ class _Search:
         return means
 
     def _left_out(
-        self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: Covariance
+        self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
     ) -> np.ndarray:
-        """Shares (p,) of the outputs' variances that the left-out forces would add, each law's by itself."""
+        """Shares (p,) of the outputs' variances by the neglected residual forces, each law separately."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
         n = len(linear.mass)
@@ -278,7 +278,7 @@ def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> Lin
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, none)
         for o, read in zip(linear.outputs, reading, strict=True)
     )
-    wheels = tuple(Wheel(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
+    wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)
 
 

@@ -134,7 +134,8 @@ class Modes:
 
 
 def modes(A: np.ndarray) -> Modes:
-    """Eigenvalues and vectors of A (n, n), of every part that stands alone for itself: equal parts stay exact."""
+    """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled parts, so that equal parts stay exactly
+    equal."""
     count, label = connected_components(A != 0, directed=False)
     values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
     worst = 1.0

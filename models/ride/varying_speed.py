@@ -141,20 +141,20 @@ def quasi_stationary(
 
 
 def _moments(
-    form: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
+    road_in_path: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
 ) -> Iterator[tuple[float, np.ndarray]]:
     """End of each step of the drive and the covariance there, from P at its beginning on.
 
     Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
     """
-    road, first = form.excitation, float(profile.speeds[0])
+    road, first = road_in_path.excitation, float(profile.speeds[0])
     pairs = [] if road.independent else list(combinations(range(len(road.lengths)), 2))
     apart = [road.lengths[j] - road.lengths[i] for i, j in pairs]
     lead = max(apart, default=0.0) / first if first else 0.0
-    motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (form.A, road.F))
+    motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (road_in_path.A, road.F))
     ends = steps(profile, profile.times[0] - lead, instants, motion, path, reach)
     points = nodes(profile, ends, sorted({distance for distance in apart if distance}))
-    responses = Responses(form, profile)
+    responses = Responses(road_in_path, profile)
     hits = [_Met(responses, axle, points.time, ends) for axle in range(len(road.heights))]
     queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
     for step, (start, end) in enumerate(pairwise(ends)):
@@ -173,9 +173,9 @@ def _moments(
 class _Met:
     """Responses, at the ends of the steps, to noise that an axle meets at given times (s), rising."""
 
-    def __init__(self, responses: Responses, axle: int, time: np.ndarray, ends: np.ndarray) -> None:
-        self.responses, self.axle, self.time, self.ends = responses, axle, time, ends
-        self.first = np.searchsorted(time, ends)
+    def __init__(self, responses: Responses, axle: int, time: np.ndarray, step_ends: np.ndarray) -> None:
+        self.responses, self.axle, self.time, self.ends = responses, axle, time, step_ends
+        self.first = np.searchsorted(time, step_ends)
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
     def within(self, step: int) -> slice:
@@ -197,14 +197,14 @@ class _Met:
 class _Queue:
     """Responses (n, q, k) to noise that one axle has met and another, the ``last``, meets at given times (s)."""
 
-    def __init__(self, responses: Responses, axle: int, last: int, time: np.ndarray, ends: np.ndarray) -> None:
+    def __init__(self, responses: Responses, axle: int, last: int, time: np.ndarray, step_ends: np.ndarray) -> None:
         profile, form, self.last = responses.profile, responses.form, last
         distance = form.excitation.lengths[last] - form.excitation.lengths[axle]
         place = profile.path(time) - distance
         met = profile.time(place) if distance else time
         before = np.isneginf(met)
         self.waiting = _delayed_responses(form, axle, -place[before])
-        self.met = _Met(responses, axle, met[~before], ends)
+        self.met = _Met(responses, axle, met[~before], step_ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
         """Moves all responses on by one step; those whose noise is met within the step join them."""
@@ -224,21 +224,21 @@ def _product(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.nd
     return (first * weight[:, None]).reshape(n, -1) @ second.reshape(n, -1).T
 
 
-def _delayed_responses(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
+def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
     """Responses (n, q, k) of a vehicle at rest to noise that the axle met ``behind`` (m) its place, long ago."""
-    F, G = form.excitation.F, form.excitation.G
+    F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
-    n, axles, m = form.inputs.shape
+    n, axles, m = road_in_path.inputs.shape
     if not len(behind):
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
     after = np.zeros((axles * m, len(behind), G.shape[1]))
     after[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
-    return np.tensordot(_state_at_rest(form), after, 1)
+    return np.tensordot(_state_at_rest(road_in_path), after, 1)
 
 
-def _state_at_rest(form: RoadInPath) -> np.ndarray:
+def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
     """State (y, f) of a vehicle at rest over the states f of its road: (n + a m, a m)."""
-    if np.linalg.cond(form.A) > 1.0 / (1e3 * np.finfo(float).eps):
+    if np.linalg.cond(road_in_path.A) > 1.0 / (1e3 * np.finfo(float).eps):
         raise InputError(
             "",
             "drive.speed.0",
@@ -246,13 +246,13 @@ def _state_at_rest(form: RoadInPath) -> np.ndarray:
             "must be above 0: this vehicle has a motion that nothing pulls "
             "back, so it knows no state of rest to begin in",
         )
-    inputs = form.inputs.reshape(len(form.A), -1)
-    return np.vstack([-np.linalg.solve(form.A, inputs), np.eye(inputs.shape[1])])
+    inputs = road_in_path.inputs.reshape(len(road_in_path.A), -1)
+    return np.vstack([-np.linalg.solve(road_in_path.A, inputs), np.eye(inputs.shape[1])])
 
 
-def _standing_covariance(form: RoadInPath) -> np.ndarray:
+def _standing_covariance(road_in_path: RoadInPath) -> np.ndarray:
     """Covariance of (y, f) where the vehicle stands, at rest."""
-    road = form.excitation
+    road = road_in_path.excitation
     stationary, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
     axles = range(len(road.heights))
     P = np.zeros((len(axles), m, len(axles), m))
@@ -261,14 +261,14 @@ def _standing_covariance(form: RoadInPath) -> np.ndarray:
             if i == j or not road.independent:
                 P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ stationary
                 P[j, :, i] = P[i, :, j].T
-    rest = _state_at_rest(form)
+    rest = _state_at_rest(road_in_path)
     return rest @ P.reshape(rest.shape[1], -1) @ rest.T
 
 
-def _all_variances(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
+def _all_variances(road_in_path: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) -> np.ndarray:
     """Variances of all outputs and of the road's height under each wheel."""
-    n, C = len(form.A), form.C + speed * form.rate
-    H = np.hstack(form.excitation.heights)
+    n, C = len(road_in_path.A), road_in_path.C + speed * road_in_path.rate
+    H = np.hstack(road_in_path.excitation.heights)
     variance = ((C @ P) * C).sum(axis=1)
     lost = [state == DIFFUSING or (state == INFINITE and speed > 0.0) for state in status]
     height = ((H @ P[n:, n:]) * H).sum(axis=1)

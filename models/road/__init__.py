@@ -8,9 +8,9 @@ zeta is the height in m, positive **down** (a rise is negative); the slope is d(
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from models.road.profile import Profile, SineProfile, SplineProfile
+    from models.road.profile import RoadProfile, SineProfile, SplineProfile
 
-__all__ = ["Profile", "SineProfile", "SplineProfile"]
+__all__ = ["RoadProfile", "SineProfile", "SplineProfile"]
 
 TRACK_WIDTH = 1.5
 """Default distance between the two tracks of a measured surface, m."""

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.road.profile import OVERRUN_SHARE, Profile, SplineProfile
+from models.road.profile import OVERRUN_SHARE, RoadProfile, SplineProfile
 
 RULES = ("mirrored", "refused")
 RUN_IN = 5.0
@@ -27,7 +27,7 @@ MOST_POINTS = 5_000_000
 """Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
 
 
-def continued(profile: Profile, rule: str, needed: float, file: object = "") -> Profile:
+def continued(profile: RoadProfile, rule: str, needed: float, file: object = "") -> RoadProfile:
     """Road that reaches at least to ``needed``, or an error; a road that is long enough comes back as it is.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Mean and roll process fitted to two measured tracks, with what the measurement cannot tell said in words."""
+"""Mean and roll process fitted to two measured tracks, with sentences on what the measurement leaves undetermined."""
 
 import itertools
 import math
@@ -37,7 +37,8 @@ class FilterFit:
 
 @dataclass(frozen=True)
 class FittedRoad:
-    """The road, both fits (None for a process that is not there), sentences on what they are worth, the spectra."""
+    """The fitted road, the fits of its mean and roll process (None for an absent process), sentences on their quality,
+    and the spectra."""
 
     road: TwoTrackRoad
     mean: FilterFit
@@ -122,19 +123,19 @@ def _bands(
     return np.array(middles), np.array(values)
 
 
-def _limits(tracks: MeasuredTracks, measured: TrackSpectra) -> list[str]:
+def _limits(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
     """Sentences on what no fit of the road could change."""
-    least = measured.wavenumber[0]
-    low, high = measured.band()
+    least = spectra.wavenumber[0]
+    low, high = spectra.band()
     return [
-        f"{tracks.length:g} m in {measured.windows} windows: nothing is known of waves longer than "
+        f"{tracks.length:g} m in {spectra.windows} windows: nothing is known of waves longer than "
         f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
         f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
-        f"a coherency below {measured.chance_coherency():.2f} cannot be told from none (95 %)",
+        f"a coherency below {spectra.chance_coherency():.2f} cannot be told from none (95 %)",
     ]
 
 
-def _doubts(measured: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
+def _doubts(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
     """Where the fitted road is not the measured one."""
     said = []
     for name, fitted in (("mean", mean), ("roll", roll)):
@@ -152,9 +153,9 @@ def _doubts(measured: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> 
             said.append(
                 f"the {name} process is not of first order: the fit is off by a factor {_factor(fitted):.1f} (rms)"
             )
-    shared = np.abs(measured.mean_roll) / np.sqrt(measured.mean * np.maximum(measured.roll, 1e-300))
-    used = (measured.wavenumber >= mean.low) & (measured.wavenumber <= mean.high)
-    often = float(np.mean(shared[used] > measured.chance_coherency()))
+    shared = np.abs(spectra.mean_roll) / np.sqrt(spectra.mean * np.maximum(spectra.roll, 1e-300))
+    used = (spectra.wavenumber >= mean.low) & (spectra.wavenumber <= mean.high)
+    often = float(np.mean(shared[used] > spectra.chance_coherency()))
     if roll is not None and often > 0.2:
         said.append(
             f"mean and roll are coherent at {100.0 * often:.0f} % of the wavenumbers (5 % by chance): the tracks "

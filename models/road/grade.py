@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models.road.profile import Profile, Samples
+from models.road.profile import RoadProfile, Samples
 
 TRANSITION = 40.0
 """Length (m) over which the slope grows from 0 to its full value."""
@@ -27,7 +27,7 @@ class Graded:
     start : arc length (m) at which the slope begins to grow
     """
 
-    profile: Profile
+    profile: RoadProfile
     grade: float
     start: float
 

@@ -23,11 +23,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.road.iso8608 import level_of_class
 from models.road.two_track import TwoTrackRoad
-from models.vehicles.linear_vehicle import Wheel
+from models.vehicles.linear_vehicle import WheelPosition
 
 
 @dataclass(frozen=True)
-class Part:
+class DensityPart:
     """Track density level / (corner^2 + Omega^2)^(waviness / 2), two-sided; its own cross density in closed form.
 
     level : in m^3 (rad/m)^(waviness), S0 in m for waviness 2; corner in rad/m, 0 or more; waviness above 1
@@ -62,7 +62,7 @@ class Part:
 class IsotropicRoad:
     """A road whose track density is the sum of parts."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[DensityPart, ...]
 
     def spectrum(self, wavenumber: np.ndarray) -> np.ndarray:
         """Two-sided density (m^3) of any track over the wavenumber (rad/m)."""
@@ -83,13 +83,15 @@ def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
         raise InputError("", "cutoff", road.mean.cutoff or road.roll.cutoff, "is not known to isotropic roads")
     shares = ((road.mean, 1.0), (road.roll, y * y))
     return IsotropicRoad(
-        tuple(Part(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity)
+        tuple(
+            DensityPart(share * f.intensity / (2.0 * math.pi), f.corner) for f, share in shares if share * f.intensity
+        )
     )
 
 
 def isotropic_class(road_class: str, corner: float = 0.0, level: str = "one-sided") -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((Part(level_of_class(road_class, level), corner),))
+    return IsotropicRoad((DensityPart(level_of_class(road_class, level), corner),))
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:
@@ -116,7 +118,9 @@ def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence
     return np.array([part(k) for k in wavenumber])
 
 
-def spectral_matrix(road: IsotropicRoad | TwoTrackRoad, wheels: Sequence[Wheel], wavenumber: np.ndarray) -> np.ndarray:
+def spectral_matrix(
+    road: IsotropicRoad | TwoTrackRoad, wheels: Sequence[WheelPosition], wavenumber: np.ndarray
+) -> np.ndarray:
     """Densities (k, w, w) in m^3 of the heights under the wheels, rear axles delayed, over k wavenumbers (rad/m).
 
     Entry ij is 1/(2 pi) int E[z_i(s) z_j(s + a)] exp(-i Omega a) da = S_ij exp(i Omega (x_j - x_i)): a response with

@@ -25,7 +25,7 @@ from pyopencrg.io import IplData, cut_block, read_ipl
 
 from models.core.errors import InputError
 from models.road import TRACK_WIDTH
-from models.road.profile import Profile, SplineProfile
+from models.road.profile import RoadProfile, SplineProfile
 
 SMALLEST_INCREMENT = 1e-3
 """Smallest distance of stations that the format's own checks accept, m."""
@@ -79,11 +79,11 @@ def read_opencrg(
 
 
 def write_opencrg(
-    profile: Profile,
+    profile: RoadProfile,
     path: str | Path,
     length: float,
     increment: float,
-    right: Profile | None = None,
+    right: RoadProfile | None = None,
     track_width: float = TRACK_WIDTH,
 ) -> None:
     """Write a road from s = 0 to ``length`` in the format KDBI.
@@ -152,7 +152,7 @@ def _unreadable(path: str | Path, error: Exception) -> InputError:
 
 
 def _check_header(path: str | Path) -> _Promise:
-    """Read the header, check it, and compare the bytes that follow with what it promises."""
+    """Read the header, check it, and compare the number of bytes that follow with the number that the header gives."""
     try:
         header = read_ipl(path, meta_only=True)
         data = Path(path).read_bytes()[header.data_offset :]

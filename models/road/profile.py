@@ -21,7 +21,7 @@ OVERRUN_SHARE = 1e-9
 """Part of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
 
 
-class Profile(Protocol):
+class RoadProfile(Protocol):
     """Protocol of a road profile; heights in m, positive down."""
 
     @property

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.road.profile import Profile
+from models.road.profile import RoadProfile
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class RoadUnderWheels:
     delay to whole steps.
     """
 
-    profile: Profile
+    profile: RoadProfile
     speed: float
     wheelbase: float
     kinks: tuple[float, ...] = (0.0,)

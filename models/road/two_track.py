@@ -22,7 +22,7 @@ from models.core.errors import InputError
 from models.road.excitation import Excitation
 from models.road.iso8608 import class_at_level
 from models.road.shape_filter import ShapeFilter
-from models.vehicles.linear_vehicle import Wheel
+from models.vehicles.linear_vehicle import WheelPosition
 
 MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
 """Corners of the paper, rad/m."""
@@ -98,13 +98,13 @@ def road_of_level(
     return TwoTrackRoad(ShapeFilter(corners[0], half, cutoff), ShapeFilter(corners[1], half / half_track**2, cutoff))
 
 
-def half_track(wheels: Sequence[Wheel]) -> float:
+def half_track(wheels: Sequence[WheelPosition]) -> float:
     """Half the distance (m) of the outermost wheels of the first axle: 0 for wheels on the centre line."""
     front = [wheel.y for wheel in wheels if wheel.axle == 0]
     return (max(front) - min(front)) / 2.0
 
 
-def on_track(wheels: Sequence[Wheel], y: float) -> tuple[Wheel, ...]:
+def on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
     """The wheels all on the track at y (m): a quarter or half car, drawn on the centre line, on one track of a road.
 
     Left on the centre line it would meet the mean process alone, which is smoother than any track.
@@ -113,7 +113,7 @@ def on_track(wheels: Sequence[Wheel], y: float) -> tuple[Wheel, ...]:
 
 
 def excitation(
-    road: TwoTrackRoad, wheels: Sequence[Wheel], left_right: str = "modelled", front_rear: str = "delayed"
+    road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
 ) -> Excitation:
     """The road under the wheels, one filter per axle, each wheel at its own y.
 
@@ -143,7 +143,7 @@ def excitation(
 
 
 def input_covariance(
-    road: TwoTrackRoad, wheels: Sequence[Wheel], left_right: str = "modelled", front_rear: str = "delayed"
+    road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
 ) -> np.ndarray:
     """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
     behind = excitation(road, wheels, left_right, front_rear).lengths
@@ -166,7 +166,9 @@ def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
 
 
-def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[Wheel]) -> np.ndarray:
+def _row(
+    wheel: WheelPosition, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[WheelPosition]
+) -> np.ndarray:
     """Factors of the filter's states in the height under one wheel."""
     if left_right == "equal":
         return mean + abs(wheel.y) * roll
@@ -180,7 +182,7 @@ def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, whee
     return np.concatenate([height, other] if wheel.y >= 0.0 else [other, height])
 
 
-def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
+def _lengths(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
     """Distance (m) of each axle behind the first."""
     axles = sorted({wheel.axle for wheel in wheels})
     if not axles or axles != list(range(len(axles))):
@@ -196,6 +198,6 @@ def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
     return behind
 
 
-def _check_word(place: str, word: str, known: tuple[str, ...]) -> None:
-    if word not in known:
-        raise InputError("", place, word, "must say how the wheels' roads go together", known)
+def _check_word(place: str, word: str, allowed_words: tuple[str, ...]) -> None:
+    if word not in allowed_words:
+        raise InputError("", place, word, "must say how the wheels' roads go together", allowed_words)

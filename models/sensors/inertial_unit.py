@@ -102,7 +102,7 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
 
 
 def spread(walks: np.ndarray) -> np.ndarray:
-    """1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: what the noise takes from the mean rotation, in local components."""
+    """1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: reduction of the mean rotation by noise, in local components."""
     return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
 
 
@@ -140,7 +140,7 @@ def bias(
     deviation below it.
     """
     _check(period=period, correlation_time=correlation_time)
-    _check(least=0.0, turn_on=turn_on, instability=instability)
+    _check(minimum=0.0, turn_on=turn_on, instability=instability)
     drawn = normal(seed, path, count + 1, 1, source=GYRO_BIAS)[:, 0]
     kept = math.exp(-period / correlation_time)
     kicks = drawn[1:] * math.sqrt(-math.expm1(-2 * period / correlation_time))
@@ -158,13 +158,13 @@ def angle_variance(
     in rad/s and s. Raises InputError as ``bias`` does, and for times below 0.
     """
     _check(correlation_time=correlation_time)
-    _check(least=0.0, time=float(np.min(time)), walk=walk, turn_on=turn_on, instability=instability)
+    _check(minimum=0.0, time=float(np.min(time)), walk=walk, turn_on=turn_on, instability=instability)
     wander = instability**2 * time**2 * hyp1f1(1, 3, -time / correlation_time)
     return walk**2 * time + turn_on**2 * time**2 + wander
 
 
-def _check(least: float = math.ulp(0.0), **given: float) -> None:
+def _check(minimum: float = math.ulp(0.0), **given: float) -> None:
     """Refuse the first number that is below the least one."""
     for name, value in given.items():
-        if not value >= least:
-            raise InputError("", name, value, f"must be {'0 or more' if least == 0.0 else 'above 0'}")
+        if not value >= minimum:
+            raise InputError("", name, value, f"must be {'0 or more' if minimum == 0.0 else 'above 0'}")

@@ -105,13 +105,14 @@ class RecoveredMotion:
         """Roll, pitch, yaw (n, 3) in rad; raises GimbalLock where they are not defined."""
         return cardan(self.orientation)
 
-    def point(self, place: np.ndarray) -> np.ndarray:
+    def point(self, local_position: np.ndarray) -> np.ndarray:
         """Positions (n, 3) in m, global, of a point at local (3,) m of the body, eq. (15)."""
-        return self.position + matrix(self.orientation) @ np.asarray(place)
+        return self.position + matrix(self.orientation) @ np.asarray(local_position)
 
 
 def spin(array: SensorArray, readings: np.ndarray) -> Spin:
-    """Relative accelerations and M of readings (n, sensors, 3) in m/s^2; gravity cancels, whatever the attitude.
+    """Differences of the accelerometers' readings (n, sensors, 3) in m/s^2, and the matrix M of the rates; gravity
+    cancels at any attitude.
 
     Raises InputError for a reading that is not a finite number, and for a wrong number of sensors.
     """

@@ -106,7 +106,7 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
 
 
 def _check_turned(rates: np.ndarray, period: float) -> None:
-    """Refuse rates that say too little of what lies between their samples."""
+    """Refuse angular rates that turn the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * period > HALF_TURN:
         samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"

@@ -151,14 +151,14 @@ def readings(
     return in_space(places, felt, w, alpha)
 
 
-def in_space(places: np.ndarray, felt: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def in_space(places: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2, in the body's axes, eqs (16), (17), whatever its motion.
 
-    places : (sensors, 3) in m from a point of the body that feels ``felt`` (n, 3); w, alpha : (n, 3), the body's rates
-    and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
+    places : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3), the body's
+    rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
     """
     lever = skew(alpha) + skew(w) @ skew(w)
-    return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
+    return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 
 
 def on_bracket(mount: np.ndarray, period: float, frequency: float, damping: float) -> np.ndarray:

@@ -104,7 +104,7 @@ checked against the book."""
 
 
 @dataclass(frozen=True)
-class Curve:
+class MagicFormulaCurve:
     """One magic formula: D its peak, B its stiffness, C its shape, E its curvature."""
 
     D: float
@@ -119,14 +119,14 @@ class Curve:
 
 
 PACEJKA = {
-    "dry": (Curve(1.20, 11.7, 1.69, 0.377), Curve(0.935, 8.86, 1.19, -1.21)),
-    "wet": (Curve(1.06, 12.0, 1.80, 0.313), Curve(0.885, 10.7, 1.07, -2.14)),
-    "snow": (Curve(0.407, 10.2, 1.96, 0.651), Curve(0.383, 19.1, 0.550, -2.10)),
-    "ice": (Curve(0.172, 31.1, 1.77, 0.710), Curve(0.162, 28.4, 1.48, -1.18)),
-    "dry/rear": (Curve(1.20, 11.1, 1.69, 0.362), Curve(0.961, 9.30, 1.19, -1.11)),
-    "wet/rear": (Curve(1.07, 11.5, 1.80, 0.300), Curve(0.911, 11.3, 1.07, -1.97)),
-    "snow/rear": (Curve(0.409, 9.71, 1.96, 0.624), Curve(0.394, 20.0, 0.550, -1.93)),
-    "ice/rear": (Curve(0.173, 29.5, 1.77, 0.681), Curve(0.167, 30.0, 1.48, -1.08)),
+    "dry": (MagicFormulaCurve(1.20, 11.7, 1.69, 0.377), MagicFormulaCurve(0.935, 8.86, 1.19, -1.21)),
+    "wet": (MagicFormulaCurve(1.06, 12.0, 1.80, 0.313), MagicFormulaCurve(0.885, 10.7, 1.07, -2.14)),
+    "snow": (MagicFormulaCurve(0.407, 10.2, 1.96, 0.651), MagicFormulaCurve(0.383, 19.1, 0.550, -2.10)),
+    "ice": (MagicFormulaCurve(0.172, 31.1, 1.77, 0.710), MagicFormulaCurve(0.162, 28.4, 1.48, -1.18)),
+    "dry/rear": (MagicFormulaCurve(1.20, 11.1, 1.69, 0.362), MagicFormulaCurve(0.961, 9.30, 1.19, -1.11)),
+    "wet/rear": (MagicFormulaCurve(1.07, 11.5, 1.80, 0.300), MagicFormulaCurve(0.911, 11.3, 1.07, -1.97)),
+    "snow/rear": (MagicFormulaCurve(0.409, 9.71, 1.96, 0.624), MagicFormulaCurve(0.394, 20.0, 0.550, -1.93)),
+    "ice/rear": (MagicFormulaCurve(0.173, 29.5, 1.77, 0.681), MagicFormulaCurve(0.167, 30.0, 1.48, -1.08)),
 }
 """Along and across, front and rear tyre of a passenger car: K. Berntorp, B. Olofsson, K. Lundahl, L. Nielsen, Models
 and methodology for optimal trajectory generation in safety-critical road-vehicle manoeuvres, Vehicle System Dynamics 52

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import whole_text
-from models.tyre.magic_formula import Curve, by_similarity
+from models.tyre.magic_formula import MagicFormulaCurve, by_similarity
 from models.tyre.tyre_table import TyreTable
 
 UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
@@ -61,17 +61,17 @@ def tir_table(path: str | Path) -> TyreTable:
     )
 
 
-def longitudinal_formula(c: dict[str, float], load: float) -> Curve:
+def longitudinal_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
     """Magic formula of braking under a load (N) from a file's coefficients."""
     _, off = _load_excess(c, load)
     peak = (c["PDX1"] + c["PDX2"] * off) * c["LMUX"]
     shape = c["PCX1"] * c["LCX"]
     bend = (c["PEX1"] + c["PEX2"] * off + c["PEX3"] * off**2) * (1.0 + c["PEX4"]) * c["LEX"]
     stiffness = (c["PKX1"] + c["PKX2"] * off) * math.exp(c["PKX3"] * off) * c["LKX"]
-    return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
+    return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-def lateral_formula(c: dict[str, float], load: float) -> Curve:
+def lateral_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
     """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
     nominal, off = _load_excess(c, load)
     peak = abs(c["PDY1"] + c["PDY2"] * off) * c["LMUY"]
@@ -79,7 +79,7 @@ def lateral_formula(c: dict[str, float], load: float) -> Curve:
     bend = (c["PEY1"] + c["PEY2"] * off) * c["LEY"]
     turn = math.sin(2.0 * math.atan2(load, c["PKY2"] * nominal))
     stiffness = abs(c["PKY1"]) * nominal * turn * c["LKY"] / load
-    return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
+    return MagicFormulaCurve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
 def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
@@ -136,7 +136,7 @@ def _wrong_value(path: str | Path, properties: dict[str, Property], name: str, a
     return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
 
 
-def _check_curves(path: str | Path, curves: dict[float, tuple[Curve, Curve]]) -> None:
+def _check_curves(path: str | Path, curves: dict[float, tuple[MagicFormulaCurve, MagicFormulaCurve]]) -> None:
     """Refuse coefficients that give no friction, or one that turns round."""
     for load, pair in curves.items():
         for letter, curve in zip("XY", pair, strict=True):

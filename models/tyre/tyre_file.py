@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.tables import NEWTONS, RADIANS, SHARES, Block, Columns, blocks
+from models.core.tables import NEWTONS, RADIANS, SHARES, Columns, RowBlock, blocks
 from models.tyre.magic_formula import factors
 from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
 
@@ -47,7 +47,7 @@ def tyre_table(path: str | Path) -> TyreTable:
 
 def _columns(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Line (n,) of every row, and the columns (n,) in SI; raises InputError for the first row that is wrong."""
-    parts: list[Block] = []
+    parts: list[RowBlock] = []
     for block in blocks(path, COLUMNS):
         for row, wrong in block.wrong.items():
             raise InputError(path, f"line {block.lines[row]}", None, wrong)

@@ -95,7 +95,7 @@ class TyreTable:
 
     @property
     def cornering(self) -> float:
-        """Largest slope (1/rad) of mu_y by slip angle at none."""
+        """Largest slope (1/rad) of mu_y over the slip angle, at zero slip angle."""
         if self.angles.size == 1:
             return 0.0
         return float((self.g[1].max() * self.h[1].max()) / self.angles[1])

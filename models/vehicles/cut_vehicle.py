@@ -100,12 +100,12 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     return CutVehicle(chassis, _tree(whole, chassis), whole, elements_of(whole, held), loads)
 
 
-def elements_of(vehicle: SpatialVehicle, held: Preloads) -> tuple[Element, ...]:
+def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, ...]:
     """Springs, then bars, of a vehicle whose parts all name their frames; held : what they bear at rest."""
 
     def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
-        force = held.parts[part.name]
+        force = preloads.parts[part.name]
         return Element(
             part.name,
             first_body,

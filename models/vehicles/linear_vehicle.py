@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Wheel:
+class WheelPosition:
     """Where a wheel meets the road: x (m) forward, y (m) to the left, and its axle, 0 the frontmost."""
 
     name: str
@@ -36,7 +36,7 @@ class Output:
     road_rate_factors: np.ndarray
 
 
-class Rows(NamedTuple):
+class OutputRows(NamedTuple):
     """Rows of all outputs' matrices, as ``Output`` has them of one output: (p, n), those by the road (p, w)."""
 
     acceleration_factors: np.ndarray
@@ -60,7 +60,7 @@ class LinearVehicle:
     road_stiffness: np.ndarray
     road_damping: np.ndarray
     coordinates: tuple[tuple[str, str], ...]
-    wheels: tuple[Wheel, ...]
+    wheels: tuple[WheelPosition, ...]
     outputs: tuple[Output, ...]
     source: str = "analytic"
 
@@ -76,9 +76,11 @@ class LinearVehicle:
         return tuple(output.name for output in self.outputs)
 
     @cached_property
-    def read(self) -> Rows:
+    def read(self) -> OutputRows:
         """Factors of all outputs."""
-        return Rows(*(np.array([getattr(output, factor) for output in self.outputs]) for factor in Rows._fields))
+        return OutputRows(
+            *(np.array([getattr(output, factor) for output in self.outputs]) for factor in OutputRows._fields)
+        )
 
 
 def poles(vehicle: LinearVehicle) -> np.ndarray:

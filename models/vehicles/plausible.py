@@ -105,8 +105,8 @@ def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Find
     return tuple(query for query in queries if query.check not in accept)
 
 
-def _query(check: str, place: str, said: str, size: float, unit: str) -> Finding:
-    return Finding(check, "doubt", place, f"{place}: {said}.", size, unit)
+def _query(check: str, place: str, message: str, size: float, unit: str) -> Finding:
+    return Finding(check, "doubt", place, f"{place}: {message}.", size, unit)
 
 
 def _is_unusual(value: float, usual: tuple[float, float]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from models.core.errors import InputError
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import (
     FREEDOMS,
     PARALLEL,
@@ -174,9 +174,9 @@ def linearise(
     return limited(whole, massless(vehicle, limits.massless), free(vehicle, limits)) if limits else whole
 
 
-def wheels(vehicle: SpatialVehicle) -> tuple[Wheel, ...]:
+def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
     """Where the tyres meet the road."""
-    return tuple(Wheel(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
+    return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
 def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
@@ -285,9 +285,9 @@ def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
     return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
 
 
-def preloaded(vehicle: SpatialVehicle, held: Preloads) -> SpatialVehicle:
+def preloaded(vehicle: SpatialVehicle, preloads: Preloads) -> SpatialVehicle:
     """The vehicle with the preloads of its joint elements in them."""
-    elements = tuple(replace(element, held=held.parts[element.name]) for element in vehicle.joint_elements)
+    elements = tuple(replace(element, held=preloads.parts[element.name]) for element in vehicle.joint_elements)
     return replace(vehicle, joint_elements=elements)
 
 

@@ -254,11 +254,11 @@ class _Builder:
             self._frame(place, spring.frame, ends),
         )
 
-    def _frame(self, place: str, name: str | None, ends: tuple[str, str | None]) -> str | None:
+    def _frame(self, place: str, name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
         """The body that a table names as its frame, or else the towed one that carries both ends, if any."""
         if name is not None:
             return self._body(f"{place}.frame", name)
-        first, second = map(self._towed_under, ends)
+        first, second = map(self._towed_under, end_bodies)
         return first if first == second else None
 
     def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:

@@ -15,7 +15,7 @@ from models.core.whole_files import whole_file
 from models.measured.channel import Channel, Source
 from models.measured.file_kinds import is_measurement
 from models.measured.formats import open_source
-from models.measured.time_shift import Pair, Shift, time_shift
+from models.measured.time_shift import ChannelPair, Shift, time_shift
 from models.measured.timing import timing
 from models.measured.units import factor_between
 from studies.command.comparison import channels_of
@@ -75,7 +75,7 @@ class Match:
         return float(self.times[self.row])
 
     def values(self) -> dict[str, float | None]:
-        """Plain values; None for what is no number."""
+        """The comparison as plain values for JSON; None in place of not-a-number."""
         plain = {"rms": self.rms, "relative": self.relative, "peak": self.peak, "at": self.at, "stated": self.stated}
         return {key: value if np.isfinite(value) else None for key, value in plain.items()}
 
@@ -108,7 +108,7 @@ class Overlay:
 
 
 def _share(relative: float) -> str:
-    """A relative error; what does not move has none."""
+    """Relative error of a channel; not a number for a channel that does not vary."""
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
@@ -168,7 +168,7 @@ def _notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> 
             yield f"not compared: {channel.name!r} is no channel of the run{suggestion(channel.name, tuple(ours))}"
 
 
-def _pair(source: Source, channel: Channel, ours: Quantity) -> Pair:
+def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
     """A channel of both, in the unit of the run."""
     if not channel.unit and ours.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
@@ -177,21 +177,29 @@ def _pair(source: Source, channel: Channel, ours: Quantity) -> Pair:
     blocks = list(source.blocks([channel.name]))
     times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
     clock = timing(times, str(source.path), (channel.name,))
-    return Pair(ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order]))
+    return ChannelPair(
+        ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order])
+    )
 
 
-def _match(name: str, pair: Pair, unit: str, shift: float, run: Result) -> Match | None:
+def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
     """A channel of both at the times of the measurement that lie within the run; None where there are none."""
     from scipy.interpolate import CubicSpline
 
-    times = pair.times - shift
-    slack = 1e-9 * (pair.run_times[-1] - pair.run_times[0])
-    inside = np.isfinite(pair.values) & (times >= pair.run_times[0] - slack) & (times <= pair.run_times[-1] + slack)
+    times = channel_pair.times - shift
+    slack = 1e-9 * (channel_pair.run_times[-1] - channel_pair.run_times[0])
+    inside = (
+        np.isfinite(channel_pair.values)
+        & (times >= channel_pair.run_times[0] - slack)
+        & (times <= channel_pair.run_times[-1] + slack)
+    )
     if not inside.any():
         return None
-    read = CubicSpline(pair.run_times, pair.run)(times[inside])
+    read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[inside])
     stated = errors_of(run).get(name.partition(", ")[0])
-    return Match(name, unit, times[inside], read, pair.values[inside], np.nan if stated is None else stated.error)
+    return Match(
+        name, unit, times[inside], read, channel_pair.values[inside], np.nan if stated is None else stated.error
+    )
 
 
 def saved_results(place: Path) -> dict[str, Result]:

@@ -118,7 +118,7 @@ def _files(table: Any) -> Iterator[str]:
 
 
 def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
-    """The engines that were asked for; none for a system that no engine computes. option : where they were named."""
+    """The requested engines; none for a system that runs without an engine. option : the option that names them."""
     engines = KNOWN_SYSTEMS[system].engines
     if name is not None and not engines:
         raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")

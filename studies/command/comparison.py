@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.core.result import Result, load
 from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
-from studies.command.differences import Difference, Quantity
+from studies.command.differences import Quantity, QuantityDifference
 
 SUFFIXES = (".nc", ".csv")
 SHOWN_QUANTITIES = 20
@@ -25,13 +25,13 @@ EQUAL_PLACES = 1e-9
 """Places so near, by the largest of them, are the same."""
 
 
-def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:
+def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[str]]:
     """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
     pairs, notes = _pairs(first, second)
-    differences = list[Difference]()
+    differences = list[QuantityDifference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
         a, b = (dict(_quantities(file)) for file in files)
@@ -40,14 +40,14 @@ def compare(first: Path, second: Path) -> tuple[list[Difference], list[str]]:
     return _by_share(differences, first, second), notes
 
 
-def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
+def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[QuantityDifference], list[str]]:
     """Differences between two results in memory, which messages and notes call by ``names``."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
-def _by_share(differences: list[Difference], first: object, second: object) -> list[Difference]:
+def _by_share(differences: list[QuantityDifference], first: object, second: object) -> list[QuantityDifference]:
     """The largest share first; raises InputError where there is none."""
     if not differences:
         raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
@@ -200,7 +200,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _difference(name: str, first: Quantity, second: Quantity, file: object) -> Difference:
+def _difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
     """Raises InputError where kinds of runs, units or rows do not fit."""
     if first.kind != second.kind:
         raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
@@ -213,7 +213,7 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> D
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
     near = EQUAL_PLACES * np.abs(first.grid).max(initial=0.0)
     if first.grid.shape == second.grid.shape and np.allclose(first.grid, second.grid, rtol=0.0, atol=near):
-        return Difference(
+        return QuantityDifference(
             name,
             first.unit,
             first.over,
@@ -230,7 +230,7 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> D
     return _in_time(name, first, second, file)
 
 
-def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> Difference:
+def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
     """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
@@ -247,7 +247,7 @@ def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> Diff
     pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
     note = f"on {len(times)} common rows, the denser run by a cubic spline"
     both = pair if fine is first else pair[::-1]
-    return Difference(name, first.unit, first.over, times, *both, note, stated=first.error + second.error)
+    return QuantityDifference(name, first.unit, first.over, times, *both, note, stated=first.error + second.error)
 
 
 def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
@@ -277,12 +277,12 @@ def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
     }
 
 
-def lines(differences: list[Difference], notes: list[str]) -> list[str]:
+def lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
     """Lines for the screen: what differs most, and the notes."""
     return [*_lines(differences), *(f"  {note}" for note in notes)]
 
 
-def _lines(differences: list[Difference]) -> list[str]:
+def _lines(differences: list[QuantityDifference]) -> list[str]:
     differ = [each for each in differences if each.largest > 0.0]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit"]
@@ -300,7 +300,7 @@ def _lines(differences: list[Difference]) -> list[str]:
     ]
 
 
-def _difference_text(difference: Difference) -> str:
+def _difference_text(difference: QuantityDifference) -> str:
     """Where a difference is largest, and whether it tells anything."""
     return (
         f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
@@ -309,7 +309,7 @@ def _difference_text(difference: Difference) -> str:
     )
 
 
-def _figure(first: Path, second: Path, differences: list[Difference], results: Results, path: Path) -> None:
+def _figure(first: Path, second: Path, differences: list[QuantityDifference], results: Results, path: Path) -> None:
     """Draw both results and, below, their difference, of the three quantities that differ most, or one that is
     equal."""
     from models.drawing.figures import (

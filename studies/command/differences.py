@@ -23,8 +23,8 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Difference:
-    """``second`` less ``first`` over ``grid`` (n,); ``note`` says how they came onto the same rows.
+class QuantityDifference:
+    """``second`` less ``first`` over ``grid`` (n,); ``note`` : how the two were brought to the same rows.
 
     stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
     """

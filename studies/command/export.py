@@ -27,10 +27,10 @@ def _systems() -> tuple[str, ...]:
     return tuple(name for name, system in SYSTEMS.items() if find_spec(f"{system.package}.export"))
 
 
-def target(scene: Any, engine: str, out: Path | None) -> Path:
+def target(scene: Any, engine: str, output_path: Path | None) -> Path:
     """The file to write; InputError where it is there already, has another end, or lies in no folder."""
     suffix = SUFFIXES.get(engine, "")
-    path = out or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
+    path = output_path or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
     if path.suffix != suffix:
         raise InputError("--out", "", str(path), f"must end in {suffix} for {engine}")
     if path.exists():
@@ -40,17 +40,18 @@ def target(scene: Any, engine: str, out: Path | None) -> Path:
     return path
 
 
-def export(scene: Any, engine: str, out: Path | None) -> dict[str, Any]:
-    """Write the file; what was written where: its "file", what it "has", and what is "left out", a sentence each."""
+def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
+    """Write the file; returns its path ("file"), and sentences on its contents ("has") and on omissions ("left
+    out")."""
     answer = exported(scene, engine)
-    path = target(scene, engine, out)
+    path = target(scene, engine, output_path)
     write_whole(path, answer.text)
     return {"file": str(path), "has": [*answer.has], "left out": [*answer.left_out]}
 
 
-def lines(title: str, told: dict[str, Any]) -> list[str]:
-    """What the command prints of a scene's title and of what ``export`` tells."""
-    path, left_out = told["file"], [f"    {text}" for text in told["left out"]]
+def lines(title: str, export_record: dict[str, Any]) -> list[str]:
+    """Lines that the command prints: the scene's title, and the contents and omissions of the exported file."""
+    path, left_out = export_record["file"], [f"    {text}" for text in export_record["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"
     opened = f"python -m mujoco.viewer --mjcf={path}" if path.endswith(SUFFIXES["mujoco"]) else f"python {path}"
-    return [f"{title}: {path}", f"  has {', '.join(told['has'])}", head, *left_out, f"  open it: {opened}"]
+    return [f"{title}: {path}", f"  has {', '.join(export_record['has'])}", head, *left_out, f"  open it: {opened}"]

@@ -64,13 +64,13 @@ def finish(
         sys.exit(1)
 
 
-def folder_of(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
+def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | None, resume: Path | None) -> Path:
     """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
     from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:
-        return new_folder(out, name)
-    if out is not None:
+        return new_folder(output_folder, name)
+    if output_folder is not None:
         raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
     if blocks is None:
         raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")

@@ -15,8 +15,8 @@ from models.ensemble.workers import Crew, places_of
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
-from models.identification.uncertainty import Profile, Uncertainty, profile, uncertainty
-from models.measured.time_shift import Pair, time_shift
+from models.identification.uncertainty import LikelihoodProfile, Uncertainty, profile, uncertainty
+from models.measured.time_shift import ChannelPair, time_shift
 
 STAGES = "stages"
 """Folder of finished stages, from which ``--resume`` goes on."""
@@ -53,13 +53,15 @@ def identify(
 
 
 def profiles_of(
-    scene: Any, known: Uncertainty, every: bool = False, tell: Tell = lambda text, share: None
-) -> Iterator[Profile]:
+    scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, tell: Tell = lambda text, share: None
+) -> Iterator[LikelihoodProfile]:
     """Profiles of every parameter, or of those that the data do not determine, computed by the scene's crew."""
-    wanted = [k for k in range(len(known.fit.problem.parameters)) if every or not known.determined[k]]
+    wanted = [
+        k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.determined[k]
+    ]
     with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
-        for done, (k, made) in enumerate(in_order(partial(profile, known), iter(wanted), pool), start=1):
-            tell(f"profile of {known.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
+        for done, (k, made) in enumerate(in_order(partial(profile, uncertainty), iter(wanted), pool), start=1):
+            tell(f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
             yield made
 
 
@@ -77,11 +79,11 @@ def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, l
 
 
 def report(
-    scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, every: bool, **more: Any
+    scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, all_profiles: bool, **more: Any
 ) -> dict[str, Any]:
     """Identify, save ``identify.json`` and ``identify.png``, and say it in lines; every : profiles of all of them."""
     known = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
-    drawn = list(profiles_of(scene, known, every, tell))
+    drawn = list(profiles_of(scene, known, all_profiles, tell))
     answer = as_dict(known, drawn)
     write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
     draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
@@ -95,9 +97,9 @@ def report(
     }
 
 
-def as_dict(known: Uncertainty, profiles: Sequence[Profile] = ()) -> dict[str, Any]:
+def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
     """All of it in plain values; None stands for a standard error that is none."""
-    solved, names = known.fit, [each.name for each in known.fit.problem.parameters]
+    solved, names = uncertainty.fit, [each.name for each in uncertainty.fit.problem.parameters]
     return {
         "estimates": {
             name: {
@@ -107,16 +109,16 @@ def as_dict(known: Uncertainty, profiles: Sequence[Profile] = ()) -> dict[str, A
                 "at a bound": bool(at),
             }
             for name, value, error, sure, at in zip(
-                names, solved.values, known.deviations, known.determined, solved.at_bound, strict=True
+                names, solved.values, uncertainty.deviations, uncertainty.determined, solved.at_bound, strict=True
             )
         },
-        "correlation": {"of": names, "rows": correlation(known).tolist()},
+        "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
         "combinations": [
             {"standard error": error, "direction": dict(zip(names, vector.tolist(), strict=True))}
-            for error, vector in known.combinations()
+            for error, vector in uncertainty.combinations()
         ],
-        "condition": _finite_number(known.condition),
-        "residuals stay alike for [s]": known.staying,
+        "condition": _finite_number(uncertainty.condition),
+        "residuals stay alike for [s]": uncertainty.staying,
         "errors of channels": errors(solved),
         "samples left out": {channel.name: channel.left_out for channel in solved.problem.channels},
         "converged": solved.converged,
@@ -127,44 +129,45 @@ def as_dict(known: Uncertainty, profiles: Sequence[Profile] = ()) -> dict[str, A
     }
 
 
-def correlation(known: Uncertainty) -> np.ndarray:
+def correlation(uncertainty: Uncertainty) -> np.ndarray:
     """(p, p): of the estimates, 0 with those at a bound."""
-    size = np.sqrt(np.clip(np.diag(known.covariance), 0.0, None))
+    size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
-    return np.divide(known.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
+    return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
 
 
 def _finite_number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def errors(solved: Fit) -> dict[str, float]:
+def errors(fit: Fit) -> dict[str, float]:
     """Rms error of each channel by its rms."""
-    weights = solved.problem.weights > 0.0
+    weights = fit.problem.weights > 0.0
     return {
         channel.name: float(np.sqrt(np.mean(row[used] ** 2)))
-        for channel, row, used in zip(solved.problem.channels, solved.residuals, weights, strict=True)
+        for channel, row, used in zip(fit.problem.channels, fit.residuals, weights, strict=True)
     }
 
 
-def lines(known: Uncertainty, profiles: Sequence[Profile] = ()) -> list[str]:
+def lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> list[str]:
     """Lines for the screen."""
-    solved = known.fit
+    solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
     for k, each in enumerate(solved.problem.parameters):
-        error = "at its bound" if solved.at_bound[k] else f"{known.deviations[k]:.3g}"
-        doubt = "" if known.determined[k] else "  not determined by the data"
+        error = "at its bound" if solved.at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
+        doubt = "" if uncertainty.determined[k] else "  not determined by the data"
         table.append(f"  {each.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
     table += [f"  error of {name:<23}{100.0 * value:>12.3g} % of its rms" for name, value in errors(solved).items()]
-    table += _combined(known)
+    table += _combined(uncertainty)
     table.append(
-        f"  residuals stay alike for {known.staying:.3g} s; standard errors count them so, not as independent samples"
+        f"  residuals stay alike for {uncertainty.staying:.3g} s; "
+        "standard errors count them so, not as independent samples"
     )
     left = {channel.name: channel.left_out for channel in solved.problem.channels}
     table.append("  left out as spikes or not measured: " + ", ".join(f"{n} of {name}" for name, n in left.items()))
     if not solved.converged:
         table.append("  the search has not settled: resume it, or start nearer")
-    if late := late_clock(known):
+    if late := late_clock(uncertainty):
         table.append(
             f"  DOUBT: the measurement's clock seems {late:.4g} s later than the run's: take that off its times"
         )
@@ -175,22 +178,24 @@ def lines(known: Uncertainty, profiles: Sequence[Profile] = ()) -> list[str]:
     return table
 
 
-def late_clock(known: Uncertainty) -> float:
+def late_clock(uncertainty: Uncertainty) -> float:
     """s by which the measurement seems later than the model; 0 unless both are ``NEARER`` as near when laid so.
 
     The model is that of the start: estimates take up a part of the delay.
     """
-    problem, times = known.fit.problem, known.fit.problem.clock.times
+    problem, times = uncertainty.fit.problem, uncertainty.fit.problem.clock.times
     measured = [np.where(channel.used, channel.values, np.nan) for channel in problem.channels]
     start = np.array([each.start for each in problem.parameters])
-    pairs = [Pair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)]
+    pairs = [
+        ChannelPair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)
+    ]
     shift = time_shift(pairs).seconds
     return shift if _distance(pairs, shift) * NEARER < _distance(pairs, 0.0) else 0.0
 
 
-def _distance(pairs: Sequence[Pair], shift: float) -> float:
-    """Mean, over channels, of the rms difference by the measurement's deviation, the measurement laid earlier by so
-    many seconds."""
+def _distance(pairs: Sequence[ChannelPair], shift: float) -> float:
+    """Mean over channels of rms difference / standard deviation of the measurement, with the measurement shifted
+    earlier by a time (s)."""
     shares = []
     for pair in pairs:
         at = pair.times - shift
@@ -200,11 +205,11 @@ def _distance(pairs: Sequence[Pair], shift: float) -> float:
     return float(np.mean(shares))
 
 
-def _combined(known: Uncertainty) -> list[str]:
-    combinations = known.combinations()
+def _combined(uncertainty: Uncertainty) -> list[str]:
+    combinations = uncertainty.combinations()
     if not combinations:
         return []
-    names = [each.name for each in known.fit.problem.parameters]
+    names = [each.name for each in uncertainty.fit.problem.parameters]
 
     def told(vector: np.ndarray) -> str:
         order = np.argsort(-np.abs(vector))
@@ -214,16 +219,16 @@ def _combined(known: Uncertainty) -> list[str]:
     return [
         f"  best determined, within {100.0 * best:.2g} %: {told(first)}",
         f"  worst determined, within {100.0 * worst:.2g} %: {told(last)}",
-        f"  condition of the information: {known.condition:.3g}",
+        f"  condition of the information: {uncertainty.condition:.3g}",
     ]
 
 
-def draw_fit(known: Uncertainty, title: str, path: Path) -> None:
+def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
     """Every channel with the model at the estimates, the error below it."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
-    problem = known.fit.problem
-    predicted, times = problem.predicted(known.fit.values), problem.clock.times
+    problem = uncertainty.fit.problem
+    predicted, times = problem.predicted(uncertainty.fit.values), problem.clock.times
     count = len(problem.channels)
     figure, axes = subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
     for (top, below), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):

@@ -51,7 +51,8 @@ class Watch:
         self._thread.start()
 
     def _sample_stack(self) -> None:
-        """Give the time since the last look to what is seen now: a call that lets no thread in ends before a look."""
+        """Attribute the time since the last sample to the present call stack; a call that holds the interpreter's lock
+        ends before the sample."""
         last = time.perf_counter()
         while not self._over.wait(SAMPLING_PERIOD):
             now = time.perf_counter()

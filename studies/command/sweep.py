@@ -28,7 +28,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed
 from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import Crew
 from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
@@ -65,7 +65,7 @@ class Points:
         return _array(map(self.record, paths))
 
     def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
-        """Scene, engines and study of a point; InputError if it cannot be run."""
+        """Scene, engines and study of a point of the sweep; InputError if the point cannot be run."""
         scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
@@ -274,7 +274,7 @@ def _absolute_path(scene: str) -> str:
 
 
 def _save(folder: Path, swept: "Swept") -> None:
-    """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
+    """Save ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
         [_largest_error(results) for results in swept.results],
         [_broken(results) for results in swept.results],

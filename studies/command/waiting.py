@@ -145,12 +145,12 @@ def waiting(text: str, system: str = "") -> Iterator[Tell]:
         now.kernels.detach()
 
 
-def _draw(now: Waiting, over: threading.Event) -> None:
+def _draw(waiting: Waiting, finished: threading.Event) -> None:
     """Draw the bar until the work is over, from BAR_DELAY on."""
-    while not over.wait(BAR_PERIOD):
-        now.kernels.attach()
-        now.state()  # which sees when a march begins
-        if time.monotonic() - now.begun > BAR_DELAY:
+    while not finished.wait(BAR_PERIOD):
+        waiting.kernels.attach()
+        waiting.state()  # which sees when a march begins
+        if time.monotonic() - waiting.begun > BAR_DELAY:
             break
     else:
         return
@@ -160,11 +160,11 @@ def _draw(now: Waiting, over: threading.Event) -> None:
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
-        task = bar.add_task(now.text, total=None, left="")
+        task = bar.add_task(waiting.text, total=None, left="")
         while True:
-            now.kernels.attach()
-            text, share, left = now.state()
+            waiting.kernels.attach()
+            text, share, left = waiting.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
-            if over.wait(BAR_PERIOD):
+            if finished.wait(BAR_PERIOD):
                 return

@@ -51,7 +51,7 @@ class Camera:
         return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
 
     def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (..., 2) and inverse distances (...) of points (..., 3); not positive behind the eye."""
+        """Pixels (..., 2) and inverse distances (...) of points (..., 3); zero or negative behind the camera."""
         seen = (points - self.eye) @ self.axes.T
         near = -1.0 / seen[..., 2]
         scale = height / (2.0 * np.tan(self.opening / 2.0)) * near

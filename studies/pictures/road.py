@@ -51,7 +51,7 @@ class PassingRoad:
         return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT_GREY), grass, *marks]
 
     def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
-        """Drawn height (m) at a place on the way and across it."""
+        """Height (m) of the drawn road at a position along and across the path."""
         left, two = (np.interp(distance, self.distances, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
         return self.magnified * (left + share * (two - left))

@@ -25,9 +25,9 @@ class PaintedSurface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, place: np.ndarray, turn: np.ndarray) -> "PaintedSurface":
-        """The surface after turning by ``turn`` (3, 3) and shifting by ``place`` (3,)."""
-        return replace(self, corners=self.corners @ turn.T + place, normals=self.normals @ turn.T)
+    def moved(self, offset: np.ndarray, turn: np.ndarray) -> "PaintedSurface":
+        """The surface after turning by ``turn`` (3, 3) and shifting by ``offset`` (3,)."""
+        return replace(self, corners=self.corners @ turn.T + offset, normals=self.normals @ turn.T)
 
     def at(self, *place: float) -> "PaintedSurface":
         """The surface shifted."""
@@ -88,7 +88,8 @@ def extruded(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurfac
 
 
 def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
-    """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time.
+    """A horizontal square about the origin, made of tiles; tiles behind the camera are not drawn, and those near the
+    origin are small.
 
     up : 1 where z is up, -1 where it is down.
     """
@@ -107,7 +108,8 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
 def line_solid(
     tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
 ) -> PaintedSurface:
-    """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
+    """A solid of revolution whose axis runs from one point (tail) to another (head); ``axial`` : positions from the
+    tail (m)."""
     along = (head - tail) / np.linalg.norm(head - tail)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     aside /= np.linalg.norm(aside)

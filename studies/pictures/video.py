@@ -13,11 +13,13 @@ from models.core.whole_files import whole_file
 PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
-def missing_extra(form: str) -> str:
+def missing_extra(format_name: str) -> str:
     """A sentence that names the extra where a film of this format needs it and it is not there; else empty."""
-    if form == "png" or all(find_spec(name) for name in PACKAGES):
+    if format_name == "png" or all(find_spec(name) for name in PACKAGES):
         return ""
-    return f"no {form} is written without the extra 'video': pip install 'twinrig[video]'; the stills need nothing"
+    return (
+        f"no {format_name} is written without the extra 'video': pip install 'twinrig[video]'; the stills need nothing"
+    )
 
 
 def write(path: Path, frames: Iterable[np.ndarray], per_second: int) -> Path:

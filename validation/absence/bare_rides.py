@@ -1,4 +1,5 @@
-"""Bare rides in time beside cars that were written for that alone: a car with seven freedoms on one track of a road."""
+"""Rides without effects, compared in time with hand-written code for that case: a car with seven degrees of freedom on
+a single track."""
 
 import time
 from collections.abc import Callable

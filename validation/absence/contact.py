@@ -24,7 +24,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the theory that computes, and forces at all motions."""
-    from models.contact.theories import Exact, ExactOnEllipse, Linear, Simplified
+    from models.contact.theories import Exact, ExactOnEllipse, LinearTheory, Simplified
     from models.systems.contact import run
 
     coarse = scene.model_copy(update={"method": scene.method.model_copy(update={"cells": 7})})
@@ -32,7 +32,7 @@ def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], b
         forces = run.run(coarse, error=False)
     body = forces.detail.contact
     counts = {
-        "bounded": int(not isinstance(body, Linear)),
+        "bounded": int(not isinstance(body, LinearTheory)),
         "areas of any shape": int(isinstance(body, Simplified)),
         "half-spaces": int(isinstance(body, Exact | ExactOnEllipse)),
         "laws of friction": int(getattr(body, "choices", {}).get("falling") is not None),

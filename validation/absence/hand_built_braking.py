@@ -125,7 +125,7 @@ def settle(now, regular, starts, truck, known):
 
 @inlined
 def tyre(i, given, now, truck, known):
-    """Fill the report of a wheel by what is done to it in a step."""
+    """Fill the report of a wheel by its torque, load and motion in a step."""
     report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
     sign, cells = 1.0 if u0 >= 0.0 else -1.0, Cells(known.cell[i], known.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(

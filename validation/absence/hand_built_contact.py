@@ -14,7 +14,7 @@ from models.contact.fastsim import Ellipse
 from models.contact.fastsim_grid import grid
 from models.contact.inputs import Array
 from models.contact.linear_theory import flexibilities
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 from models.machine.timing import interleave, paired_ratio
 
@@ -51,7 +51,7 @@ def forces(axis, limit, along, across, halves, shares, bound):
 
 def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
     """The product's call and the written one, CALLS times: fx, fy (N)."""
-    pair = Pair()
+    pair = MaterialPair()
     product = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
     flexible = tuple(float(value) for value in flexibilities(AXIS, AXIS, pair))[:2]
     strips, cells = grid(CELLS, product.net.strips.shape[1], "intermediate").records

@@ -1,4 +1,4 @@
-"""A car with seven freedoms on a rough road written directly for each engine, and its equations written out.
+"""A car with seven degrees of freedom on a rough road, written directly for each engine, and its equations of motion.
 
 As someone would write it who needs that alone.
 

@@ -119,8 +119,8 @@ def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) 
     return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
 
-def _increases(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
-    return {key: n - before[key] for key, n in after.items() if n != before[key]}
+def _increases(counts_before: dict[str, int], counts_after: dict[str, int]) -> dict[str, int]:
+    return {key: n - counts_before[key] for key, n in counts_after.items() if n != counts_before[key]}
 
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
@@ -248,7 +248,7 @@ def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _present(system: str, more: dict[str, Counts]) -> list[Row]:
+def _present(system: str, added_counts: dict[str, Counts]) -> list[Row]:
     """A row for each effect on the counts that it adds."""
     return [
         behaves(
@@ -259,7 +259,7 @@ def _present(system: str, more: dict[str, Counts]) -> list[Row]:
             _text(declared(system, name, counts)),
             "positive control: what its file says, and no more",
         )
-        for name, counts in more.items()
+        for name, counts in added_counts.items()
     ]
 
 

@@ -92,52 +92,52 @@ def march(engine: str, model: Model) -> MarchCounts:
     return seen
 
 
-def leanest_march(engine: str, make: Callable[[], Model], runs: int = 3) -> MarchCounts:
+def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march that took the least memory of some: what a loop allocates shows in every one of them."""
-    return min((march(engine, make()) for _ in range(runs)), key=lambda seen: seen.memory)
+    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.memory)
 
 
 @contextmanager
-def _entry(engine: str, seen: MarchCounts) -> Iterator[None]:
+def _entry(engine: str, counts: MarchCounts) -> Iterator[None]:
     """Put a watch around the one function in which an engine spends its time."""
     if engine == "reference":
         from models.engines import reference
 
         real = reference.march_of
-        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), seen))
+        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), counts))
     elif engine == "mujoco":
         from mujoco import rollout
 
-        patch = mock.patch.object(rollout, "rollout", _with_probes(rollout.rollout, seen))
+        patch = mock.patch.object(rollout, "rollout", _with_probes(rollout.rollout, counts))
     else:
         import exudyn as exu
 
-        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _with_probes(exu.MainSystem.SolveDynamic, seen))
+        patch = mock.patch.object(exu.MainSystem, "SolveDynamic", _with_probes(exu.MainSystem.SolveDynamic, counts))
     with patch:
         yield
 
 
-def _with_probes(function: Callable[..., Any], seen: MarchCounts) -> Callable[..., Any]:
-    """The function, with frames, memory and callbacks added to ``seen``."""
+def _with_probes(function: Callable[..., Any], counts: MarchCounts) -> Callable[..., Any]:
+    """The function, with frames, memory and callbacks added to ``counts``."""
 
     def call(*args: Any, **options: Any) -> Any:
-        seen.callbacks = max(seen.callbacks, installed())
+        counts.callbacks = max(counts.callbacks, installed())
         tracemalloc.start()
-        sys.setprofile(lambda frame, event, argument: _count(seen, event))
+        sys.setprofile(lambda frame, event, argument: _count(counts, event))
         try:
             result = function(*args, **options)
         finally:
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        seen.memory += peak - _size(result, [*args, *options.values()])
+        counts.memory += peak - _size(result, [*args, *options.values()])
         return result
 
     return call
 
 
-def _count(seen: MarchCounts, event: str) -> None:
-    seen.frames += event == "call"
+def _count(counts: MarchCounts, event: str) -> None:
+    counts.frames += event == "call"
 
 
 def _size(result: Any, given: Sequence[Any]) -> int:

@@ -127,14 +127,14 @@ class ConstrainedBody:
             state = self._stepped(state, step)
         return state
 
-    def run(self, duration: float, step: float, every: int) -> tuple[BodyMotion, Reaction]:
-        """Motion and reaction at every so many of the steps (s) of the classical Runge-Kutta method."""
+    def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
+        """Motion and reaction by the classical Runge-Kutta method, at every ``stride``-th step."""
         state, kept = self.start(), list[np.ndarray]()
         for k in range(round(duration / step) + 1):
-            if k % every == 0:
+            if k % stride == 0:
                 kept.append(state)
             state = self._stepped(state, step)
-        return self._told(np.array(kept), step * every)
+        return self._told(np.array(kept), step * stride)
 
     def _stepped(self, state: np.ndarray, step: float) -> np.ndarray:
         after = step_on(lambda _, here: self.rates(here), 0.0, state, step)

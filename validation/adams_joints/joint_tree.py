@@ -1,4 +1,4 @@
-"""A mechanism on the common description: a chain of slides and hinges, for the engines.
+"""The mechanism of the Adams file as a vehicle description for the engines: a chain of slides and hinges.
 
 The vehicle's axes are laid along those of the joint, so that slides and hinges need no others; gravity then points
 anywhere. A universal joint is two hinges, a ball three, a distance a massless rod on two hinges with a ball at its end:
@@ -95,13 +95,13 @@ class JointTree:
             raise InputError("", "PART, V and W", wanted.tolist(), "is no velocity that the joint allows at the start")
         return rates
 
-    def run(self, engine: str, duration: float, step: float, every: int) -> tuple[BodyMotion, Reaction]:
+    def run(self, engine: str, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
         """Motion and reaction in an engine at every so many of its steps (s), reactions from its accelerations."""
         model = free_model(engine, self.driven(), Settings("RK44", step, duration))
         rates = self.start_rates()
-        states = model.march(0.0 * rates, rates, round(duration / step), step)[::every]
+        states = model.march(0.0 * rates, rates, round(duration / step), step)[::stride]
         q, v = np.split(states, 2, axis=1)
-        times = step * every * np.arange(len(q))
+        times = step * stride * np.arange(len(q))
         a = np.array([model.acceleration(t, *row) for t, *row in zip(times.tolist(), q, v, strict=True)])
         motion = self.motion(times, q, v, a)
         return motion, reaction_by_momentum(self.mechanism, motion)

@@ -116,24 +116,24 @@ class _Reading:
     def named(self, *names: str) -> list[Statement]:
         return [each for each in self.statements if each.name in names]
 
-    def _marker(self, of: Statement, parts: dict[int, Statement]) -> Marker:
-        part = parts.get(of.whole("PART"))
+    def _marker(self, statement: Statement, parts: dict[int, Statement]) -> Marker:
+        part = parts.get(statement.whole("PART"))
         if part is None:
-            raise of.refuse(", PART", of.whole("PART"), "is no part of the file")
+            raise statement.refuse(", PART", statement.whole("PART"), "is no part of the file")
         frame = _turned_axes(part.numbers("REULER", (0.0, 0.0, 0.0)))
-        place = part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ of.numbers("QP", (0.0, 0.0, 0.0))
-        return Marker(part.number, place, frame @ _turned_axes(of.numbers("REULER", (0.0, 0.0, 0.0))))
+        place = part.numbers("QG", (0.0, 0.0, 0.0)) + frame @ statement.numbers("QP", (0.0, 0.0, 0.0))
+        return Marker(part.number, place, frame @ _turned_axes(statement.numbers("REULER", (0.0, 0.0, 0.0))))
 
-    def marker(self, of: Statement, number: int) -> Marker:
+    def marker(self, statement: Statement, number: int) -> Marker:
         if number not in self.markers:
-            raise of.refuse("", number, "is no marker of the file")
+            raise statement.refuse("", number, "is no marker of the file")
         return self.markers[number]
 
-    def pair(self, of: Statement, first: int, second: int) -> tuple[Marker, Marker]:
+    def pair(self, statement: Statement, first: int, second: int) -> tuple[Marker, Marker]:
         """The ground's marker and the body's of two."""
-        both = self.marker(of, first), self.marker(of, second)
+        both = self.marker(statement, first), self.marker(statement, second)
         if {marker.part for marker in both} != {self.ground.number, self.part.number}:
-            raise of.refuse("", [first, second], "must be a marker of the ground and one of the body")
+            raise statement.refuse("", [first, second], "must be a marker of the ground and one of the body")
         return both if both[0].part == self.ground.number else both[::-1]
 
     def mechanism(self) -> Mechanism:
@@ -194,12 +194,12 @@ class _Reading:
             raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {apart:g} m")
         return "distance", ends, apart
 
-    def _spring(self, of: Statement, kind: Kind, joint: Marker) -> Spring:
-        ground, body = self.pair(of, of.whole("I"), of.whole("J"))
-        turns = of.has("ROTATIONAL") or of.has("ROTATION")
+    def _spring(self, statement: Statement, kind: Kind, joint: Marker) -> Spring:
+        ground, body = self.pair(statement, statement.whole("I"), statement.whole("J"))
+        turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
         if turns and not (kind == "revolute" and _parallel(ground.axes[:, 2], joint.axes[:, 2])):
-            raise of.refuse("", None, "turns about an axis that no revolute joint has: not supported")
-        law = self._sprung(of, turns) if of.name == "SPRINGDAMPER" else self._function(of, turns)
+            raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
+        law = self._sprung(statement, turns) if statement.name == "SPRINGDAMPER" else self._function(statement, turns)
         angle = 0.0
         if turns:  # of the body beside the ground about the joint's axis, at the start
             x, y = (ground.axes[:, k] @ body.axes[:, 0] for k in range(2))
@@ -208,45 +208,47 @@ class _Reading:
         stiffness, damping, rest = law
         return Spring(turns, ground.place, body.place, stiffness, damping, rest - angle if turns else rest)
 
-    def _sprung(self, of: Statement, turns: bool) -> tuple[float, float, float]:
+    def _sprung(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
         names = ("KT", "CT", "ANGLE", "TORQUE") if turns else ("K", "C", "LENGTH", "FORCE")
-        stiffness, damping, rest, held = (float(of.numbers(name, (0.0,))[0]) for name in names)
+        stiffness, damping, rest, held = (float(statement.numbers(name, (0.0,))[0]) for name in names)
         if held:
-            raise of.refuse(f", {names[3]}", held, "is not supported: give the free length or angle")
+            raise statement.refuse(f", {names[3]}", held, "is not supported: give the free length or angle")
         return stiffness, damping, rest
 
-    def _function(self, of: Statement, turns: bool) -> tuple[float, float, float]:
+    def _function(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
         """Stiffness, damping and rest of a force that is affine in travel and rate, read off its values."""
-        text = of.text("FUNCTION").lower().replace("\\", " ")
-        i, j = (f"0*{of.whole(end)}" for end in "IJ")
+        text = statement.text("FUNCTION").lower().replace("\\", " ")
+        i, j = (f"0*{statement.whole(end)}" for end in "IJ")
         travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
         if not turns:
             travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
         plain = re.sub(rate, "(rate)", re.sub(travel, "(travel)", text))
-        force = _evaluated(of, plain)
+        force = _evaluated(statement, plain)
         base, k, c = force(0.0, 0.0), force(1.0, 0.0), force(0.0, 1.0)
         stiffness, damping = base - k, base - c
         if abs(force(2.0, 3.0) - (base - 2.0 * stiffness - 3.0 * damping)) > 1e-9 * (abs(stiffness) + abs(damping)):
-            raise of.refuse(", FUNCTION", text, "is not supported: only forces that are straight in travel and rate")
+            raise statement.refuse(
+                ", FUNCTION", text, "is not supported: only forces that are straight in travel and rate"
+            )
         if not stiffness and base:
-            raise of.refuse(", FUNCTION", text, "is not supported: a constant force needs a stiffness")
+            raise statement.refuse(", FUNCTION", text, "is not supported: a constant force needs a stiffness")
         rest = base / stiffness if stiffness else 0.0
         return stiffness, damping, -rest if turns else rest  # az is the angle of the ground beside the body
 
 
-def _evaluated(of: Statement, text: str) -> Callable[[float, float], float]:
+def _evaluated(statement: Statement, text: str) -> Callable[[float, float], float]:
     """Value of an expression of numbers, travel, rate, RTOD and DTOR."""
     names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except SyntaxError:
-        raise of.refuse(", FUNCTION", text, "cannot be read") from None
+        raise statement.refuse(", FUNCTION", text, "cannot be read") from None
     allowed = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Name, ast.Load, ast.Constant, ast.operator, ast.unaryop)
     for node in ast.walk(tree):
         strange = isinstance(node, ast.Name) and node.id not in (*names, "travel", "rate")
         if strange or not isinstance(node, allowed):
             shown = node.id if isinstance(node, ast.Name) else ast.unparse(node)
-            raise of.refuse(", FUNCTION", shown, "is not supported: numbers, DM, VR, AZ, WZ, RTOD and DTOR are")
+            raise statement.refuse(", FUNCTION", shown, "is not supported: numbers, DM, VR, AZ, WZ, RTOD and DTOR are")
     code = compile(tree, "", "eval")
     return lambda travel, rate: float(eval(code, {"__builtins__": {}}, {**names, "travel": travel, "rate": rate}))
 

@@ -108,11 +108,11 @@ def _passed(text: str) -> bool:
     return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in IGNORED_STATEMENTS
 
 
-def _statement(file: str, line: int, text: str) -> Statement:
+def _statement(file: str, line_number: int, text: str) -> Statement:
     head = _HEAD.fullmatch(text)
     name = head.group(1).upper() if head else ""
     if head is None or name not in KEYS:
-        raise InputError(file, f"line {line}", text[:40], f"is not supported; read are {', '.join(KEYS)}")
+        raise InputError(file, f"line {line_number}", text[:40], f"is not supported; read are {', '.join(KEYS)}")
     values: dict[str, list[str]] = {}
     key = ""
     for part in _between_commas(head.group(3)):
@@ -126,7 +126,7 @@ def _statement(file: str, line: int, text: str) -> Statement:
             values[key].append(part.strip())
         elif part.strip():
             values[part.strip().upper()] = []
-    statement = Statement(file, line, name, int(head.group(2) or 0), values)
+    statement = Statement(file, line_number, name, int(head.group(2) or 0), values)
     for unknown in (each for each in values if each not in KEYS[name]):
         raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS[name])}")
     return statement

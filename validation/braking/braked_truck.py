@@ -1,4 +1,4 @@
-"""Vehicles in the plane under torques that are given, moved on by the step or an engine: what a truck must do then."""
+"""Plane vehicles under given brake torques, advanced by twinrig's step or an engine, for checks of a truck's motion."""
 
 from collections.abc import Callable
 
@@ -18,21 +18,26 @@ def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: floa
     return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 
 
-class Moving:
+class RollingTruck:
     """A vehicle that begins by rolling along x at a speed (m/s), its front wheels steered (rad).
 
     motion : moved in place; time : that passed (s); go : ``advance``, or an engine's.
     """
 
     def __init__(
-        self, vehicle: OnRoad, speed: float, *, steer: float = 0.0, go: Callable[..., tuple[int, float]] = advance
+        self,
+        vehicle: OnRoad,
+        speed: float,
+        *,
+        steer: float = 0.0,
+        step_function: Callable[..., tuple[int, float]] = advance,
     ) -> None:
         self.plane, self.time = vehicle.plane, 0.0
         state = np.zeros((2, 2 + vehicle.plane.masses.size))
         state[1, 0] = speed
         self.motion = motion_of(state, speed / self.plane.radius)
         steered = np.where(self.plane.place[:, 0] > 0.0, steer, 0.0)
-        self._go, self._others = go, (steered, vehicle)
+        self._go, self._others = step_function, (steered, vehicle)
 
     @property
     def state(self) -> np.ndarray:
@@ -66,7 +71,7 @@ class Moving:
 
     def braked(
         self, torques: np.ndarray, step: float = 5.5e-3, until: float = 0.0, duration: float = 200.0
-    ) -> "Moving":
+    ) -> "RollingTruck":
         """The state at the end of a stop, or earlier at a speed (m/s) or a time (s). Raises RunFailed."""
         status = FINE
         while status == FINE and self.speed > until and self.time < duration - 1e-9:
@@ -111,7 +116,7 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        slid = Moving(truck_on(constant(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
+        slid = RollingTruck(truck_on(constant(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
         wanted = static + PAPER.mass * slowing[name] * lift * np.array([1.0, -1.0])
         errors[name] = float(np.abs(slid.report.load.reshape(2, 2).sum(1) / wanted - 1.0).max())
     return errors
@@ -120,4 +125,4 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
 def sideways_with_locked_front_wheels() -> float:
     """Lateral way (m) of a truck on ice from 10 to 1 m/s whose front wheels are steered by 0.05 rad, but locked."""
     locked = np.array([LOCKS, LOCKS, 0.0, 0.0])
-    return float(Moving(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])
+    return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])

@@ -17,7 +17,7 @@ from models.systems.braking.march import Start
 from models.systems.braking.procedures import ready
 from models.systems.braking.run import marched_by, run
 from models.systems.braking.scene import BrakingScene, build
-from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, Moved, bent_friction
+from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, MovedVehicle, bent_friction
 
 TRUCK, HIGH_TRUCKS = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}))
 """The paper's truck, and one as high as it is long and twice as high as it is wide."""
@@ -31,7 +31,7 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
 
     def error(implementation: str, folder: Path) -> float:
-        moved = Moved(implementation, TRUCK, ICE, turning=0.0)
+        moved = MovedVehicle(implementation, TRUCK, ICE, turning=0.0)
         moved.state[1] = speeds
         first, gains = energy(moved.state[1]), []
         for _ in range(25):
@@ -45,7 +45,7 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
 
 def on_even_friction(implementation: str, folder: Path) -> float:
     """The truck on even friction, straight ahead: y, heading and yaw rate (m, rad, rad/s)."""
-    moved = Moved(implementation, TRUCK, DRY)
+    moved = MovedVehicle(implementation, TRUCK, DRY)
     moved.under(np.full((101, 4), 4e3))
     return float(np.abs(moved.state[:, 1:]).max())
 
@@ -54,7 +54,7 @@ def mirrored(implementation: str, folder: Path) -> float:
     """The truck steered left on a slick left side, and its mirror image: difference (m, rad)."""
     ends = []
     for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
-        moved = Moved(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
+        moved = MovedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
         moved.under(np.full((101, 4), 2e3))
         ends.append(moved.state * np.array([1.0, side, side]))
     return float(np.abs(ends[0] - ends[1]).max())
@@ -62,20 +62,20 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 def lifting(implementation: str, folder: Path) -> float:
     """A truck as high as it is long, braked on dry road."""
-    Moved(implementation, HIGH_TRUCKS, DRY, speed=20.0).under(np.full((101, 4), 2e4))
+    MovedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).under(np.full((101, 4), 2e4))
     return np.inf
 
 
 def turned_over(implementation: str, folder: Path) -> float:
     """A truck twice as high as it is wide, steered on dry road."""
-    Moved(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
+    MovedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
     return np.inf
 
 
 def jackknifed(implementation: str, folder: Path) -> float:
     """A train folded by 100 degrees, all wheels locked on dry road: largest gain of energy over 0.4 s, by the first."""
     plane = train(PAPER, CHOSEN.model_copy(update={"fold": np.pi}), transfer=False)
-    moved = Moved(implementation, plane, DRY, turning=0.0)
+    moved = MovedVehicle(implementation, plane, DRY, turning=0.0)
     state = moved.state
     state[0, 3:] = np.radians(-100.0)
 
@@ -95,7 +95,7 @@ def jackknifed(implementation: str, folder: Path) -> float:
 def no_friction_on_one_side(implementation: str, folder: Path) -> float:
     """The truck locked, none on the left, 0.8 on the right, for 5 ms: speed lost against mu g t / 2, relative."""
     tyres, plane = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
-    moved = Moved(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved = MovedVehicle(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
     moved.under(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
     return lost if moved.state[1, 2] < 0.0 else np.inf
@@ -157,11 +157,15 @@ def below_push_out(implementation: str, folder: Path) -> float:
     return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
 
 
-def nonsense_answers(most: float = 8.0, **command: Any) -> Error:
-    """A case of a controller that answers nonsense where the supply has ``most`` bar."""
+def nonsense_answers(supply_pressure: float = 8.0, **command: Any) -> Error:
+    """A case of a controller that answers nonsense where the supply has ``supply_pressure`` bar."""
 
     def error(implementation: str, folder: Path) -> float:
-        checked_answer(Command(**command), Sample(3, 16_500_000, np.ones(4), True, most, 10.0), most=most)
+        checked_answer(
+            Command(**command),
+            Sample(3, 16_500_000, np.ones(4), True, supply_pressure, 10.0),
+            maximum_pressure=supply_pressure,
+        )
         return np.inf
 
     return error

@@ -10,10 +10,10 @@ from models.brake.plane_vehicle import GRAVITY, Plane
 from models.brake.quarter import Quarter
 from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.core.errors import RunFailed
-from models.engines.braking import Carried
+from models.engines.braking import CarriedChassis
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.braked_truck import Moving, on_road
+from validation.braking.braked_truck import RollingTruck, on_road
 from validation.braking.quarter_stops import exact_distance
 
 Error = Callable[[str, Path], float]
@@ -30,7 +30,7 @@ def bent_friction(*points: tuple[float, float]) -> TyreTable:
     return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)), np.zeros((2, 1)))
 
 
-class Moved(Moving):
+class MovedVehicle(RollingTruck):
     """A vehicle on tyres, moved on by an implementation; it begins by rolling."""
 
     def __init__(
@@ -43,8 +43,8 @@ class Moved(Moving):
         road: Road = UNIFORM_ROAD,
         steer: float = 0.0,
     ) -> None:
-        go = advance if implementation == "reference" else Carried(implementation, plane).advance
-        super().__init__(on_road(plane, stacked(tyres), road), speed, steer=steer, go=go)
+        go = advance if implementation == "reference" else CarriedChassis(implementation, plane).advance
+        super().__init__(on_road(plane, stacked(tyres), road), speed, steer=steer, step_function=go)
         self.implementation = implementation
         if turning is not None:
             self.turning[:] = turning
@@ -72,7 +72,7 @@ def stopping(
     road: Road = UNIFORM_ROAD,
 ) -> float:
     """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
-    wheel = Moved(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
+    wheel = MovedVehicle(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
     least = min(level / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
     rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least / step) + 50, 1), level), step)
     return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
@@ -136,7 +136,7 @@ def frictions(implementation: str, folder: Path) -> float:
     """Locked on friction from 1e-6 to 1.5 for 0.2 s: speed lost against mu g t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
-        wheel = Moved(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), turning=0.0)
+        wheel = MovedVehicle(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), turning=0.0)
         wheel.under(np.full((41, 1), 1e6), 5e-3)
         errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
     return float(max(errors))
@@ -144,21 +144,21 @@ def frictions(implementation: str, folder: Path) -> float:
 
 def at_rest(implementation: str, folder: Path) -> float:
     """A vehicle that stands, its brakes on: way and speed (m, m/s)."""
-    wheel = Moved(implementation, QUARTER.plane, DRY, speed=0.0)
+    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, speed=0.0)
     wheel.under(np.full((51, 1), 5e3))
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
 def backwards(implementation: str, folder: Path) -> float:
     """A wheel thrown backwards, no brake: rim's speed against the vehicle's after 0.5 s, by it."""
-    wheel = Moved(implementation, QUARTER.plane, DRY, turning=-10.0)
+    wheel = MovedVehicle(implementation, QUARTER.plane, DRY, turning=-10.0)
     wheel.under(np.zeros((101, 1)), 5e-3)
     return wheel.rims
 
 
 def released(implementation: str, folder: Path) -> float:
     """A locked wheel whose brake lets go on a step's end: rim's speed against the vehicle's 0.6 s later, by it."""
-    wheel = Moved(implementation, QUARTER.plane, ICE, turning=0.0)
+    wheel = MovedVehicle(implementation, QUARTER.plane, ICE, turning=0.0)
     wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
     return wheel.rims
 

@@ -24,26 +24,30 @@ PLANE: Plane = truck(PAPER)
 DRY = stacked([surface("dry")])
 
 
-def tyre(tables: Tables, under: Surface, motion: WheelMotion, load: float, of: Braked) -> np.ndarray:
+def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
     """(7,) as ``models.brake.plain.tyre.tyre``."""
     wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORTED, 1)), surfaces(1)
-    below.first[0], below.second[0], below.share[0] = under.first, under.second, under.share
+    below.first[0], below.second[0], below.share[0] = surface.first, surface.second, surface.share
     wheels.start[0], wheels.load[0] = motion.start, load
     ahead = motion.forwards if motion.start >= 0.0 else -motion.forwards
     slide(0, ahead, motion.across, motion.regular, below.lag, tables.angles, wheels)
-    given = StepInput(motion.start, motion.start + of.step * motion.rate, *of.torques, of.step)
-    compiled_tyre(0, given, Wheel(of.radius, of.inertia, of.turning), tables, wheels, below, Report(*report))
+    given = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
+    compiled_tyre(
+        0, given, Wheel(braked.radius, braked.inertia, braked.turning), tables, wheels, below, Report(*report)
+    )
     return report[:, 0]
 
 
-def friction(tables: Tables, which: int, angle: float, load: float, slip: float) -> tuple[float, float]:
+def friction(tables: Tables, table_index: int, angle: float, load: float, slip: float) -> tuple[float, float]:
     """mu_x and mu_y of one of the tables at a slip angle (rad), a load (N) and a slip."""
     cells, (s, w) = (
         Cells(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
         cell_and_share(tables.slips, slip),
     )
-    below, above = (longitudinal_adhesion(which, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1)))
-    return below + w * (above - below), lateral_adhesion(which, cells, s, w, tables.g, tables.h)
+    below, above = (
+        longitudinal_adhesion(table_index, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1))
+    )
+    return below + w * (above - below), lateral_adhesion(table_index, cells, s, w, tables.g, tables.h)
 
 
 def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from models.brake.controllers.five_phase_cycle import Frozen
 
 
 @dataclass(frozen=True)
-class Wheel:
+class ExactWheel:
     """speed (m/s), radius (m), inertia (kg m^2); slips and forces (N) at the nodes of the table."""
 
     speed: float
@@ -30,7 +30,7 @@ class Wheel:
 class Piece:
     """Solution from slip s0 and torque (N m) that changes at a rate (N m/s), in cell i of the table."""
 
-    def __init__(self, wheel: Wheel, i: int, s0: float, torque: float, rate: float) -> None:
+    def __init__(self, wheel: ExactWheel, i: int, s0: float, torque: float, rate: float) -> None:
         way = wheel.slips[i + 1] - wheel.slips[i]
         c = (wheel.forces[i + 1] - wheel.forces[i]) / way
         f0 = wheel.forces[i] - c * wheel.slips[i]
@@ -87,21 +87,21 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
     return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
 
 
-def phase(wheel: Wheel, at: list[float], rate: float, sign: float, level: float) -> None:
-    """Move ``at`` (slip, torque, time, impulse) on to the end of a phase at a rate of torque (N m/s)."""
-    i = min(int(np.searchsorted(wheel.slips, at[0], side="right")) - 1, wheel.slips.size - 2)
+def phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level: float) -> None:
+    """Move ``state`` (slip, torque, time, impulse) on to the end of a phase at a rate of torque (N m/s)."""
+    i = min(int(np.searchsorted(wheel.slips, state[0], side="right")) - 1, wheel.slips.size - 2)
     for _ in range(100_000):
-        piece = Piece(wheel, i, at[0], at[1], rate)
+        piece = Piece(wheel, i, state[0], state[1], rate)
         if sign * (piece.rim(0.0) - level) >= 0.0:
             return
         met = min(piece.meets(level), 0.1)
         time, side = piece.leaves(wheel.slips[i], wheel.slips[i + 1], met)
         ended = side == 0 and met < 0.1
-        at[:] = [piece.slip(time), at[1] + rate * time, at[2] + time, at[3] + piece.impulse(time)]
+        state[:] = [piece.slip(time), state[1] + rate * time, state[2] + time, state[3] + piece.impulse(time)]
         if ended:
             return
         if side != 0:
-            at[0], i = float(wheel.slips[i + (side > 0)]), i + side
+            state[0], i = float(wheel.slips[i + (side > 0)]), i + side
     raise ArithmeticError("a phase that does not end")
 
 
@@ -111,10 +111,10 @@ def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = Non
     rates[0] = rates[0] if begun is None else begun
     phases = [(frozen.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
     forces = frozen.load * frozen.tyre.mu_x[0, 0]
-    return cycle(Wheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
+    return cycle(ExactWheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
 
 
-def cycle(wheel: Wheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
+def cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
     """Period (s) and mean force by the largest, of the last of some cycles.
 
     phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.

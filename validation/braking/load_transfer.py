@@ -48,11 +48,11 @@ def asked_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
 
 
 def braked_error(drive: Drive, mu: float) -> float:
-    """Transfer between the axles of a drive that slides, beside what is asked for, less 1."""
+    """Relative error of the load transfer between the axles while all wheels slide."""
     return float(transfer(drive)[0] / asked_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
 
 
 def turning_error(drive: Drive) -> float:
-    """Transfer between the sides of a drive in a steady turn, beside what is asked for, less 1."""
+    """Relative error of the load transfer between left and right in a steady turn."""
     ahead, _, rate = drive.velocity()[-1]
     return float(transfer(drive)[1] / asked_moments(drive, np.array([0.0, ahead * rate]))[1] - 1.0)

@@ -27,9 +27,9 @@ BY_LOAD = np.array([1.1, 1.0, 0.8])
 """Friction at these loads (N) divided by that of the surface."""
 
 
-def by_load(on: str) -> TyreTable:
+def by_load(surface_name: str) -> TyreTable:
     """A surface's tyre whose friction falls with the load."""
-    tables_of = surface(on)
+    tables_of = surface(surface_name)
     spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
     return replace(spread, mu_x=spread.mu_x * BY_LOAD[None, :, None], h=spread.h * BY_LOAD)
 

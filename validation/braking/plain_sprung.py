@@ -151,7 +151,7 @@ def controller(valves: bool, wheels: int = 4) -> Controller:
 def run(
     vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
-    """Run so many seconds of a stop from a speed (m/s)."""
+    """Simulate a stop from a speed (m/s) for a duration (s)."""
     return vehicle_on(vehicle, engine, valves, lags).run(controller(valves, wheels_of(vehicle)), speed, duration)
 
 
@@ -163,12 +163,13 @@ def plain_run(
     return run(EVERY_VEHICLE[vehicle](), "reference", duration, valves, speed, lags)
 
 
-def paths_apart(first: BrakingPath, other: BrakingPath) -> float:
+def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
     """Largest difference of positions, rates and rims (m, rad, per s) at common times; infinite if one ended early."""
-    if len(first.times) != len(other.times):
+    if len(first.times) != len(other_path.times):
         return np.inf
     off = max(
-        float(np.abs(first.states - other.states).max()), 0.3 * float(np.abs(first.turning - other.turning).max())
+        float(np.abs(first.states - other_path.states).max()),
+        0.3 * float(np.abs(first.turning - other_path.turning).max()),
     )
     return off if np.isfinite(off) else np.inf
 

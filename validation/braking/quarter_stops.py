@@ -36,18 +36,18 @@ class Numbers(NamedTuple):
     inertia: float
 
 
-class Curve(NamedTuple):
+class FrictionCurve(NamedTuple):
     """Friction mu (s,) by slips (s,)."""
 
     slips: np.ndarray
     mu: np.ndarray
 
 
-class Change(NamedTuple):
+class FrictionChange(NamedTuple):
     """A road on which friction changes at a place (m)."""
 
-    before: Curve
-    behind: Curve
+    before: FrictionCurve
+    behind: FrictionCurve
     place: float = math.inf
 
 
@@ -101,7 +101,7 @@ def march(scheme, u, w, torques, quarter, road, step):
     """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, the steps (s) taken, -1 if it does not stop
     under the torques (n + 1,) in N m at the ends of steps, and the speed (m/s) that is left.
 
-    u (m/s), w (rad/s) : speeds at the start; road : a ``Change``.
+    u (m/s), w (rad/s) : speeds at the start; road : a ``FrictionChange``.
     """
     x = 0.0
     for n in range(torques.size - 1):
@@ -115,7 +115,7 @@ def march(scheme, u, w, torques, quarter, road, step):
 
 
 def marched_quarter(
-    scheme: int, quarter: Quarter, torques: np.ndarray, road: Change, speed: float, step: float
+    scheme: int, quarter: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
 ) -> tuple[float, int, float]:
     """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
     numbers = Numbers(quarter.mass, quarter.radius, quarter.spin_inertia)
@@ -132,9 +132,9 @@ def stopped(
     the way until then is given, with the speed (m/s) that is left, else 0.
     """
     most = int(LONGEST_TIME_RATIO * speed * quarter.mass * quarter.radius / (torque * step))
-    curve = Curve(tyre.slips, tyre.mu_x[0, 0])
+    curve = FrictionCurve(tyre.slips, tyre.mu_x[0, 0])
     way, _, left = marched_quarter(
-        SCHEMES.index(scheme), quarter, np.full(most + 1, torque), Change(curve, curve), speed, step
+        SCHEMES.index(scheme), quarter, np.full(most + 1, torque), FrictionChange(curve, curve), speed, step
     )
     return way, left
 
@@ -171,9 +171,9 @@ STEP = 5.5e-3
 
 
 @cache
-def friction_table(on: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
+def friction_table(surface_name: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
     """Table of a surface, as it is and for compiled functions."""
-    tyre = surface(on, scale)
+    tyre = surface(surface_name, scale)
     return tyre, stacked([tyre])
 
 

@@ -69,73 +69,79 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
     return table
 
 
-def procedure(draw: Draw, kind: str) -> dict[str, Any]:
+def procedure(generator: Draw, kind: str) -> dict[str, Any]:
     """A random procedure of the driver, as a table of a scene."""
-    options: dict[str, Any] = {"kind": kind, "speed": draw.within(2.0, 25.0)}
+    options: dict[str, Any] = {"kind": kind, "speed": generator.within(2.0, 25.0)}
     if kind == "split":
-        options["right"] = draw.choice(*SURFACES)
+        options["right"] = generator.choice(*SURFACES)
     if kind == "turn":
-        options |= {"radius": draw.choice(-1.0, 1.0) * draw.within(60.0, 200.0), "speed": draw.within(2.0, 7.0)}
-    if kind == "j_turn" and draw.chance(0.5):
-        options["steer"] = draw.within(-0.05, 0.05)
+        options |= {
+            "radius": generator.choice(-1.0, 1.0) * generator.within(60.0, 200.0),
+            "speed": generator.within(2.0, 7.0),
+        }
+    if kind == "j_turn" and generator.chance(0.5):
+        options["steer"] = generator.within(-0.05, 0.05)
     elif kind == "j_turn":
-        options["steering"] = [[0.0, 0.0], [0.5, draw.within(-0.05, 0.05)], [1.5, draw.within(-0.05, 0.05)]]
+        options["steering"] = [[0.0, 0.0], [0.5, generator.within(-0.05, 0.05)], [1.5, generator.within(-0.05, 0.05)]]
     return options
 
 
-def road(draw: Draw) -> dict[str, Any]:
+def road(generator: Draw) -> dict[str, Any]:
     """One to three stretches."""
-    starts = [0.0, 12.0, 25.0][: draw.integer(1, 4)]
-    return {"stretches": [{"x": x, "left": draw.choice(*SURFACES)} for x in starts]}
+    starts = [0.0, 12.0, 25.0][: generator.integer(1, 4)]
+    return {"stretches": [{"x": x, "left": generator.choice(*SURFACES)} for x in starts]}
 
 
-def brakes(draw: Draw) -> dict[str, Any]:
+def brakes(generator: Draw) -> dict[str, Any]:
     """Loops of the axles, and the supply."""
-    table: dict[str, Any] = {"supply": draw.within(3.0, 10.0)}
+    table: dict[str, Any] = {"supply": generator.within(3.0, 10.0)}
     for axle in ("front", "rear", "trailer"):
-        rising, push_out = draw.within(400.0, 3000.0), draw.within(0.0, 0.8)
+        rising, push_out = generator.within(400.0, 3000.0), generator.within(0.0, 0.8)
         table[axle] = {
             "gradient": rising,
             "push_out": push_out,
-            "release": push_out * draw.within(0.5, 1.0),
-            "falling": rising * draw.within(1.0, 1.3),
+            "release": push_out * generator.within(0.5, 1.0),
+            "falling": rising * generator.within(1.0, 1.3),
         }
     return table
 
 
-def axle(draw: Draw, x: float) -> dict[str, float]:
+def axle(generator: Draw, x: float) -> dict[str, float]:
     """Wheels of an axle."""
     return {
         "x": x,
-        "track": draw.within(1.7, 2.1),
-        "radius": draw.within(0.35, 0.55),
-        "spin_inertia": draw.within(3.0, 30.0),
+        "track": generator.within(1.7, 2.1),
+        "radius": generator.within(0.35, 0.55),
+        "spin_inertia": generator.within(3.0, 30.0),
     }
 
 
-def vehicle(draw: Draw) -> dict[str, Any]:
+def vehicle(generator: Draw) -> dict[str, Any]:
     """A truck, light or laden, low enough that friction of 1 does not turn it over."""
-    mass = draw.within(1500.0, 16000.0)
+    mass = generator.within(1500.0, 16000.0)
     return {
         "mass": mass,
-        "yaw_inertia": mass * draw.within(2.0, 5.0),
-        "height": draw.within(0.3, 1.3),
-        "front": axle(draw, draw.within(1.3, 2.2)),
-        "rear": axle(draw, draw.within(-2.4, -1.4)),
+        "yaw_inertia": mass * generator.within(2.0, 5.0),
+        "height": generator.within(0.3, 1.3),
+        "front": axle(generator, generator.within(1.3, 2.2)),
+        "rear": axle(generator, generator.within(-2.4, -1.4)),
     }
 
 
-def trailer(draw: Draw) -> dict[str, Any]:
+def trailer(generator: Draw) -> dict[str, Any]:
     """A drawbar trailer."""
-    mass = draw.within(1500.0, 9000.0)
-    axles = {"front": axle(draw, draw.within(1.5, 2.4)), "rear": axle(draw, draw.within(-2.4, -1.5))}
+    mass = generator.within(1500.0, 9000.0)
+    axles = {
+        "front": axle(generator, generator.within(1.5, 2.4)),
+        "rear": axle(generator, generator.within(-2.4, -1.5)),
+    }
     return {
         "mass": mass,
-        "yaw_inertia": mass * draw.within(2.0, 4.0),
-        "height": draw.within(0.5, 1.1),
-        "drawbar": draw.within(1.5, 3.0),
-        "drawbar_mass": draw.within(300.0, 800.0),
-        "drawbar_inertia": draw.within(150.0, 600.0),
-        "hook": draw.within(-4.0, -2.8),
+        "yaw_inertia": mass * generator.within(2.0, 4.0),
+        "height": generator.within(0.5, 1.1),
+        "drawbar": generator.within(1.5, 3.0),
+        "drawbar_mass": generator.within(300.0, 800.0),
+        "drawbar_inertia": generator.within(150.0, 600.0),
+        "hook": generator.within(-4.0, -2.8),
         **{name: {**axle_table, "roll_share": 0.5} for name, axle_table in axles.items()},
     }

@@ -25,18 +25,20 @@ Stretches = Sequence[tuple[float, Callable[[float], float]]]
 """Stretches of a road: where each begins (m), and mu by the slip."""
 
 
-def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, substeps: int) -> float:
+def own_distance(
+    quarter: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
+) -> float:
     """Stopping distance (m) by the product's step."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
-    vehicle = on_tyres(quarter.plane, [surface(on)], of_wheels(brake), chambers, substeps=substeps)
+    vehicle = on_tyres(quarter.plane, [surface(surface_name)], of_wheels(brake), chambers, substeps=substeps)
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 
 def reference_distance(
-    quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, tolerance: float = 1e-10
+    quarter: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
     """Stopping distance (m) by the reference, at a relative tolerance."""
-    curve = SURFACES[on][0]
+    curve = SURFACES[surface][0]
     return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
 
 

@@ -66,7 +66,8 @@ def car() -> Sprung:
 
 
 def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
-    """Pitch (rad, nose down) of the box in steady braking, and what its front axle bears more than at rest (N).
+    """Pitch (rad, nose down) of the box in steady braking, and the increase of its front axle load over that at rest
+    (N).
 
     About the ground, m a h + m g (h - r) theta = K theta: the contacts go forwards with their wheels. Each axle bears
     K theta / L of it. To first order in theta.

@@ -1,4 +1,4 @@
-"""A car that brakes with its caravan on their suspensions: what closed forms say of both, and runs of them.
+"""A braking car with a caravan, both with suspension: closed forms of both, and their runs.
 
 The closed forms are statics of two bodies on a ball, with the forces of inertia of a steady deceleration. They take
 masses, places and nothing else from the vehicle's description, and share no code with what computes the runs.
@@ -26,7 +26,7 @@ SETTLED_SHARE = 0.4
 
 
 @dataclass(frozen=True)
-class Pulled:
+class PulledCaravan:
     """A caravan that brakes alone: deceleration (m/s^2) of the train, load (N) of the caravan's axle, and force (N) by
     which the caravan pulls at the ball."""
 
@@ -41,7 +41,7 @@ def locked_stop(speed: float = 1.5) -> tuple[float, float]:
     return float(path.states[-1, 0, 0]), speed**2 / (2.0 * SLIPPERY * GRAVITY)
 
 
-def pulled_by_levers() -> Pulled:
+def pulled_by_levers() -> PulledCaravan:
     """A caravan that brakes alone by its levers: moments about the ball, and momentum of the train.
 
     With N under its axle l behind the ball, its mass m2 c behind and d above that, the ball h above the road, and a
@@ -59,7 +59,7 @@ def pulled_by_levers() -> Pulled:
     arm = hitch[0] - axle + GRIP * (hitch[2] + above * behind[0] / whole)
     load = back * behind[0] * GRAVITY / arm
     slowing = GRIP * load / whole
-    return Pulled(slowing, load, (car[0] + rolling) * slowing)
+    return PulledCaravan(slowing, load, (car[0] + rolling) * slowing)
 
 
 def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
@@ -70,7 +70,7 @@ def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
     return float(masses.sum()), float(x), float(z)
 
 
-def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> Pulled:
+def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
     """A run in MuJoCo of a caravan that brakes alone, all its wheels locked; change : plants a fault in the table."""
     vehicle = towing() if change is None else towing.__wrapped__()
     if change is not None:
@@ -80,7 +80,7 @@ def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4
     times, speeds = path.times[late], path.states[late, 1, 0]
     slowing = float(speeds[0] - speeds[-1]) / float(times[-1] - times[0])
     load = float(path.reports.load[late, 4:].sum(axis=1).mean())
-    return Pulled(slowing, load, _pull(vehicle, path, late, slowing))
+    return PulledCaravan(slowing, load, _pull(vehicle, path, late, slowing))
 
 
 def _pull(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
@@ -96,13 +96,13 @@ def hold_on_to_the_car(car: Handling) -> None:
 
 
 @cache
-def errors() -> Pulled:
+def errors() -> PulledCaravan:
     """A caravan that brakes alone, over its levers, less 1."""
     return relative_difference(pulled(), pulled_by_levers())
 
 
-def relative_difference(run: Pulled, wanted: Pulled) -> Pulled:
+def relative_difference(run: PulledCaravan, expected: PulledCaravan) -> PulledCaravan:
     """Each of a run over what is wanted, less 1."""
-    return Pulled(
-        run.deceleration / wanted.deceleration - 1.0, run.load / wanted.load - 1.0, run.pull / wanted.pull - 1.0
+    return PulledCaravan(
+        run.deceleration / expected.deceleration - 1.0, run.load / expected.load - 1.0, run.pull / expected.pull - 1.0
     )

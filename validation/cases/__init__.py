@@ -1,4 +1,4 @@
-"""Cases: one file each, with what is compared, what is expected, the tolerance and its reason.
+"""Validation cases, a module each: the compared values, the expected ones, the tolerance and its reason.
 
 A case module holds
 

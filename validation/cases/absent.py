@@ -184,6 +184,6 @@ def _text(table: dict[str, dict[str, int]]) -> str:
     return "; ".join(parts) or "nothing"
 
 
-def changes(more: dict[str, int]) -> str:
+def changes(added_counts: dict[str, int]) -> str:
     """Counts that an effect changes, in words."""
-    return ", ".join(f"{value:+d} {key}" for key, value in sorted(more.items()))
+    return ", ".join(f"{value:+d} {key}" for key, value in sorted(added_counts.items()))

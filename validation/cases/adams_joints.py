@@ -146,7 +146,8 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
 
 
 def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
-    """Rows of the joint in MJCF, as ``twinrig twin`` certifies it, and of its paths beside those of constraints."""
+    """Rows that compare the joint in MJCF with its certificate by ``twinrig twin``, and its paths with those of
+    constraint equations."""
     step, every = STEP / JOINT_STEPS, JOINT_STEPS * STEPS_PER_ROW
     accelerations, paths = examined(mechanism, folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)

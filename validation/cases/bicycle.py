@@ -108,7 +108,7 @@ def _gaps(bicycle: Whipple, engine: str) -> np.ndarray:
 
 
 def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
-    """Order of convergence in each engine, the limit extrapolated, and both engines beside one another."""
+    """Rows: order of convergence in each engine, the extrapolated limit, and the difference of the engines."""
     rows = []
     for engine, gap in gaps.items():
         order = np.log(gap[-2] / gap[-1]) / np.log(STIFFNESS[-1] / STIFFNESS[-2])
@@ -179,18 +179,18 @@ def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
     return [*rows, *_choice_rows(chosen(bicycle, FEEDBACK, seen))], table
 
 
-def _unfitted_rows(bicycle: Whipple, seen: Observation) -> list[Row]:
-    model, mean, deviation = predicted(bicycle, FEEDBACK, seen), seen.mean, seen.deviation
-    at = f"{seen.speed:g} m/s, {len(seen.weave)} windows"
+def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
+    model, mean, deviation = predicted(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
+    at = f"{observation.speed:g} m/s, {len(observation.weave)} windows"
     damping = Observed(
-        f"bicycle.measured.damping.{seen.speed:g}",
+        f"bicycle.measured.damping.{observation.speed:g}",
         SYSTEM,
         f"weave damping at {at}, nothing fitted: deviation by the measured {-mean[0]:.2f} +- {deviation[0]:.2f} 1/s",
         float(model[0] / mean[0] - 1.0),
         "",
     )
     frequency = Observed(
-        f"bicycle.measured.frequency.{seen.speed:g}",
+        f"bicycle.measured.frequency.{observation.speed:g}",
         SYSTEM,
         f"weave frequency at {at}, nothing fitted: deviation by the measured {mean[1]:.2f} +- {deviation[1]:.2f} rad/s",
         float(model[1] / mean[1] - 1.0),
@@ -199,23 +199,24 @@ def _unfitted_rows(bicycle: Whipple, seen: Observation) -> list[Row]:
     why = "parameters and feedback as published, no number fitted"
     judged = (
         damping.at_most(0.1, why, "measured")
-        if seen.speed >= LOWEST_JUDGED_SPEED
+        if observation.speed >= LOWEST_JUDGED_SPEED
         else damping.beside(0.0, why, "measured")
     )
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 
-def _predicted_rows(bicycle: Whipple, choice: Choice, seen: Observation) -> list[Row]:
-    gaps = deviations(bicycle, FEEDBACK, choice, seen)
+def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) -> list[Row]:
+    gaps = deviations(bicycle, FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
         "that were settled with all of these speeds in sight"
     )
     return [
         Observed(
-            f"bicycle.chosen.{name}.{seen.speed:g}",
+            f"bicycle.chosen.{name}.{observation.speed:g}",
             SYSTEM,
-            f"weave {name} at {seen.speed:g} m/s by suspects chosen on the other speeds: standard deviations off",
+            f"weave {name} at {observation.speed:g} m/s by suspects chosen on the other speeds: "
+            "standard deviations off",
             float(gap),
             "",
         ).at_most(2.0, why, "measured")
@@ -243,11 +244,11 @@ def _choice_rows(choice: Choice) -> list[Row]:
     ]
 
 
-def _line(bicycle: Whipple, choice: Choice | None, seen: Observation) -> list[str]:
-    model, mean, deviation = predicted(bicycle, FEEDBACK, seen), seen.mean, seen.deviation
-    gaps = np.empty(0) if choice is None else deviations(bicycle, FEEDBACK, choice, seen)
+def _line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
+    model, mean, deviation = predicted(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
+    gaps = np.empty(0) if choice is None else deviations(bicycle, FEEDBACK, choice, observation)
     return [
-        f"{seen.speed:g} m/s",
+        f"{observation.speed:g} m/s",
         f"{-mean[0]:.2f} +- {deviation[0]:.2f}",
         f"{-model[0]:.2f}",
         f"{mean[1]:.2f} +- {deviation[1]:.2f}",

@@ -184,18 +184,18 @@ def _cycle_rows(name: str) -> list[Row]:
     ]
 
 
-def truck_stop(on: str, name: str, speed: float) -> Recorded:
+def truck_stop(surface_name: str, name: str, speed: float) -> Recorded:
     """The paper's truck on one surface under a controller with its defaults."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
-    return on_tyres(truck(PAPER), [surface(on)], PAPER_BRAKES, chambers).run(CONTROLLERS[name](4), speed)
+    return on_tyres(truck(PAPER), [surface(surface_name)], PAPER_BRAKES, chambers).run(CONTROLLERS[name](4), speed)
 
 
-def stop(on: str, name: str, speed: float) -> dict[str, float]:
+def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
     """Figures of one stop: distance (m), time (s), utilisation above 15 km/h, longest lock there (ms)."""
-    path = truck_stop(on, name, speed)
+    path = truck_stop(surface_name, name, speed)
     speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE))
-    used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(on).mu_x.max()
+    used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(surface_name).mu_x.max()
     return {
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),

@@ -13,13 +13,13 @@ from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_vehicle import PAPER
 from models.brake.pressure import Chambers
 from models.brake.trailer import CHOSEN, follow, hooked
-from models.engines.braking import Carried
+from models.engines.braking import CarriedChassis
 from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braked_truck import (
     ICE,
     PLANE,
-    Moving,
+    RollingTruck,
     on_road,
     sideways_with_locked_front_wheels,
     transfer_errors,
@@ -41,7 +41,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     until = 10.0 if quick else LAST_SPEED
     compiled = turn(until)
     beside = {"written out": braked_turn(PAPER, ICE, STEER, TORQUES, SPEED, until)}
-    beside |= {name: turn(until, go=Carried(name, PLANE).advance) for name in ("exudyn", "mujoco")}
+    beside |= {name: turn(until, step_function=CarriedChassis(name, PLANE).advance) for name in ("exudyn", "mujoco")}
     rows = [
         Observed(
             f"braking_engines.{name.replace(' ', '_')}",
@@ -71,9 +71,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def turn(until: float, steer: float = STEER, go: Callable[..., Any] = advance) -> Turned:
+def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> Turned:
     """The truck from SPEED to another (m/s) on ice; the last step is shared in proportion."""
-    truck = Moving(on_road(PLANE, stacked([ICE]), slope=ICE.cornering), SPEED, steer=steer, go=go)
+    truck = RollingTruck(
+        on_road(PLANE, stacked([ICE]), slope=ICE.cornering), SPEED, steer=steer, step_function=step_function
+    )
     while True:
         passed, place, fast = truck.time, truck.state[0].copy(), truck.speed
         status, used = truck.on(np.repeat(TORQUES, 2), STEP)

@@ -55,11 +55,11 @@ def ending_text(number: int) -> str:
     return "" if path.stands else "does not stand"
 
 
-def _stops_row(ends: list[str]) -> Row:
-    limits = [end for end in ends if any(limit in end for limit in LIMITS)]
-    wrong = [f"{i}: {end}" for i, end in enumerate(ends) if end and end not in limits]
+def _stops_row(endings: list[str]) -> Row:
+    limits = [end for end in endings if any(limit in end for limit in LIMITS)]
+    wrong = [f"{i}: {end}" for i, end in enumerate(endings) if end and end not in limits]
     what = (
-        f"stops that do not finish, of {len(ends)} random legal ones, {len(limits)} of which end by a limit of the "
+        f"stops that do not finish, of {len(endings)} random legal ones, {len(limits)} of which end by a limit of the "
         f"vehicle: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "").within(
@@ -103,7 +103,7 @@ def _jackknife_row() -> Row:
     return Observed(
         "braking_limits.jackknife",
         SYSTEM,
-        f"largest hinge angle that is kept of a train that folds, limit 1 rad: {told}",
+        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {told}",
         angle if told else math.nan,
         "rad",
     ).within(1.0, 0.02, "a sample before the limit", "closed form")

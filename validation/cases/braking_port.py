@@ -19,7 +19,7 @@ import models.brake.port as port
 from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
-from models.brake.port.setup import PortTable, Run, opened
+from models.brake.port.setup import ControllerRun, PortTable, opened
 from models.machine.timing import median
 from models.systems.braking.march import BrakingPath as Driven
 from models.systems.braking.run import run
@@ -170,15 +170,15 @@ def _pressures_move(path: Driven) -> Row:
     )
 
 
-def _compare_bits(path: Driven, other: Driven) -> str:
+def _compare_bits(path: Driven, other_run: Driven) -> str:
     names = ("times", "states", "turning", "pressures", "torques", "reports")
-    apart = [name for name in names if not np.array_equal(getattr(path, name), getattr(other, name))]
+    apart = [name for name in names if not np.array_equal(getattr(path, name), getattr(other_run, name))]
     return f"other {', '.join(apart)}" if apart else "same bits"
 
 
 def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> dict[str, list[float]]:
     """Microseconds of one exchange by way: median of the rounds with its 95 % interval."""
-    facts, seconds = Run(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
+    facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
             name: PortTable(timeout=PATIENT, start=PATIENT, **table)

@@ -66,7 +66,7 @@ def _short_row(engine: str) -> Row:
     return Observed(
         "braking_relaxation.short",
         SYSTEM,
-        "ratio of how far a relaxation length of 0.2 m moves the end of a braked turn to how far 0.1 m moves it",
+        "ratio of the shift of a braked turn's end by a relaxation length of 0.2 m to the shift by 0.1 m",
         short_ratio(engine),
         "",
     ).within(2.0, 0.05, "to first order in the length, whose limit is a tyre that answers at once", "closed form")

@@ -136,15 +136,15 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spin: float) -> Row:
+def _further_row(name: str, surface: str, slip: float, speed: float, mass: float, spin: float) -> Row:
     quarter = Quarter(mass=mass * FRONT.mass, radius=FRONT.radius, spin_inertia=spin * FRONT.spin_inertia)
-    tyre, _ = both = friction_table(on)
+    tyre, _ = both = friction_table(surface)
     torque = steady_torque(quarter, tyre, slip)[1]
     error = stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
     return Observed(
         f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
-        f"relative error of the stopping distance, {name} ({on}, {100 * slip:g} % slip, {speed:g} "
+        f"relative error of the stopping distance, {name} ({surface}, {100 * slip:g} % slip, {speed:g} "
         "m/s), steps of 5.5 ms",
         error,
         "",

@@ -99,18 +99,14 @@ def _alone_rows() -> list[Row]:
     }
     return [
         Observed(
-            f"braking_trailer.alone.{key}",
-            SYSTEM,
-            f"{what}, over the closed form's, less 1",
-            abs(float(getattr(errors, key))),
-            "",
+            f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(getattr(errors, key))), ""
         ).at_most(STATICS, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form")
         for key, what in told.items()
     ]
 
 
 def _control_rows() -> list[Row]:
-    """The slip controller of all six wheels on ice, beside wheels that lock."""
+    """Rows: slip control of all six wheels on ice, compared with locked wheels."""
     ice, speed = surface("ice"), 11.11
     vehicle = braked(whole.towing(), ice, substeps=4, gradient=150.0)
     controlled, locked = (

@@ -14,7 +14,7 @@ from models.systems.ride.reduced_scene import Effect, without
 from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
 from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.ride.drawn_rides import Drawn, drawn
+from validation.ride.drawn_rides import DrawnRide, drawn
 
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
 """The published half car."""
@@ -35,13 +35,14 @@ JUDGED_CHANGES = (1e-4, 0.05)
 
 @dataclass(frozen=True)
 class Judged:
-    """A scene with its choice; worst error of the identity; changes by frequency (quantities,) or None.
+    """A scene with its choice of effects, the largest error of the identity of covariance and adjoint, and the changes
+    (quantities,) by frequency responses, or None.
 
     nearby : worst change at random speeds and with random parameters, by the tolerance; measured : saving by the
     covariance of what runs sample.
     """
 
-    scene: Drawn
+    scene: DrawnRide
     choice: RideChoice
     identity: float
     by_frequency: np.ndarray | None
@@ -60,7 +61,7 @@ class Judged:
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
-def judged(scene: Drawn, second: bool) -> Judged:
+def judged(scene: DrawnRide, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
     chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
@@ -130,7 +131,8 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
 
 
 def _prediction_row(choices: list[Judged]) -> Row:
-    """Predicted divided by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
+    """Row: predicted / confirmed change, over all choices and quantities whose change differs from zero and is below 5
+    %."""
     predicted, confirmed_ = (
         np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
     )
@@ -341,7 +343,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Predicted against confirmed changes, and savings over tolerance."""
+    """Draw predicted over confirmed changes of the choice, and the computing time saved over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

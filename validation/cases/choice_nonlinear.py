@@ -12,7 +12,7 @@ from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
-from validation.ride.drawn_rides import COPIES, Bent, drawn_bent
+from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -44,7 +44,7 @@ def judged(system: str, seed: int) -> JudgedByRuns:
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judged_ride(asked: Bent) -> JudgedByRuns:
+def judged_ride(asked: BentRide) -> JudgedByRuns:
     """Choose, and run the vehicle and what is left on roads that the choice has not seen."""
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
@@ -56,10 +56,12 @@ def judged_ride(asked: Bent) -> JudgedByRuns:
     return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 
-def _least_certain_change(full: np.ndarray, reduced: np.ndarray) -> float:
+def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) -> float:
     """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
-    picked = np.random.default_rng(FRESH_SEED).integers(len(full), size=(RESAMPLED, len(full)))
-    changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full[picked].mean(axis=1)) - 1.0)
+    picked = np.random.default_rng(FRESH_SEED).integers(
+        len(full_mean_squares), size=(RESAMPLED, len(full_mean_squares))
+    )
+    changes = np.abs(np.sqrt(reduced[picked].mean(axis=1) / full_mean_squares[picked].mean(axis=1)) - 1.0)
     return float(np.quantile(changes, UNSURE))
 
 
@@ -112,7 +114,8 @@ def _refused() -> Row:
 
 
 def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
-    """Predicted and confirmed changes (n, 2) of all quantities whose change is told from zero and below 5 %."""
+    """Predicted and confirmed changes (n, 2) of all quantities whose change differs significantly from zero and is
+    below 5 %."""
     pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.contact.linear_theory import RATIOS, coefficients
-from models.contact.material import Material, Pair
+from models.contact.material import Material, MaterialPair
 from models.contact.normal_problem import centres
 from models.contact.rolling_operator import FreeSystem, SlipOperator
 from models.contact.rolling_problem import rigid_slip
@@ -65,7 +65,7 @@ def _on_grid(ratio: float, nu: float, cells: int) -> Array:
     x, y = centres(columns, dx), centres(rows, dy)
     inside = (x / a) ** 2 + (y[:, None] / b) ** 2 < 1.0
     body = Material(E=2e11, nu=nu)
-    operator = SlipOperator(columns, rows, dx, dy, Pair(body, body))
+    operator = SlipOperator(columns, rows, dx, dy, MaterialPair(body, body))
     system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
     sums = []
     for motion in np.eye(3):
@@ -146,13 +146,13 @@ def _misprint(nodes: Array) -> Row:
     )
 
 
-def _between_rows(between: Array, nodes: Array) -> list[Row]:
+def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
     """Error of interpolation alone: the deviation there, less the mean of that at the nodes on both sides."""
     at_nodes = deviation(nodes).reshape(len(RATIOS), len(NUS), 4)
     count = len(RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
     along_nu = [(at_nodes[i, k] + at_nodes[i, k + 1]) / 2.0 for i in (0, 9, 18) for k in (0, 1)]
-    off = np.abs(deviation(between) - np.concatenate((along_ratio, along_nu)))
+    off = np.abs(deviation(interpolated) - np.concatenate((along_ratio, along_nu)))
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
     return [

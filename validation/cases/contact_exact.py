@@ -8,7 +8,7 @@ import numpy as np
 
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
-from models.contact.material import Material, Pair
+from models.contact.material import Material, MaterialPair
 from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
@@ -18,7 +18,7 @@ from validation.common.scenes import data_folder
 
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
-PAIR, MU, LOAD, SIZE = Pair(), 0.3, 8e4, 5e-3
+PAIR, MU, LOAD, SIZE = MaterialPair(), 0.3, 8e4, 5e-3
 """Materials, friction, N, and sqrt(ab) in m."""
 LIMIT = MU * LOAD
 SAMPLE = "contact_sample.csv"
@@ -145,7 +145,7 @@ def _strip_rows(cells: int) -> list[Row]:
 def shift(share: float, nu: float, cells: int) -> RollingSolution:
     """A ball shifted so far that, by Cattaneo and Mindlin, the force is ``share`` of mu N."""
     body = Material(E=2.1e11, nu=nu)
-    pair = Pair(body, body)
+    pair = MaterialPair(body, body)
     way = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
     return solve_shift(hertzian(SIZE, SIZE, LOAD, cells), MU, way, 0.0, pair)
 
@@ -251,7 +251,9 @@ def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
     ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
     body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
     x, y, spin = (float(part) for part in rng.normal(size=3))
-    case = ContactCase(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, Pair(body, body), "drawn", (x, y, spin), level)
+    case = ContactCase(
+        SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, MaterialPair(body, body), "drawn", (x, y, spin), level
+    )
     return case, int(rng.integers(60, 121))
 
 
@@ -308,7 +310,7 @@ def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
         value["xi_x"],
         value["xi_y"],
         value["phi_rad_per_mm"] * 1e3,
-        Pair(body, body),
+        MaterialPair(body, body),
     )
     limit = value["mu"] * value["FN_N"]
     force = np.hypot(solved.fx - value["Fx_N"], solved.fy - value["Fy_N"]) / limit

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.hertz import Hertz, by_approach, by_load
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
 from validation.common.rows import Observed, Row, System, Table, behaves
 
@@ -19,7 +19,7 @@ BOUND = 1e-10
 LOAD = 1e5
 PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
-PAIR = Pair(STEEL, Material(E=7e10, nu=0.33))
+PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
 NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
 RANGE = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
@@ -118,7 +118,7 @@ def _exchange_axes(touching: Hertz) -> Hertz:
 
 def _published() -> list[Row]:
     """A contact that another program computed on a grid, and scaling."""
-    touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
+    touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, MaterialPair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
         Observed(
@@ -216,7 +216,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
-    touching = by_load(curvature, 1.0, LOAD, Pair())
+    touching = by_load(curvature, 1.0, LOAD, MaterialPair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")

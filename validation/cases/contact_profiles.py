@@ -7,9 +7,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.profile_files import read_profile
-from models.contact.profiles import Profile
+from models.contact.profiles import ContactProfile
 from models.contact.simplified_theory import press
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.wheel_on_rail import Track, wheel_on_rail
@@ -28,7 +28,7 @@ QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
 LOAD = 1e4
 """Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
 CELLS = 40
-PAIR = Pair()
+PAIR = MaterialPair()
 BENCHMARK = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
     "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
@@ -110,14 +110,14 @@ def _file_rows() -> list[Row]:
     ]
 
 
-def wheel_off(wheel: Profile) -> float:
+def wheel_off(wheel: ContactProfile) -> float:
     """Largest difference in height (m) where both are known."""
     rail_profile = s1002()
     inside = (wheel.y >= rail_profile.y[0]) & (wheel.y <= rail_profile.y[-1])
     return float(np.abs(rail_profile.curve(wheel.y[inside]) - wheel.z[inside]).max())
 
 
-def rail_off(rail: Profile) -> float:
+def rail_off(rail: ContactProfile) -> float:
     """Largest distance (m) of the file's points from the inclined rail, after the best shift: its origin is its own."""
     laid = uic60().turned(Track().inclination)
     tree = KDTree(np.column_stack([laid.y, laid.z]))
@@ -131,7 +131,7 @@ def rail_off(rail: Profile) -> float:
 
 
 def _main(case: dict[str, Any]) -> dict[str, float]:
-    """The place that carries most."""
+    """The contact patch with the largest normal force."""
     return max(case["places"], key=lambda place: place["load"])
 
 

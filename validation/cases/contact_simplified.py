@@ -146,9 +146,9 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
     return errors
 
 
-def _box_around(pressed: NormalContact) -> Box:
+def _box_around(normal_contact: NormalContact) -> Box:
     """The contact's box with a fifth more on every side."""
-    x0, x1, y0, y1 = np.array([part.box for part in pressed.patches]).T
+    x0, x1, y0, y1 = np.array([part.box for part in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
     wide, high = 0.2 * (high_x - low_x), 0.2 * (high_y - low_y)
     return low_x - wide, high_x + wide, low_y - high, high_y + high

@@ -173,5 +173,5 @@ def tables(data: Saved) -> list[Table]:
     return tables
 
 
-def _cell(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
+def _cell(value: float | None, format_name: str) -> str:
+    return "" if value is None else format(value, format_name)

@@ -81,7 +81,7 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
     ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(steps + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, rounds, every=(1, 1, SELDOM), clock=time.process_time)
+    seconds = interleave(jobs, rounds, round_interval=(1, 1, SELDOM), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,

@@ -92,7 +92,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
 
 
 def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
-    """Row: path 7 of the ensemble equals the run of a scene that names path 7."""
+    """Row: path 7 of the ensemble equals a single run of the scene with ``path = 7``."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
@@ -104,10 +104,10 @@ def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _same_row(id: str, title: str, first: Arrays, other: Arrays) -> Row:
+def _same_row(id: str, title: str, first: Arrays, other_paths: Arrays) -> Row:
     """Whether two ensembles are equal to the last bit."""
-    count = len(other["drift_off"])
-    equal = all(np.array_equal(first[name][:count], other[name], equal_nan=True) for name in first)
+    count = len(other_paths["drift_off"])
+    equal = all(np.array_equal(first[name][:count], other_paths[name], equal_nan=True) for name in first)
     return behaves(
         f"ensemble.{id}",
         SYSTEM,
@@ -252,7 +252,7 @@ def _scale_rows(large: Saved) -> list[Row]:
 
 
 def _engines(
-    scene: Scene, truth: np.ndarray, times: np.ndarray, whole: Arrays, count: int, pool: Executor | None
+    scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
     """The first paths in both engines: rows of agreement, and seconds per path and step of each way."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
@@ -271,7 +271,7 @@ def _engines(
             f"largest difference of {count} paths in {way} from the reference before drift-off, over the largest state"
         )
         rows.append(
-            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(whole, paths, times), "").at_most(
+            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(ensemble, paths, times), "").at_most(
                 1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native"
             )
         )

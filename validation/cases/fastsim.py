@@ -1,4 +1,4 @@
-"""FASTSIM: error of its cells, error of its model, what must always hold, derivatives, and the price of a call."""
+"""FASTSIM: discretisation error, model error, invariants, derivatives, and the cost of a call."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from models.contact.fastsim_grid import POWERS
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import theory_errors
 from validation.contact.contact_set import JUDGED, read_contacts, read_drawn
@@ -41,7 +41,7 @@ LEVELS = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)
 SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
-PAIR = Pair()
+PAIR = MaterialPair()
 UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
 """Of fx, fy (N) and mz (N m)."""
 Contacts = dict[str, Any]

@@ -106,10 +106,10 @@ def constrained_unchecked() -> dict[str, str]:
     return {name: ending(partial(setups.unchecked, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
-def _unexpected_endings(endings: dict[str, str], word: str) -> str:
+def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
     """The expected word if all runs ended so, else the ones that did not."""
-    other = [f"{name}: {ended}" for name, ended in endings.items() if ended != word]
-    return "; ".join(other) or word
+    other = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
+    return "; ".join(other) or expected
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
@@ -136,7 +136,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _outside_rows() -> list[Row]:
-    """Wrong integrators from outside the tree are told in every run; a right one passes."""
+    """Rows: the guards report wrong integrators of outside engines in every run, and pass a right one."""
     silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG_ENGINES)
     return [
@@ -163,7 +163,7 @@ def _disk_row(folder: Path) -> Row:
     return Observed(
         "guards.full_disk",
         SYSTEM,
-        f"moments, of {full_disk.MOMENTS}, at which a full disk leaves an incomplete file or goes unnoticed",
+        f"number of moments (of {full_disk.MOMENTS}) at which a full disk leaves an incomplete file or is not reported",
         full_disk.damage(folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")

@@ -1,4 +1,4 @@
-"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and what it costs."""
+"""R19-free on four brush tyres: both engines, the linear limit, friction, energy, standstill, and computing cost."""
 
 import time
 from collections.abc import Callable
@@ -92,14 +92,14 @@ def _tyre_rows() -> list[Row]:
         Observed(
             "handling.cornering",
             SYSTEM,
-            "cornering stiffness at small slip, by the ride vehicle's, less 1",
+            "cornering stiffness at small slip / that of the ride vehicle - 1",
             cornering_error(Handling(R19)),
             "",
         ).at_most(1e-3, "the bristles are those of the ride vehicle's tyres", "closed form"),
         Observed(
             "handling.locked",
             SYSTEM,
-            "force on a wheel that does not turn, beside mu N against its sliding, by mu N",
+            "deviation of the force on a locked wheel from mu N against its sliding velocity, relative to mu N",
             locked_error(),
             "",
         ).at_most(1e-9, "all bristles slide one way", "closed form"),
@@ -133,7 +133,7 @@ def _mirror_row(duration: float) -> Row:
     return Observed(
         "handling.mirror",
         SYSTEM,
-        "step steer to the left beside the mirror image of one to the right, with inclined wheels",
+        "difference of a step steer to the left from the mirror image of a step steer to the right, inclined wheels",
         mirror_gap(inclined, duration),
         "m, rad",
     ).at_most(1e-10, "a symmetric vehicle", "none")
@@ -155,7 +155,7 @@ def _turn_rows() -> list[Row]:
         Observed(
             "handling.turn",
             SYSTEM,
-            "yaw gain of a steady turn of small slip at 20 m/s, by the single-track vehicle's, less 1",
+            "yaw gain of a steady turn of small slip at 20 m/s / that of the single-track vehicle - 1",
             turn_error(),
             "",
         ).at_most(1e-3, "linear tyres, with trail and turning slip", "closed form"),
@@ -176,7 +176,7 @@ def _stop_rows() -> list[Row]:
         Observed(
             "handling.slide",
             SYSTEM,
-            "braking force of four locked wheels beside mu N, by mu N",
+            "braking force of four locked wheels: deviation from mu N, relative to mu N",
             float(np.abs(left / drive.grip()).max()),
             "",
         ).at_most(1e-9, "at every step of a stop", "closed form"),
@@ -240,7 +240,7 @@ def _energy_rows() -> list[Row]:
         Observed(
             "handling.ledger",
             SYSTEM,
-            "energy of the lane change that nothing accounts for, by all of it",
+            "error of the energy balance of the lane change, relative to its total energy",
             gaps["sliding", 1e-3] / whole,
             "",
         ).at_most(
@@ -327,7 +327,7 @@ def _threads_row() -> Row:
     return behaves(
         "handling.threads",
         SYSTEM,
-        "three lane changes marched by MuJoCo in two threads beside one, to the last bit",
+        "three lane changes computed by MuJoCo in two threads and in one: equal to the last bit",
         said,
         "identical",
         "the callback writes nothing but its own run's forces",

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
 from validation.hard_cases import cases_by_family
-from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, Outcome, judge
+from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, CaseOutcome, judge
 from validation.hard_cases.catalogue import COVERED, beyond
 
 TITLE = "Hard cases"
@@ -49,7 +49,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "hard.passed",
             SYSTEM,
-            "hard cases that every implementation answers right, refuses or says it failed",
+            "hard cases in which every implementation gives a right answer, refuses, or reports its failure",
             sum("SILENT" not in place for place in words),
             "cases",
         ).within(len(data), 0, f"every one; {share} were run", "none"),
@@ -64,13 +64,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def quick_cases(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
     """The quick share: the last case of each family, and every QUICK_SPACING-th before it."""
-    families = dict.fromkeys(family for family, _ in known)
-    return [pair for name in families for pair in [case for case in known if case[0] == name][::-QUICK_SPACING]]
+    families = dict.fromkeys(family for family, _ in cases)
+    return [pair for name in families for pair in [case for case in cases if case[0] == name][::-QUICK_SPACING]]
 
 
-def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
+def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     """The error where an answer is wanted and given, the behaviour otherwise."""
     id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
     quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"

@@ -89,25 +89,25 @@ def _measure(folder: Path) -> FreeRuns:
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, predicted_stiffness)
 
 
-def _error(setting: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
+def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str = "reference") -> float:
     """Largest pitch error (rad) of a run on a spring (N m/rad)."""
-    free = measured.runs[setting.disturbed]
-    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
+    free = free_runs.runs[setting.disturbed]
+    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - measured.pitch).max())
+    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - free_runs.pitch).max())
 
 
-def _rows_of_limits(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
+def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _error(setting, factor * measured.predicted_stiffness, measured, engine)
+        off = _error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
         key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
         rows.append(
             behaves(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {measured.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
+                f"spring of {factor} of the predicted {free_runs.predicted_stiffness:.1f} N m/rad, {setting}, {engine}",
                 "holds" if off <= HELD_PITCH else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD_PITCH} allowed",
@@ -117,14 +117,14 @@ def _rows_of_limits(setting: Setting, measured: FreeRuns, engine: str) -> list[R
     return rows
 
 
-def _smallest(setting: Setting, measured: FreeRuns) -> float:
+def _smallest(setting: Setting, free_runs: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
-    low, high = 0.5 * measured.predicted_stiffness, 1.3 * measured.predicted_stiffness
-    if _error(setting, high, measured) > HELD_PITCH:
+    low, high = 0.5 * free_runs.predicted_stiffness, 1.3 * free_runs.predicted_stiffness
+    if _error(setting, high, free_runs) > HELD_PITCH:
         return math.nan
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _error(setting, middle, measured) <= HELD_PITCH else (middle, high)
+        low, high = (low, middle) if _error(setting, middle, free_runs) <= HELD_PITCH else (middle, high)
     return high
 
 

@@ -96,7 +96,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _drive(folder: Path, duration: float) -> Files:
-    """Measure on the study road, write forces, pitch, and the pitch that a gyro's integrated rate gives."""
+    """Run a virtual measurement on the road of the study; write its forces, its pitch, and the pitch by integration of
+    a gyro's rate."""
     measured = drive(folder, duration, STEP, STEP)
     walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
@@ -223,7 +224,7 @@ def _index_two_refused() -> Row:
     return behaves(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
-        "Exudyn's generalised-alpha solver is asked to run with its flag for index 2",
+        "outcome of Exudyn's generalised-alpha solver with its flag for index 2",
         ended,
         "refused",
         "index 2 is there with the trapezoidal rule alone",

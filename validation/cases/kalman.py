@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
-    """Mean NEES and NIS per degree of freedom; the filters that are told a wrong noise get a quarter of the runs."""
+    """Mean NEES and NIS per degree of freedom; filters with a wrong noise level get a quarter of the runs."""
     by_filter: dict[str, list[Any]] = {name: [] for name in filters}
     for i in range(count):
         scales = {name: FILTERS[name] for name in filters if name == "right" or i < count // 4}
@@ -121,7 +121,7 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
     return behaves(
         f"kalman.{name}",
         SYSTEM,
-        f"{words} of a filter that is told 4 times the variance of the {noise}",
+        f"{words} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",

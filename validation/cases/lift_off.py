@@ -246,7 +246,8 @@ def _pulls(quick: bool) -> list[Row]:
 
 
 def _in_space(quick: bool) -> list[Row]:
-    """R19-ride where its tyres lift: accelerations beside the written ones, and both engines on a random road."""
+    """Rows of R19-ride with tyres that lift off: accelerations against hand-written equations, and both engines on a
+    random road."""
     ride = build_ride(
         {
             "title": TITLE,
@@ -269,7 +270,7 @@ def _in_space(quick: bool) -> list[Row]:
             error = float(np.abs(model.acceleration(0.0, q, v, road) - wanted).max() / np.abs(wanted).max())
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
-    first, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)
+    first, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES)
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
         *(

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.contact.profile_files import read_profile
 from models.contact.wheel_on_rail import Track, WheelAndRail, Wheelset, rail_in_track
-from models.rail.contact_table import Placed
+from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail.run import run
 from models.systems.wheel_rail.scene import Positions
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
@@ -69,14 +69,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, data
 
 
-def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
+def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
     """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
     return placed_run.detail.placed, placed_run.seconds / len(shifts)
 
 
-def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
+def _published_rows(wheel: str, placed: list[WheelsetPlacement], published: np.ndarray) -> list[Row]:
     published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
     off = np.abs(np.array([sums(position, wheel) for position in placed]) - published_sums)
     place, _, _ = off.max(axis=0).tolist()
@@ -111,7 +111,7 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
     return rows
 
 
-def _static_rows(placed: list[Placed]) -> list[Row]:
+def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
     """Touching places by search, and the mirror image."""
     contact, gaps = contact_of("A-1"), []
     for position in placed:
@@ -150,7 +150,7 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
     ]
 
 
-def _axle_row(placed: Placed) -> Row:
+def _axle_row(placed: WheelsetPlacement) -> Row:
     """The wheelset turns freely: in the middle of the track each wheel's reported forces have no moment about it."""
     moments = [
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
@@ -169,7 +169,7 @@ def _axle_row(placed: Placed) -> Row:
     )
 
 
-def _split_rows(placed: Placed) -> list[Row]:
+def _split_rows(placed: WheelsetPlacement) -> list[Row]:
     """Rows: shares of the load on two patches at 5 mm, in case A-2."""
     forces = [place.normal for place in placed.right]
     total = sum(forces)
@@ -200,7 +200,7 @@ def _split_rows(placed: Placed) -> list[Row]:
     ]
 
 
-def _load_row(static: list[Placed]) -> Row:
+def _load_row(static: list[WheelsetPlacement]) -> Row:
     off = max(
         abs(sum(place.vertical for place in wheel) / SCENE.wheelset.load - 1.0)
         for each in static
@@ -215,7 +215,7 @@ def _load_row(static: list[Placed]) -> Row:
     ).at_most(1e-5, "patches share the load to the precision of the shares", "none")
 
 
-def _file_rows(placed: list[Placed]) -> list[Row]:
+def _file_rows(placed: list[WheelsetPlacement]) -> list[Row]:
     """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
     names = {"places": ("mm", PLACE_BOUND, 0), "forces": ("%", FORCE_BOUND, 1)}
     words = "difference between built-in profiles and the benchmark's files, case A-2"
@@ -255,7 +255,7 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
     ]
 
 
-def _table_of_patches(placed: Placed) -> dict[str, Any]:
+def _table_of_patches(placed: WheelsetPlacement) -> dict[str, Any]:
     """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
     return {"shift": 1e3 * placed.shift} | {
         wheel: [

@@ -141,10 +141,12 @@ def _size(findings: Sequence[Finding], check: str, place: str = "") -> float:
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _sized(key: str, quantity: str, size: float, unit: str, wanted: float) -> Row:
+def _sized(key: str, quantity: str, size: float, unit: str, planted_size: float) -> Row:
     """Row of the size of what was planted."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, size, unit).within(wanted, SHARE * abs(wanted), why, "closed form")
+    return Observed(id, SYSTEM, quantity, size, unit).within(
+        planted_size, SHARE * abs(planted_size), why, "closed form"
+    )
 
 
 def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> Row:
@@ -170,7 +172,7 @@ def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
 
 
 def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
-    """No error and no doubt in clean recordings."""
+    """Row: the checks report no error and no doubt for recordings without a fault."""
     what = f"errors and doubts in {len(recordings)} clean recordings"
     return _row_of_no_findings(
         f"clean.{name}",

@@ -74,14 +74,14 @@ def _tyre_rows() -> list[Row]:
         Observed(
             "measured_drive.tyres",
             SYSTEM,
-            "squared distance of both axles' identified cornering stiffness from the truth, by its covariance",
+            "squared Mahalanobis distance of both axles' identified cornering stiffness from the truth",
             float(scaled @ np.linalg.solve(known.covariance, scaled)),
             "",
         ).at_most(OUTER, "chi-square: larger where standard errors are too small, or estimates off", "closed form"),
         Observed(
             "measured_drive.stiffness",
             SYSTEM,
-            "largest error of an identified cornering stiffness, as a share of it",
+            "largest relative error of an identified cornering stiffness",
             float(np.abs(off).max()),
             "",
         ).at_most(0.05, "six seconds of turns with noise determine it to a few per cent", "closed form"),

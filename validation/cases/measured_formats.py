@@ -19,7 +19,7 @@ from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
 from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 from validation.measured.measured_files import csv_forms, kinds
-from validation.measured.measured_files.odd import Odd, read
+from validation.measured.measured_files.odd import OddFile, read
 from validation.measured.measured_files.own_libraries import LIBRARIES
 
 TITLE = "Measurement files"
@@ -208,7 +208,7 @@ def forms(folder: Path) -> list[Row]:
     ]
 
 
-def _difference_or_error(odd: Odd, folder: Path) -> float | str | None:
+def _difference_or_error(odd: OddFile, folder: Path) -> float | str | None:
     """Difference to the truth, None where a file is refused and says why; the error where there is another one."""
     try:
         return odd.error(folder)
@@ -226,7 +226,8 @@ def wheel_force() -> np.ndarray:
 
 
 def resolution(folder: Path) -> list[Row]:
-    """Why RPC III is written with floating-point samples: damage of the road beside one pothole, in both."""
+    """Damage of the road without its pothole, with integer and with floating-point samples: why RPC III files are
+    written with the latter."""
     load = wheel_force()
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
@@ -238,7 +239,7 @@ def resolution(folder: Path) -> list[Row]:
         Observed(
             "measured_formats.rsp.damage",
             SYSTEM,
-            "relative change of the damage by RPC III as it is written, 32-bit floating point",
+            "relative change of the damage when the load is saved as RPC III in 32-bit floating point",
             errors[0],
             "relative",
         ).at_most(1e-5, why, "closed form"),

@@ -13,7 +13,7 @@ from models.fatigue.rainflow_cycles import cycles
 from models.measured.formats import open_source
 from models.measured.signal import HUB
 from models.systems.measured.hand_on import hand_on
-from models.systems.measured.section_run import Hold, run
+from models.systems.measured.section_run import AttitudeHold, run
 from models.systems.measured.sections import Sections, guided
 from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import cut
@@ -138,7 +138,7 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     """Samples that differ between a run in one piece and one in uneven blocks."""
     place = folder / f"blocks {seconds}"
     place.mkdir(exist_ok=True)
-    job = run_of(place, seconds, REPEATED, engine, Hold(method))  # type: ignore[arg-type]
+    job = run_of(place, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {method} {block}"
@@ -206,7 +206,7 @@ def _memory(folder: Path) -> list[Row]:
 
 
 def _handed_on(folder: Path) -> list[Row]:
-    """Section forces in every format, read back; and check channels beside the run."""
+    """Rows: section forces written in every format and read back; check channels compared with the run."""
     place = folder / "handed on"
     place.mkdir()
     job = run_of(place, 2.0, REPEATED)

@@ -18,7 +18,7 @@ from models.measured.formats import write
 from models.measured.recording import Recording
 from models.systems.hub_forces.measurement import HubForces, model
 from models.systems.measured.run import read_files as read_files
-from models.systems.measured.section_run import Hold, Outcome, SectionRun
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
 from models.systems.measured.trust import Level, drift
@@ -53,13 +53,13 @@ class Proof:
     vehicle: str
     frame: str
     bits: int
-    hold: Hold
+    hold: AttitudeHold
     formats: tuple[str, ...]
 
 
 PROOFS = (
-    Proof("r19_free", "r19_free", "hub", 16, Hold(), FORMATS),
-    Proof("own", "own.toml", "inertial", 12, Hold(bandwidth=1.0), ("mf4",)),
+    Proof("r19_free", "r19_free", "hub", 16, AttitudeHold(), FORMATS),
+    Proof("own", "own.toml", "inertial", 12, AttitudeHold(bandwidth=1.0), ("mf4",)),
 )
 
 
@@ -104,22 +104,24 @@ def faults(bits: int) -> Faults:
     return read(Faults, table, "")
 
 
-def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, form: str, folder: Path) -> Recording:
+def recorded(
+    virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, folder: Path
+) -> Recording:
     """Samples written by two recorders, hubs and inertial unit, in a format, and read back as a scene says."""
     folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
     for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -RECORDER_DELAY)):
         signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
-        write(folder / f"{name}.{form}", [group(signals, samples[:, chosen], virtual.period)])
-        text.append(map_lines(signals, f"{name}.{form}", offset))
+        write(folder / f"{name}.{format_name}", [group(signals, samples[:, chosen], virtual.period)])
+        text.append(map_lines(signals, f"{name}.{format_name}", offset))
     (folder / "scene.toml").write_text("\n".join(text))
     if (taken := folder.parent / vehicle).is_file():
         (folder / vehicle).write_bytes(taken.read_bytes())
     return read_files(load(folder / "scene.toml"), folder)
 
 
-def held_run(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
+def held_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
     """Set up the run of a recording, with the vehicle held as ``hold`` says; the run is not yet marched."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
@@ -172,23 +174,23 @@ def _largest_channel_change(recording: Recording, true: VirtualMeasurement, samp
     return largest_change
 
 
-def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[Row]:
+def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -> list[Row]:
     worst = max(means, key=lambda name: abs(means[name] - 1))
-    what = f"{proof.name}, frame {proof.frame!r}, {proof.bits} bit, through {form}"
+    what = f"{proof.name}, frame {proof.frame!r}, {proof.bits} bit, through {format_name}"
     return [
         Observed(
-            f"measured_virtual.values_{proof.name}_{form}",
+            f"measured_virtual.values_{proof.name}_{format_name}",
             SYSTEM,
-            f"change of hub channels by file, map and clock, over their largest value; {what}",
+            f"change of hub channels by writing, reading and mapping, relative to their largest value; {what}",
             off,
             "1",
         ).at_most(
-            2**-23 if form == "rsp" else 1e-12,
+            2**-23 if format_name == "rsp" else 1e-12,
             "RPC III holds single precision, the others every bit; units cost a rounding",
             "native",
         ),
         Observed(
-            f"measured_virtual.damage_{proof.name}_{form}",
+            f"measured_virtual.damage_{proof.name}_{format_name}",
             SYSTEM,
             f"ratio of the damage (slope 5) of {worst} to the true damage, the farthest of "
             f"{len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
@@ -200,7 +202,7 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
 
 def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: the recording run free and held by both engines; the verdicts."""
-    free = held_run(first, true.vehicle, Hold("none"))
+    free = held_run(first, true.vehicle, AttitudeHold("none"))
     jobs = {engine: held_run(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
     beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
@@ -231,7 +233,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
     try:
         run = march(free, folder / "free")
     except RunFailed as error:
-        assert isinstance(error.partial, Outcome)
+        assert isinstance(error.partial, SectionOutcome)
         run = error.partial
     said = judge(free, run, trusted=until)
     rows.append(

@@ -89,7 +89,7 @@ def _rows_without_integration(name: str) -> list[Row]:
 
 
 def _plain() -> Row:
-    """The trap, shown by writing eq. (18) down as it stands."""
+    """Pitch acceleration by eq. (18) exactly as printed, which shows its error."""
     floor = np.array(list(ARRAYS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
@@ -243,10 +243,15 @@ def _engine(engine: str, duration: float) -> list[Row]:
 
 
 def _recovered_errors(
-    rule: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
+    rule: str,
+    engine: str,
+    array: SensorArray,
+    specific_forces: np.ndarray,
+    states: np.ndarray,
+    rates: np.ndarray | None,
 ) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
-    followed = motion(array, felt, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
+    followed = motion(array, specific_forces, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
     errors = (
         ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
         ("heave", followed.position[:, 2] - states[:, 2], "m", 1e-5),

@@ -62,7 +62,7 @@ def _lane_change(handling: Handling, duration: float) -> list[Row]:
             Observed(
                 f"own_car.plain_{engine}",
                 SYSTEM,
-                f"largest difference of accelerations in {engine} from the plain equations, at the end of it",
+                f"largest difference of accelerations between {engine} and the plain equations, at the end of the run",
                 float(apart),
                 "of the largest",
             ).at_most(ALLOWED_DIFFERENCE, "rounding", "native")

@@ -97,9 +97,9 @@ def _beside(quick: bool) -> CaseAnswer:
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, make: Make) -> CaseAnswer:
+def _priced(quick: bool, make_problem: Make) -> CaseAnswer:
     """The rows and the saved data of a problem."""
-    problem = make(quick)
+    problem = make_problem(quick)
     measured = runner.measure(problem, quick, ROUNDS[quick], SHORTEST_TURN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
@@ -114,9 +114,9 @@ def _in_processes() -> tuple[list[CaseAnswer], CaseAnswer]:
         return [road.result(), *priced], beside.result()
 
 
-def _road_rows(saved: Saved) -> list[Row]:
+def _road_rows(saved_rows: Saved) -> list[Row]:
     """Rows: curves that must coincide on the road, and methods that Exudyn names without having them."""
-    road = runner.of_saved(saved)
+    road = runner.of_saved(saved_rows)
     groups = [" = ".join(sorted(group)) for group in road.same()]
     rows = [
         behaves(
@@ -134,7 +134,7 @@ def _road_rows(saved: Saved) -> list[Row]:
         behaves(
             "price.road.status.DVERK6",
             SYSTEM,
-            "what the solver DVERK6 does in Exudyn",
+            "behaviour of the solver DVERK6 in Exudyn",
             p.status,
             "refused",
             "Exudyn names the method but has not implemented it",
@@ -224,9 +224,9 @@ def draw(data: Saved) -> Drawn:
     return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(data["ride"])]
 
 
-def _caption(measured: runner.Measured) -> str:
+def _caption(measured_points: runner.MeasuredPoints) -> str:
     return (
-        f"{measured.title}: error over work and over seconds. Reference: {measured.reference}. "
+        f"{measured_points.title}: error over work and over seconds. Reference: {measured_points.reference}. "
         "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
-        f"{measured.note}"
+        f"{measured_points.note}"
     )

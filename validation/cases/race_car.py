@@ -11,7 +11,7 @@ from models.identification.bands import bands, error_model
 from models.identification.fit import fit
 from models.identification.held_out import Identified, Search, identified
 from models.identification.of_scene import problem_of
-from models.identification.problem import Clock, Problem
+from models.identification.problem import FitClock, Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
 from models.measured.drive import read_drive
 from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
@@ -112,10 +112,10 @@ def _known_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _coverage(solved: list[Uncertainty]) -> float:
+def _coverage(fits: list[Uncertainty]) -> float:
     """Bands of each fit around the measurement of the next noise: the least share of a channel inside, over all."""
     shares = []
-    for known, other in zip(solved, [*solved[1:], solved[0]], strict=True):
+    for known, other in zip(fits, [*fits[1:], fits[0]], strict=True):
         problem = known.fit.problem
         predicted = problem.predicted(known.fit.values)
         pairs = zip(predicted, problem.channels, strict=True)
@@ -136,8 +136,8 @@ def _race(file: Path, folder: Path) -> Identified:
     return identified(scenes[0], scenes[1], Search(PARAMETERS, list(AIMS), 5.0))
 
 
-def _race_rows(chosen: Identified) -> list[Row]:
-    answer, rows = chosen.bands, []
+def _race_rows(identified: Identified) -> list[Row]:
+    answer, rows = identified.bands, []
     figures = zip(AIMS.items(), answer.relative(), answer.inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"
@@ -146,7 +146,7 @@ def _race_rows(chosen: Identified) -> list[Row]:
                 aim, "asked for; predicted from measured steer angle and speed alone", independence="measured"
             ),
             Observed(
-                f"{id}.inside", SYSTEM, f"{name}: share of what was measured inside 95 % bands", inside, ""
+                f"{id}.inside", SYSTEM, f"{name}: share of the measured samples inside 95 % bands", inside, ""
             ).within(0.945, 0.045, "90 to 99 %, as asked for", "measured"),
             Observed(
                 f"{id}.width", SYSTEM, f"{name}: mean half-width of the bands by the rms error", width, ""
@@ -165,7 +165,7 @@ def _sensors_row(path: Path) -> Row:
     times, speed, turning, sensed, slip = (
         row[: round(SHARE * len(times))] for row in (times, speed, turning, sensed, slip)
     )
-    clock = Clock(times, 5.0)
+    clock = FitClock(times, 5.0)
     moved = clock.filtered(np.gradient(speed * np.tan(slip), clock.period) + speed * turning)
     felt = clock.filtered(sensed)
     slope, offset = np.polyfit(moved, felt, 1)
@@ -182,10 +182,10 @@ def _not_run(reason: str) -> list[Row]:
     return [not_run(f"race_car.{name.replace(' ', '_')}.error", SYSTEM, f"{name} predicted", reason) for name in AIMS]
 
 
-def _saved(chosen: Identified) -> dict[str, Any]:
-    known = chosen.known
+def _saved(identified: Identified) -> dict[str, Any]:
+    known = identified.known
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
         "standard errors": [None if np.isnan(each) else float(each) for each in known.deviations],
-        "errors": dict(zip(AIMS, chosen.bands.relative().tolist(), strict=True)),
+        "errors": dict(zip(AIMS, identified.bands.relative().tolist(), strict=True)),
     }

@@ -97,7 +97,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
         Observed(
             "recommendation.refused",
             SYSTEM,
-            f"scenes that were refused with a reason and drawn anew, beside {scenes}",
+            f"scenes that were refused with a reason and drawn again, in addition to {scenes}",
             len(refused),
             "scenes",
         ).at_most(

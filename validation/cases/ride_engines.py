@@ -11,7 +11,7 @@ from models.core.noise import normal
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
-from models.vehicles.linear_vehicle import LinearVehicle, Rows, poles, shift
+from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, poles, shift
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -72,7 +72,7 @@ def difference(computed: LinearVehicle, expected: LinearVehicle) -> float:
     """Largest error of M, D, K, the road's columns and the outputs, each relative to its own largest entry."""
     matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
     sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed, expected, matrices)]
-    sides += [(a, b, Rows._fields) for a, b in zip(computed.outputs, expected.outputs, strict=True)]
+    sides += [(a, b, OutputRows._fields) for a, b in zip(computed.outputs, expected.outputs, strict=True)]
     return max(relative(getattr(a, name), getattr(b, name)) for a, b, names in sides for name in names)
 
 
@@ -144,7 +144,7 @@ def _settings(engine: str, duration: float = 1.0) -> Settings:
 
 
 def _path() -> tuple[list[Row], list[list[str]]]:
-    """Paths from a random start over 1 s on a random road, with curves and without."""
+    """Rows: paths of both engines from a random start over 1 s on a random road, with nonlinear springs and without."""
     rows, price = [], []
     for what in ("linear", "curved"):
         vehicle = of_name("r19_ride", GRAVITY)

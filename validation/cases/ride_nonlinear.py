@@ -91,7 +91,7 @@ def _gains() -> list[Row]:
 
 
 def expected(law: Any, cuts: Any) -> float:
-    """Mean of law(x) over the standard normal x, cut where the law has corners."""
+    """Expected value of law(x) for a standard normal x, integrated piece by piece between the law's corners."""
     edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
     integrals = [
         quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]

@@ -12,9 +12,9 @@ from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import both_sides, output_densities, variances
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
-from models.road.isotropic import IsotropicRoad, Part, cross_spectrum_of, isotropic_like, spectral_matrix
+from models.road.isotropic import DensityPart, IsotropicRoad, cross_spectrum_of, isotropic_like, spectral_matrix
 from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, input_covariance, road_of_level
-from models.vehicles.linear_vehicle import LinearVehicle, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table
@@ -24,12 +24,12 @@ from validation.ride.rides import STANDARD, off
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
 WHEELS = (
-    Wheel("front left", 1.2, 0.7, 0),
-    Wheel("front right", 1.2, -0.6, 0),
-    Wheel("middle left", -1.4, 0.65, 1),
-    Wheel("middle right", -1.4, -0.75, 1),
-    Wheel("rear left", -2.7, 0.9, 2),
-    Wheel("rear right", -2.7, -0.9, 2),
+    WheelPosition("front left", 1.2, 0.7, 0),
+    WheelPosition("front right", 1.2, -0.6, 0),
+    WheelPosition("middle left", -1.4, 0.65, 1),
+    WheelPosition("middle right", -1.4, -0.75, 1),
+    WheelPosition("rear left", -2.7, 0.9, 2),
+    WheelPosition("rear right", -2.7, -0.9, 2),
 )
 """Three axles, none like another and none symmetric."""
 SPEED = 20.0
@@ -120,7 +120,7 @@ def _limit_row() -> Row:
     road = road_of_level(HALF_TRACK)
     pairs = []
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
-        wheels = tuple(Wheel(w.name, -length * w.axle, w.y, w.axle) for w in WHEELS)
+        wheels = tuple(WheelPosition(w.name, -length * w.axle, w.y, w.axle) for w in WHEELS)
         delayed, limit = (
             heights_covariance(excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
         )
@@ -141,7 +141,7 @@ def _isotropic_rows() -> list[Row]:
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
     closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
-    part = Part(1e-5, 0.3, 2.6)
+    part = DensityPart(1e-5, 0.3, 2.6)
     across = np.array([_by_surface_density(part, float(each), apart) for each in k])
     hankel = part.density(k, apart)
     return [
@@ -165,20 +165,20 @@ def _isotropic_rows() -> list[Row]:
     ]
 
 
-def _by_surface_density(part: Part, k: float, apart: float) -> float:
+def _by_surface_density(spectrum_part: DensityPart, k: float, track_distance: float) -> float:
     """S(k, d) = int Phi(sqrt(k^2 + l^2)) cos(l d) dl, Phi the Hankel transform of the track's autocovariance."""
-    w = part.waviness
-    height = part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
-    track = float(part.density(np.array(k), 0.0))
+    w = spectrum_part.waviness
+    height = spectrum_part.level * math.gamma((w + 1.0) / 2.0) / (math.sqrt(math.pi) * math.gamma(w / 2.0))
+    track = float(spectrum_part.density(np.array(k), 0.0))
     return (
         2.0
         * track
         * quad(
-            lambda across: height * (part.corner**2 + k**2 + across**2) ** (-(w + 1.0) / 2.0) / track,
+            lambda across: height * (spectrum_part.corner**2 + k**2 + across**2) ** (-(w + 1.0) / 2.0) / track,
             0.0,
             math.inf,
             weight="cos",
-            wvar=apart,
+            wvar=track_distance,
             epsabs=1e-12,
             limlst=500,
         )[0]

@@ -9,7 +9,7 @@ import numpy as np
 from models.road.csv_road import read_csv_road
 from models.road.iso8608 import CLASSES, iso8608_road
 from models.road.opencrg import read_opencrg, write_opencrg
-from models.road.profile import Profile
+from models.road.profile import RoadProfile
 from models.road.study import study_road
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Observed, Row, System, not_run
@@ -70,7 +70,7 @@ def _round_trips(folder: Path) -> list[Row]:
     return rows
 
 
-def _write_csv(road: Profile, path: Path) -> None:
+def _write_csv(road: RoadProfile, path: Path) -> None:
     """Heights up in mm, as a surveyor would hand them over."""
     station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]

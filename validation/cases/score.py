@@ -267,7 +267,7 @@ def _beside(long: list[Saved]) -> list[Row]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """Every stabiliser on both roads, and the same over 60 s beside the prototype."""
+    """Tables of every stabiliser on both roads, and over 60 s compared with the prototype."""
     tables = []
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
     for title, rows in shown.items():

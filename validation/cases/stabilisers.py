@@ -64,10 +64,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def write_motion(measured: Result, folder: Path, ahead: float = 0.0) -> None:
+def write_motion(measured_run: Result, folder: Path, ahead: float = 0.0) -> None:
     """Heave of a point ``ahead`` (m) of the true centre of mass, and pitch, as the file that scenes follow."""
-    pitch = measured["pitch"]
-    columns = {"z3": ("m", measured["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
+    pitch = measured_run["pitch"]
+    columns = {"z3": ("m", measured_run["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
     write_time_series(folder / "motion.csv", columns, STEP)
 
 
@@ -76,11 +76,11 @@ def guided(scene: Scene, engine: str) -> Result:
     return simulate(scene, engine, Settings(CONSTRAINED[engine], STEP, scene.run.duration, spectral_radius=0.6))
 
 
-def _missing_mass(parameters: str, p: Parameters, measured: Result, follow: Follow, folder: Path) -> list[Row]:
+def _missing_mass(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
     """The model lacks 5 % of the chassis: a force down, dm (g - z3'')."""
-    write_motion(measured, folder)
+    write_motion(measured_run, folder)
     scene = follow({"m3": (1 - MISSING) * p.m3}, RAILS)
-    rate = measured["z3_rate"]
+    rate = measured_run["z3_rate"]
     mean = (rate[-1] - rate[0]) / scene.run.duration
     wanted = MISSING * p.m3 * (p.g - mean)
     return [
@@ -98,11 +98,11 @@ def _missing_mass(parameters: str, p: Parameters, measured: Result, follow: Foll
     ]
 
 
-def _shifted_centre(parameters: str, p: Parameters, measured: Result, follow: Follow, folder: Path) -> list[Row]:
+def _shifted_centre(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
     """The model's centre of mass lies ahead of the true one, its struts where they are: a moment, nose up."""
-    write_motion(measured, folder, SHIFT)
+    write_motion(measured_run, folder, SHIFT)
     scene = follow({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
-    wanted = SHIFT * float(np.mean((measured["f3"] + measured["f4"]) * np.cos(measured["pitch"])))
+    wanted = SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
         Observed(
             f"stabilisers.centre.{engine}.{parameters}",
@@ -161,10 +161,10 @@ def _high_pass(follow: Follow) -> Row:
     )
 
 
-def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
-    """A pitch with the white noise of an inertial unit, raw and smoothed: what the moment becomes."""
-    noise = SENSOR * normal(SEED, 0, len(measured.times), 1)[:, 0]
-    write_time_series(folder / "measured.csv", {"pitch": ("rad", measured["pitch"] + noise)}, STEP)
+def _bandwidth(measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
+    """Rows: stabilising moment by a pitch with the white noise of an inertial unit, raw and smoothed."""
+    noise = SENSOR * normal(SEED, 0, len(measured_run.times), 1)[:, 0]
+    write_time_series(folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
     file = {"file": "measured.csv"}
     runs = {
         bandwidth: guided(
@@ -183,7 +183,7 @@ def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
         ).beside(1e6, "I s sqrt(6) / T^2 and more: differentiated twice", "published")
     ]
     for bandwidth, published in BANDWIDTHS.items():
-        off = float(np.abs(runs[bandwidth]["pitch"] - measured["pitch"]).max())
+        off = float(np.abs(runs[bandwidth]["pitch"] - measured_run["pitch"]).max())
         rows.append(
             Observed(
                 f"stabilisers.bandwidth.{bandwidth:g}",

@@ -82,7 +82,7 @@ def _circle_row() -> Row:
     return Observed(
         "trailer.circle",
         SYSTEM,
-        "angle of the caravan beside the car in a circle at 3 m/s, over that of axles that roll as they head, less 1",
+        "angle between caravan and car in a circle at 3 m/s / that of axles that roll without side slip - 1",
         circle_error(),
         "",
     ).at_most(0.03, "a patch that turns on its way pulls 3 pi a / 32 behind its centre: 1 % of 3 m", "closed form")
@@ -93,7 +93,7 @@ def _energy_row() -> Row:
     return Observed(
         "trailer.ledger",
         SYSTEM,
-        "energy of a turn with the caravan that nothing accounts for, over all of it",
+        "error of the energy balance of a turn with the caravan, relative to its total energy",
         float(np.abs(unaccounted(drive)).max() / energy(drive)[0]),
         "",
     ).at_most(1e-7, "Simpson's rule over springs, dampers, tyres, drag, brakes and steering", "closed form")

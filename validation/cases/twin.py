@@ -35,10 +35,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {}
 
 
-def _forces(parameters: str, where: str, measured: Result, steps: tuple[float, ...]) -> list[Row]:
+def _forces(parameters: str, where: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
     """Force-excited by the wheel forces of a road-excited run, the samples held and linear."""
     with TemporaryDirectory() as name:
-        write_measurement(measured, Path(name), 2e-3)
+        write_measurement(measured_run, Path(name), 2e-3)
         rows = []
         for interpolation in ("held", "linear"):
             scenes = [force_scene(Path(name), parameters, step, 2.0, interpolation) for step in steps]

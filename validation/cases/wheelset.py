@@ -138,7 +138,7 @@ def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
     return behaves(
         f"wheelset.critical.{name}",
         SYSTEM,
-        f"what three implementations find of a {name} wheelset at all speeds",
+        f"outcome of three implementations for a {name} wheelset at all speeds",
         " or ".join(sorted(said)),
         expected,
         "nothing holds it, or more than creep forces can drive",
@@ -295,7 +295,7 @@ def _energy_rows() -> list[Row]:
             Observed(
                 f"wheelset.energy.{law}",
                 SYSTEM,
-                f"ratio of the energy that the ledger of a path of 0.1 s leaves open to what creep takes, {named}",
+                f"error of the energy balance over a path of 0.1 s / energy dissipated by creep, {named}",
                 left[-1],
                 "",
             ).at_most(1e-8, "steps of 0.125 ms; works by the stages of RK4", "none"),

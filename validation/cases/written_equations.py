@@ -36,7 +36,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
-    """A row of plain equations beside other code for the same laws."""
+    """A row that compares plain equations with another implementation of the same laws."""
     return Observed(f"written.{id}", SYSTEM, quantity, value, unit).at_most(bound, WHY, "native")
 
 

@@ -18,9 +18,9 @@ from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.screen import confirmed
 from models.ride.frequency import spectra
 from models.systems.ride.reduced_scene import ReducedScene, without
-from validation.choice.drawn_scenes import Asked
+from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.sampled import Sampled
-from validation.ride.drawn_rides import Bent, Drawn
+from validation.ride.drawn_rides import BentRide, DrawnRide
 
 RANGE = (0.7, 1.0, 1.3)
 """Speeds of a scene by the one that is drawn."""
@@ -28,9 +28,11 @@ OMEGA = np.geomspace(1e-2, 3e5, 3000)
 """rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
-def asked_speeds(drawn: Drawn) -> Chooser:
+def asked_speeds(drawn_scene: DrawnRide) -> Chooser:
     """Of a range of speeds about that of the scene."""
-    return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
+    return Chooser(
+        drawn_scene.scene, [share * drawn_scene.speed for share in RANGE], drawn_scene.quantities, drawn_scene.tolerance
+    )
 
 
 def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
@@ -50,9 +52,9 @@ def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -
     return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 
-def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
+def worst_nearby(chooser: Chooser, omitted_effects: Set, draws: int, seed: int) -> float:
     """Largest change, by the tolerance, at random speeds of the range and with every parameter off at random."""
-    random, rest, worst = np.random.default_rng(seed), chooser.rest(chosen), 0.0
+    random, rest, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = parameters(chooser.scene.vehicle)
     for _ in range(draws):
@@ -64,9 +66,11 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     return worst / chooser.tolerance
 
 
-def measured_step(chooser: Chooser, chosen: Set) -> float:
+def measured_step(chooser: Chooser, omitted_effects: Set) -> float:
     """Longest step (s) that keeps the tolerance, by the covariance of what runs sample; no quantity is weighted."""
-    return longest_step([Sampled(march) for march in chooser.marches(chosen)], chooser.exact(), chooser.tolerance)
+    return longest_step(
+        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact(), chooser.tolerance
+    )
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ class JudgedByRuns:
 
     system: str
     engine: str
-    asked: Asked | Bent
+    asked: ChoiceQuestion | BentRide
     choice: ChoiceByRuns
     again: np.ndarray
 
@@ -86,14 +90,14 @@ class JudgedByRuns:
         return not self.choice.within_tolerance or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
 
 
-def judged_of(asked: Asked, system: str, engine: str) -> JudgedByRuns:
+def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns:
     """Choose, and run the scene and what is left once more."""
-    chooser = ChooserByRuns(asked.scene(), engine, list(asked.quantities), asked.tolerance)
+    chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
-    full_run = runs.system.computed_quantities(asked.scene(), engine)
+    full_run = runs.system.computed_quantities(request.scene(), engine)
     reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
-    again = [change(full_run.of(name).cases, reduced_run.of(name).cases) for name in asked.quantities]
-    return JudgedByRuns(system, engine, asked, choice, np.array(again))
+    again = [change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities]
+    return JudgedByRuns(system, engine, request, choice, np.array(again))
 
 
 def change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:

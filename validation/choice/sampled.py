@@ -72,11 +72,11 @@ class Sampled:
         G = self.march.reduced.excitation.G
         return solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T)
 
-    def _road(self, later: float) -> np.ndarray:
-        """S (m, m): the filters by themselves ``later`` seconds before."""
-        if later < 0:
-            return self._road(-later).T
-        return expm(self._rate * later) @ self._variance
+    def _road(self, delay: float) -> np.ndarray:
+        """S (m, m): the filters by themselves ``delay`` seconds before."""
+        if delay < 0:
+            return self._road(-delay).T
+        return expm(self._rate * delay) @ self._variance
 
     def _by_road(self, axle: int) -> np.ndarray:
         """Matrix (q, m) that gives the quantities from the states of the road filters of one axle."""
@@ -107,15 +107,15 @@ class Sampled:
             h / 6 * (force + mean * (noise @ (ends - between))),
         ]
 
-    def _driven(self, axle: int, late: float) -> np.ndarray:
-        """A step's forces (n, m) by the filters ``late`` seconds after the step begins, in the axle's own time."""
+    def _driven(self, axle: int, delay: float) -> np.ndarray:
+        """A step's forces (n, m) by the filters ``delay`` seconds after the step begins, in the axle's own time."""
         parts = zip(self._input_matrix(axle), SHARES, strict=True)
-        return sum(B @ self._road(share * self.step - late) for B, share in parts)
+        return sum(B @ self._road(share * self.step - delay) for B, share in parts)
 
-    def _with_road(self, axle: int, after: float) -> np.ndarray:
-        """x of an axle by the filters that it meets ``after`` seconds later (n, m); before, where that is negative."""
-        steps = max(int(np.ceil(-after / self.step)), 0)
-        begin = after + steps * self.step
+    def _with_road(self, axle: int, delay: float) -> np.ndarray:
+        """x of an axle by the filters that it meets ``delay`` seconds later (n, m); before, where that is negative."""
+        steps = max(int(np.ceil(-delay / self.step)), 0)
+        begin = delay + steps * self.step
         value, given = self._state_by_filters(axle) @ expm(self._rate.T * begin), np.zeros(())
         sooner = np.linalg.solve(self._variance, self._road(self.step))
         for i in range(steps):

@@ -55,20 +55,20 @@ def _provenance(content: Saved) -> Saved:
     return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
+def against(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
     """The comparison with an earlier report for ``results.json``: its source, notes, all changes.
 
     source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
     """
-    was = earlier["provenance"]
+    was = earlier_report["provenance"]
     old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
     notes += [f"{name} {before} -> {now}" for name, before, now in _differing_environment(was, source)]
     return {
-        "file": earlier["file"],
+        "file": earlier_report["file"],
         "commit": str(was.get("commit", "unknown")),
         "note": "; ".join(notes),
-        "changes": changes(earlier["rows"], {row["id"]: row for row in rows}),
+        "changes": changes(earlier_report["rows"], {row["id"]: row for row in rows}),
     }
 
 
@@ -88,12 +88,12 @@ def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any
     )
 
 
-def changes(before: dict[str, Saved], after: dict[str, Saved]) -> list[Change]:
+def changes(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -> list[Change]:
     """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
     listed = [
         change
-        for id in (*before, *(id for id in after if id not in before))
-        for change in _changes_of_row(id, before.get(id), after.get(id))
+        for id in (*earlier_rows, *(id for id in later_rows if id not in earlier_rows))
+        for change in _changes_of_row(id, earlier_rows.get(id), later_rows.get(id))
     ]
     return sorted(listed, key=lambda entry: (KINDS.index(entry["kind"]), _rank(entry["after"]), -entry["size"]))
 
@@ -106,14 +106,14 @@ def _rank(status: Any) -> int:
 def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
     row = new or old or {}
 
-    def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
+    def change(kind: str, old_value: Any, new_value: Any, size: float = 0.0) -> Change:
         return {
             "id": id,
             "kind": kind,
             "quantity": row["quantity"],
             "unit": row["unit"],
-            "before": before,
-            "after": after,
+            "before": old_value,
+            "after": new_value,
             "size": size,
             "reason": row["reason"] if kind in ("status", "new") else "",
         }

@@ -36,20 +36,20 @@ def random_states(count: int = 100) -> np.ndarray:
     return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * SPREAD
 
 
-def accelerations(make: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
+def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
     """Accelerations (n, 4) at states (n, 8), at times spread over the run's steps."""
-    model = make(assembly, settings)
+    model = make_engine(assembly, settings)
     steps = np.rint(np.linspace(0.05, 0.95, len(states)) * settings.steps)
     return np.array(
         [model.acceleration(i * settings.step, *np.split(y, 2)) for i, y in zip(steps, states, strict=True)]
     )
 
 
-def acceleration_gap(make: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
+def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
     """Largest difference to the equations of the paper, relative to the largest acceleration."""
     states = random_states(count)
     hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
-    return relative(accelerations(make, assembly, settings, states), hand)
+    return relative(accelerations(make_engine, assembly, settings, states), hand)
 
 
 def relative(computed: np.ndarray, hand: np.ndarray) -> float:
@@ -57,67 +57,67 @@ def relative(computed: np.ndarray, hand: np.ndarray) -> float:
     return float(np.abs(computed - hand).max() / np.abs(hand).max())
 
 
-def run(make: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
+def run(make_engine: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
     """The trajectory, None where the run was refused or failed."""
     try:
-        return make(assembly, settings).run()
+        return make_engine(assembly, settings).run()
     except (InputError, RunFailed):
         return None
 
 
-def trajectory_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+def trajectory_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Largest difference of any state (m, rad, m/s, rad/s) to the reference with the same tableau and step.
 
     The reference integrates with RK4, so this is a check to rounding for engines that do the same.
     """
     hand = engine("reference")(assembly, by_hand(settings)).run()
-    return state_gap(run(make, assembly, settings), hand)
+    return state_gap(run(make_engine, assembly, settings), hand)
 
 
-def state_gap(path: Trajectory | None, other: Trajectory) -> float:
-    """Largest difference of any state at the times that both hold; ``other`` may be finer by a whole factor."""
+def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
+    """Largest difference of any state at common times; ``other_trajectory`` may be finer by a whole factor."""
     if path is None:
         return float("inf")
-    every = (len(other.times) - 1) // (len(path.times) - 1)
-    return float(np.abs(path.states - other.states[::every]).max())
+    every = (len(other_trajectory.times) - 1) // (len(path.times) - 1)
+    return float(np.abs(path.states - other_trajectory.states[::every]).max())
 
 
-def order_gap(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+def order_gap(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """Difference between observed and declared order, from the settings' step and its half.
 
     ``truth`` is a path of the reference over the same time at a step finer by a whole factor.
     """
     name = settings.integrator
     declared = next(entries[name].order for entries in CATALOGUE.values() if name in entries)
-    return abs(observed_order(make, assembly, settings, truth) - declared)
+    return abs(observed_order(make_engine, assembly, settings, truth) - declared)
 
 
-def observed_order(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+def observed_order(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """log2 of the ratio of the largest state errors at the settings' step and its half."""
     halved = replace(settings, step=settings.step / 2)
-    coarse, fine = (state_gap(run(make, assembly, each), truth) for each in (settings, halved))
+    coarse, fine = (state_gap(run(make_engine, assembly, each), truth) for each in (settings, halved))
     return float(np.log2(coarse / fine)) if np.isfinite([coarse, fine]).all() and fine > 0 else float("-inf")
 
 
-def equilibrium_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Largest distance by which any state moves away from the closed form of the static equilibrium on a flat road.
 
     ``assembly`` is the vehicle on its tyres with nothing that drives it.
     """
-    trajectory = run(make, assembly, settings)
+    trajectory = run(make_engine, assembly, settings)
     if trajectory is None:
         return float("inf")
     rest = pitch_plane.equilibrium(assembly.parameters, assembly.vehicle.geometry)
     return float(np.abs(trajectory.states - rest).max())
 
 
-def momentum_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Change of the vertical momentum against weight minus wheel forces over time, relative to weight times time.
 
     An invariant of any vehicle under prescribed wheel forces, whatever its suspension does; exact under
     RK4 for forces that are constant or linear over each step. Needs no second implementation.
     """
-    trajectory = run(make, assembly, settings)
+    trajectory = run(make_engine, assembly, settings)
     if trajectory is None:
         return float("inf")
     p = assembly.parameters
@@ -137,9 +137,9 @@ def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(h * part)))
 
 
-def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
-    path = run(make, assembly, settings)
+    path = run(make_engine, assembly, settings)
     if path is None or path.enforced is None:
         return float("inf")
     hand = engine("reference")(assembly, by_hand(settings)).run().enforced
@@ -152,6 +152,6 @@ def by_hand(settings: Settings) -> Settings:
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
-def largest_relative_difference(computed: Any, wanted: Any) -> float:
+def largest_relative_difference(computed: Any, expected: Any) -> float:
     """Largest difference by the largest."""
-    return float(np.abs(np.asarray(computed) - wanted).max() / np.abs(wanted).max())
+    return float(np.abs(np.asarray(computed) - expected).max() / np.abs(expected).max())

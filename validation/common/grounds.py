@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from models.core.assumptions import Broken, broken_of, watching
+from models.core.assumptions import BrokenAssumption, broken_of, watching
 from models.core.result import Result
 
 ANY_ASSUMPTION = ""
@@ -25,7 +25,7 @@ class Breach:
     """An assumption that a run broke; ``why`` it may, "" where nobody allowed it."""
 
     run: str
-    broken: Broken
+    broken: BrokenAssumption
     why: str
 
 

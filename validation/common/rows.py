@@ -106,7 +106,7 @@ class Observed:
         return self.within(0.0, bound, why, independence)
 
     def beside(self, expected: float | str, why: str, independence: Independence = "published") -> Row:
-        """Row that reports the figure beside a published one without judging it."""
+        """Row that reports a value next to a published value without a verdict."""
         return self._row(expected, None, why, independence, "reported")
 
     def aim(self, bound: float, why: str, side: Side = "at most", independence: Independence = "none") -> Row:
@@ -134,13 +134,13 @@ class Observed:
 
 
 def behaves(
-    id: str, system: System, quantity: str, seen: str, expected: str, why: str, independence: Independence = "none"
+    id: str, system: System, quantity: str, outcome: str, expected: str, why: str, independence: Independence = "none"
 ) -> Row:
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
-    passed = seen == expected
-    reason = "" if passed else f"found {seen!r}"
+    passed = outcome == expected
+    reason = "" if passed else f"found {outcome!r}"
     return Row(
-        id, system, quantity, seen, "", expected, None, why, independence, "passed" if passed else "failed", reason
+        id, system, quantity, outcome, "", expected, None, why, independence, "passed" if passed else "failed", reason
     )
 
 

@@ -88,6 +88,6 @@ def data_folder() -> Path | None:
     return Path(named) if named and Path(named).is_dir() else None
 
 
-def gap(first: Result, other: Result) -> float:
+def gap(first: Result, other_result: Result) -> float:
     """Largest difference of any state (m, rad, m/s, rad/s) of two runs on the same times."""
-    return float(np.abs(first.states - other.states).max())
+    return float(np.abs(first.states - other_result.states).max())

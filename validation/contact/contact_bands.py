@@ -57,9 +57,9 @@ class TheoryErrors:
         """Size of force and moment, (n,)."""
         return used_with_moment(self.used, self.moment)
 
-    def of(self, which: Array) -> "TheoryErrors":
+    def of(self, mask: Array) -> "TheoryErrors":
         """Some of the contacts, by a mask (n,)."""
-        return TheoryErrors(*(getattr(self, part.name)[which] for part in fields(self)))
+        return TheoryErrors(*(getattr(self, part.name)[mask] for part in fields(self)))
 
 
 def forces(name: str, cases: list[ContactCase], cells: int) -> Array:

@@ -1,4 +1,4 @@
-"""Picture of what a contact kernel costs inside an engine."""
+"""Figure of the cost of a contact kernel inside an engine."""
 
 from typing import Any
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.material import Material, Pair
+from models.contact.material import Material, MaterialPair
 from models.systems.contact import work_precision
 from models.systems.contact.work_precision import ContactCase, ellipse_cases, with_exact_forces
 
@@ -32,7 +32,7 @@ KINDS = {
     },
 }
 """Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
-SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, Pair()
+SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, MaterialPair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
 SEED, DRAWN, RANGE = 43, 300, (0.2, 10.0)
 """Of the drawn contacts: seed, how many in each part, and their sizes."""
@@ -53,16 +53,16 @@ def cases() -> list[ContactCase]:
     return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
 
 
-def drawn_contacts(part: int) -> list[ContactCase]:
+def drawn_contacts(part_number: int) -> list[ContactCase]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
-    return _draw_contacts(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
+    return _draw_contacts(part_number, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part_number}", [PAIR])
 
 
-def wide_contacts(part: int) -> list[ContactCase]:
+def wide_contacts(part_number: int) -> list[ContactCase]:
     """A part of the wide contacts, without their forces."""
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
-    pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED]) * part
-    streams = enumerate(WIDE_CONTACTS[part], first)
+    pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED]) * part_number
+    streams = enumerate(WIDE_CONTACTS[part_number], first)
     return [
         case
         for stream in streams
@@ -71,7 +71,7 @@ def wide_contacts(part: int) -> list[ContactCase]:
 
 
 def _draw_contacts(
-    stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[Pair], absent: float = 0.0
+    stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[MaterialPair], absent: float = 0.0
 ) -> list[ContactCase]:
     """Contacts of a stream of numbers, of pairs in turn; each creepage is absent in a share of them, but never all."""
     rng = np.random.default_rng((SEED, stream))
@@ -92,31 +92,33 @@ def read_contacts() -> list[ContactCase]:
     return _read(FILE, cases())
 
 
-def read_drawn(part: int) -> list[ContactCase]:
+def read_drawn(part_number: int) -> list[ContactCase]:
     """A part of the drawn contacts with their forces."""
-    return _read(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))[part * DRAWN : (part + 1) * DRAWN]
-
-
-def read_wide(part: int) -> list[ContactCase]:
-    """A part of the wide contacts with their forces."""
-    return _read(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))[part * sum(WIDE_CONTACTS[FITTED]) :][
-        : sum(WIDE_CONTACTS[part])
+    return _read(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))[
+        part_number * DRAWN : (part_number + 1) * DRAWN
     ]
 
 
-def _read(path: Path, asked: list[ContactCase]) -> list[ContactCase]:
+def read_wide(part_number: int) -> list[ContactCase]:
+    """A part of the wide contacts with their forces."""
+    return _read(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))[part_number * sum(WIDE_CONTACTS[FITTED]) :][
+        : sum(WIDE_CONTACTS[part_number])
+    ]
+
+
+def _read(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWERS} for row in rows]
-    return [replace(case, **force) for case, force in zip(asked, forces, strict=True)]
+    return [replace(case, **force) for case, force in zip(contacts, forces, strict=True)]
 
 
-def write(path: Path, asked: list[ContactCase]) -> None:
+def write(path: Path, contacts: list[ContactCase]) -> None:
     """Compute the forces of all contacts asked for."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("ratio", "kind", "level", *ANSWERS))
-        for case in map(with_exact_forces, asked):
+        for case in map(with_exact_forces, contacts):
             numbers = (f"{getattr(case, name):.6f}" for name in ANSWERS)
             writer.writerow((round(case.a / case.b, 9), case.kind, round(case.level, 9), *numbers))
             file.flush()

@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.patches import Patch
 from models.contact.rolling_problem import RollingSolution, solve_rolling
 from models.contact.simplified_theory import NormalContact
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance, from_function
-from models.contact.wheel_on_rail import Touch, wheel_on_rail
+from models.contact.wheel_on_rail import TouchingPlace, wheel_on_rail
 from models.core.errors import InputError, RunFailed
 
-PAIR = Pair()
+PAIR = MaterialPair()
 FRICTION = 0.3
 CURVATURE = 1.0 / 0.92
 """A of a wheel of 0.46 m radius (1/m)."""
@@ -149,16 +149,16 @@ def profiles() -> list[Shape]:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedWheelset:
     """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), where that wheel touches."""
 
     shift: float
     yaw: float
     load: float
-    touches: list[Touch]
+    touches: list[TouchingPlace]
 
 
-def placed() -> list[Placed]:
+def placed() -> list[PlacedWheelset]:
     """S1002 on UIC 60 with and without yaw, where the wheel's normals are all but the track's vertical.
 
     Half-spaces are joined along the contour there; flange and tread lie on none.
@@ -168,7 +168,7 @@ def placed() -> list[Placed]:
         for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
             touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
             if max(touch.patch.lean for touch in touches) < UPRIGHT or len(touches) == 1:
-                wheelsets += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
+                wheelsets += [PlacedWheelset(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
     return wheelsets
 
 
@@ -180,16 +180,16 @@ MARGINS = (1.4, 2.0, 3.0)
 """Sides of the exact grid divided by those of the simplified theory's area."""
 
 
-def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
+def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells: int) -> NormalSolution:
     """The exact contact of profiles: each height counts along the track's vertical."""
     boxes = np.array(
         [
             np.add(part.box, (0.0, 0.0, part.patch.contour_position, part.patch.contour_position))
-            for part in pressed.patches
+            for part in normal_contact.patches
         ]
     ).T
     (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
-    slope = float(np.cos(min(part.patch.lean for part in pressed.patches)))
+    slope = float(np.cos(min(part.patch.lean for part in normal_contact.patches)))
     for margin in MARGINS:
         step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
         x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)

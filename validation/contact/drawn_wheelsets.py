@@ -51,13 +51,15 @@ def drawn_wheelsets() -> dict[str, Wheelset]:
     return wheelsets
 
 
-def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
+def criticals(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None]:
     """Critical speed (m/s) of each implementation; None where there is none. near : engines look about the first."""
     speeds: dict[str, float | None] = {}
     for engine in IMPLEMENTATIONS:
         of, first = partial(growth, implementation(engine)), speeds.get("reference")
         speeds[engine] = (
-            _critical_speed_near(partial(of, wheelset), first) if near and first else critical_or_why(wheelset, of)[0]
+            _critical_speed_near(partial(of, wheelset), first)
+            if search_nearby and first
+            else critical_or_why(wheelset, of)[0]
         )
     return speeds
 

@@ -11,7 +11,7 @@ from models.contact.fastsim import Ellipse, RollingEllipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import march_plain, march_second_order
 from models.contact.fastsim_records import BLOCK, LANES
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
 from validation.common.rows import Observed, Row, System
@@ -23,7 +23,7 @@ CONTACTS = 400
 WHY = "median of interleaved rounds, seconds of the processor"
 
 
-def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
+def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
     """Rows for a call and for a cell, and a table (what, time, by the bound)."""
     draw = np.random.default_rng(5)
     blocks = _blocks(1)
@@ -32,7 +32,7 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     (_, cells), values = grid(CELLS, CELLS + 1, "intermediate").records, draw.uniform(1.0, 2.0, CELLS * LANES)
     along, across = (draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
     many = RollingEllipse(axis, axis, load, mu, along, across, draw.normal(0.0, 0.3, CONTACTS))
-    calls = {n: Ellipse(1.0, pair, cells=n) for n in (12, CELLS)}
+    calls = {n: Ellipse(1.0, material_pair, cells=n) for n in (12, CELLS)}
     marched = REPEATS * CELLS * LANES
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
         "bound": (partial(_bound, values, REPEATS), marched),
@@ -40,7 +40,7 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
         "second": (partial(_repeat_second_order, blocks, cells, REPEATS), marched),
         **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
         **{
-            f"many {march}": (partial(fastsim, many, pair, march=march), CONTACTS * CELLS * (CELLS + 1))
+            f"many {march}": (partial(fastsim, many, material_pair, march=march), CONTACTS * CELLS * (CELLS + 1))
             for march in ("plain", "second-order")
         },
     }

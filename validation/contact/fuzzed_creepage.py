@@ -15,7 +15,7 @@ import numpy as np
 from models.contact.fastsim import Creep, RollingEllipse, fastsim
 from models.contact.fastsim_grid import Bound, nets
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 
 OPTIONS: tuple[dict[str, Any], ...] = (
     {},
@@ -62,10 +62,12 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     return {"a": a, "b": b, "load": load, "mu": mu, "xi_x": xi_x, "xi_y": xi_y, "spin": spin}
 
 
-def worst_violation(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
+def worst_violation(
+    columns: Mapping[str, Any], options: Mapping[str, Any], material_pair: MaterialPair
+) -> dict[str, float]:
     """Largest violation of each invariant, divided by mu N and the creepages where it has a size; not finite counts as
     inf."""
-    creep = fastsim(RollingEllipse(**columns), pair, **options)
+    creep = fastsim(RollingEllipse(**columns), material_pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
     least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
     motion = np.hypot(columns["xi_x"], columns["xi_y"]) + np.abs(columns["spin"]) * arm
@@ -79,7 +81,9 @@ def worst_violation(columns: Mapping[str, Any], options: Mapping[str, Any], pair
     def unlike(name: str) -> float:
         factors, sizes = SIMILAR_CONTACTS[name]
         changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
-        return _largest_finite(np.abs(forces - relative(fastsim(RollingEllipse(**changed), pair, **options), sizes)))
+        return _largest_finite(
+            np.abs(forces - relative(fastsim(RollingEllipse(**changed), material_pair, **options), sizes))
+        )
 
     forces = relative(creep, (1.0, 1.0, 1.0))
     return {
@@ -104,7 +108,8 @@ def _largest_finite(values: Array) -> float:
 
 
 def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
-    """Largest moment (N m), (n,), of contacts with columns a, b (m), load (N) and mu, (n,) each."""
+    """Upper bound (n,) of the spin moment (N m) of contacts with semi-axes a, b (m), load (N) and friction mu, (n,)
+    each."""
     pure = {
         "xi_x": np.zeros_like(columns["a"]),
         "xi_y": np.zeros_like(columns["a"]),

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, WheelAndRail, distance_over, touches_of
-from models.rail.contact_table import Contact, Placed
+from models.rail.contact_table import WheelsetContact, WheelsetPlacement
 from models.systems.wheel_rail.scene import build
 
 SCENE = build(
@@ -42,17 +42,17 @@ SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3
 
 
 @cache
-def contact_of(case: str) -> Contact:
+def contact_of(case: str) -> WheelsetContact:
     """Wheelset and track of a case."""
     return SCENE.contact(SCENE.cases[case])
 
 
-def placed_at(case: str, shift: float) -> Placed:
+def placed_at(case: str, shift: float) -> WheelsetPlacement:
     """Contact of a case at a lateral displacement (m)."""
     return contact_of(case).at(shift, SCENE.cases[case].yaw * shift)
 
 
-def sums(placed: Placed, wheel: str) -> tuple[float, float, float]:
+def sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
     """Mean place across the track (mm), normal force (N), largest pressure (MPa) of all patches of one wheel."""
     places = getattr(placed, wheel)
     normal = sum(place.normal for place in places)
@@ -60,7 +60,7 @@ def sums(placed: Placed, wheel: str) -> tuple[float, float, float]:
     return 1e3 * mean, normal, max(place.peak for place in places) / 1e6
 
 
-def on_one_plane(contact: Contact, placed: Placed) -> tuple[float, float, list[float]]:
+def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[float, float, list[float]]:
     """The right wheel lowered on CONTACT's plane: mean place (mm), largest pressure (MPa), both patches' forces (N)."""
     side, (_, y, angle) = contact.side, PLANE
     normal, pose = sum(touch.normal for touch in placed.right), _lowered(side, placed)
@@ -78,7 +78,7 @@ def on_one_plane(contact: Contact, placed: Placed) -> tuple[float, float, list[f
     return 1e3 * float(rows @ (y + s * math.cos(angle)) / rows.sum()), float(solved.pressure.max()) / 1e6, loads
 
 
-def patch_forces(contact: Contact, placed: Placed) -> list[float]:
+def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[float]:
     """Normal forces (N) of the right wheel's patches, each on a half-space of its own.
 
     Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
@@ -105,18 +105,18 @@ def patch_forces(contact: Contact, placed: Placed) -> list[float]:
     return [float(force) for force in pressed(approach)]
 
 
-def _load_of_patch(distance: Distance, approach: float, pair: Pair) -> float:
+def _load_of_patch(distance: Distance, approach: float, material_pair: MaterialPair) -> float:
     x, s = centres(60, 2e-4), centres(70, 1e-4)
     heights = distance.at(x[None, :], s[:, None])
-    return solve_normal(heights, 2e-4, 1e-4, pair, approach=approach).load if heights.min() < approach else 0.0
+    return solve_normal(heights, 2e-4, 1e-4, material_pair, approach=approach).load if heights.min() < approach else 0.0
 
 
-def _lowered(side: WheelAndRail, placed: Placed) -> Pose:
+def _lowered(side: WheelAndRail, placed: WheelsetPlacement) -> Pose:
     pose = Pose(placed.shift, placed.yaw, placed.roll, 0.0)
     return Pose(placed.shift, placed.yaw, placed.roll, side.clearance(pose))
 
 
-def first_touch(side: WheelAndRail, placed: Placed, sign: float, near: float) -> tuple[float, float, float]:
+def first_touch(side: WheelAndRail, placed: WheelsetPlacement, sign: float, guess: float) -> tuple[float, float, float]:
     """First touch of a wheel near a place on it (m from the taping line), by search over points of its surface.
 
     sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.
@@ -125,13 +125,13 @@ def first_touch(side: WheelAndRail, placed: Placed, sign: float, near: float) ->
     roll, yaw = sign * placed.roll, sign * placed.yaw
     ahead, reach_u, reach_a = 0.0, SEARCHED[0], SEARCHED[1]
     for _ in range(HALVINGS):
-        u, a = np.meshgrid(near + reach_u * GRID, ahead + reach_a * GRID)
+        u, a = np.meshgrid(guess + reach_u * GRID, ahead + reach_a * GRID)
         radius = side.wheelset.radius + np.interp(u, side.wheel.y, side.wheel.z)
         x, y, z = radius * np.sin(a), side.wheelset.arm + u, radius * np.cos(a)
         y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
         y = x * math.sin(yaw) + y * math.cos(yaw) + sign * placed.shift
         k = np.argmin(np.interp(y, side.rail.y, side.rail.z) - z)
-        place, near, ahead = float(y.flat[k]), float(u.flat[k]), float(a.flat[k])
+        place, guess, ahead = float(y.flat[k]), float(u.flat[k]), float(a.flat[k])
         reach_u, reach_a = reach_u / 4.0, reach_a / 4.0
     low, high = np.interp([place - STEP, place + STEP], side.rail.y, side.rail.z)
-    return place, near, math.atan(float(high - low) / (2.0 * STEP))
+    return place, guess, math.atan(float(high - low) / (2.0 * STEP))

@@ -81,7 +81,7 @@ def hertz(small: float, large: float, elastic: float, load: float) -> tuple[floa
 
 
 def coefficients(ratio: float, nu: float) -> Array:
-    """Kalker's C11, C22, C23, C33 (4,) at a/b and Poisson's ratio, as ``linear_theory.coefficients`` says."""
+    """Kalker's C11, C22, C23, C33 (4,) at a/b and Poisson's ratio, see ``linear_theory.coefficients``."""
     inner = min(max(ratio, 0.1), 10.0)
     nodes = np.exp(NODES(math.log(inner)))
     answer = np.array([_by_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
@@ -136,7 +136,7 @@ def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
 
 
 def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
-    """Part of the one flexibility by the reach of the three creepages (3,)."""
+    """Weight of the common flexibility, by the reach (3,) of the three creepages."""
     x, y, z = reach
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
     turns = OF_SPIN * shape**SPIN_BY_RATIO * z

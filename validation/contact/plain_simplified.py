@@ -17,7 +17,7 @@ from scipy.signal import convolve2d
 
 from models.contact.half_space import Z, influence, offsets
 from models.contact.inputs import Array
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.simplified_kernels import LEAST_STIFFNESS_SHARE, POINTS_PER_MESH
 from models.contact.simplified_theory import SimplifiedOptions
 
@@ -86,10 +86,10 @@ class PlainBodies:
         return ends[0], ends[1], ends[2], ends[3]
 
 
-def _lowest_value(line: CubicHermiteSpline) -> float:
+def _lowest_value(spline: CubicHermiteSpline) -> float:
     """Least value of a spline within its nodes."""
-    turning = line.derivative().roots(extrapolate=False)
-    return float(min(line(line.x).min(), line(turning[np.isfinite(turning)]).min(initial=np.inf)))
+    turning = spline.derivative().roots(extrapolate=False)
+    return float(min(spline(spline.x).min(), spline(turning[np.isfinite(turning)]).min(initial=np.inf)))
 
 
 def middles(low: float, high: float, count: int) -> Array:
@@ -103,10 +103,10 @@ def overlap(depth: float, low: float, height: Array, options: SimplifiedOptions)
     return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
 
 
-def spread(values: Array, step: tuple[float, float], pair: Pair, parts: Array) -> Array:
+def spread(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
     """Displacement (m) on a square net by one component of traction (Pa) on it; parts : the influence's component."""
     n = len(values)
-    kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, pair)[(..., *parts)]
+    kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, material_pair)[(..., *parts)]
     return convolve2d(kernel, values, mode="valid")
 
 
@@ -127,14 +127,14 @@ class PlainPatch:
         return self.stiffness * self.volume
 
 
-def at_depth(bodies: PlainBodies, depth: float, pair: Pair, options: SimplifiedOptions) -> PlainPatch:
+def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, options: SimplifiedOptions) -> PlainPatch:
     """The fit on the crude net."""
     box, n = bodies.box(depth), options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     height, slope_x, slope_y = bodies.at(middles(*box[:2], n), middles(*box[2:], n))
     cover = np.clip(0.5 + (depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
     pressure = overlap(depth, bodies.low, height, options)
-    u = spread(pressure, step, pair, np.array([Z, Z]))
+    u = spread(pressure, step, material_pair, np.array([Z, Z]))
     least = LEAST_STIFFNESS_SHARE * (depth - bodies.low) / np.average(u, weights=cover)
     stiffness = max(-1.0 / fitted_slopes(height[None], u[None], cover, step, options, True), least)
     approach = float(np.average(stiffness * u + height, weights=pressure))
@@ -166,14 +166,14 @@ def fitted_slopes(
     return float(squares / products if by_height else products / squares)
 
 
-def press(bodies: PlainBodies, approach: float, pair: Pair, options: SimplifiedOptions) -> PlainPatch:
+def press(bodies: PlainBodies, approach: float, material_pair: MaterialPair, options: SimplifiedOptions) -> PlainPatch:
     """The patch at a rigid approach (m)."""
     over = approach - bodies.low
 
     def off(part: float) -> float:
-        return at_depth(bodies, bodies.low + part * over, pair, options).approach - approach
+        return at_depth(bodies, bodies.low + part * over, material_pair, options).approach - approach
 
-    return at_depth(bodies, bodies.low + brentq(off, 0.2, 1.0, xtol=1e-15) * over, pair, options)
+    return at_depth(bodies, bodies.low + brentq(off, 0.2, 1.0, xtol=1e-15) * over, material_pair, options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,22 +187,22 @@ class Strips:
     pressure: Array
 
 
-def strips(bodies: PlainBodies, pressed: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
+def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
     """Strips between the places where the distance passes the depth; one too short to hold a node or the middle
     between two nodes is none, as the package looks there for contact."""
-    box, ends = pressed.box, []
+    box, ends = patch.box, []
     for y in middles(*box[2:], cells):
         line = bodies.line(float(y))
-        places = line.solve(pressed.depth, extrapolate=False)
+        places = line.solve(patch.depth, extrapolate=False)
         looked = np.linspace(bodies.x[0], bodies.x[-1], 2 * bodies.x.size - 1)
-        if places.size and (line(looked) < pressed.depth).any():
+        if places.size and (line(looked) < patch.depth).any():
             ends.append((y, places.min(), places.max(), line))
     y, low, high = (np.array([each[k] for each in ends]) for k in range(3))
     rows = [each[3](middles(b, a, cells)) for each, a, b in zip(ends, low, high, strict=True)]
-    pressure = overlap(pressed.depth, bodies.low, np.array(rows), options)
+    pressure = overlap(patch.depth, bodies.low, np.array(rows), options)
     width = (box[3] - box[2]) / cells
     carried = np.sum(pressure * (high - low)[:, None] * width / cells)
-    return Strips(y, low, high, width, pressure * pressed.load / carried)
+    return Strips(y, low, high, width, pressure * patch.load / carried)
 
 
 def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]) -> tuple[Array, Array]:
@@ -237,13 +237,15 @@ def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
     return np.array([mean.real, mean.imag])
 
 
-def refitted(pressed: PlainPatch, net: Strips, tractions: Array, pair: Pair, options: SimplifiedOptions) -> float:
+def refitted(
+    patch: PlainPatch, net: Strips, tractions: Array, material_pair: MaterialPair, options: SimplifiedOptions
+) -> float:
     """W_1 = W_2 (m/Pa) of the tractions of a march."""
-    n, box = options.net, pressed.box
+    n, box = options.net, patch.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     p = gathered(net, tractions, box, n)
-    u = np.array([sum(spread(p[m], step, pair, np.array([k, m])) for m in range(2)) for k in range(2)])
-    return fitted_slopes(u, p, pressed.cover, step, options)
+    u = np.array([sum(spread(p[m], step, material_pair, np.array([k, m])) for m in range(2)) for k in range(2)])
+    return fitted_slopes(u, p, patch.cover, step, options)
 
 
 def _common(low: Array, high: Array, edges: Array) -> Array:
@@ -253,17 +255,17 @@ def _common(low: Array, high: Array, edges: Array) -> Array:
 
 def roll(
     bodies: PlainBodies,
-    pressed: PlainPatch,
+    patch: PlainPatch,
     mu: float,
     motion: tuple[float, float, float],
-    pair: Pair,
+    material_pair: MaterialPair,
     cells: int,
     options: SimplifiedOptions,
 ) -> tuple[Array, float]:
     """fx, fy (N), mz (N m) and the share of the area that sticks (4,), and W_1 (m/Pa)."""
-    net = strips(bodies, pressed, cells, options)
-    first, _ = march(net, mu, 1.0 / pressed.stiffness, motion)
-    flexibility = refitted(pressed, net, first, pair, options)
+    net = strips(bodies, patch, cells, options)
+    first, _ = march(net, mu, 1.0 / patch.stiffness, motion)
+    flexibility = refitted(patch, net, first, material_pair, options)
     p, slips = march(net, mu, flexibility, motion)
     area = ((net.high - net.low) / cells * net.width)[:, None] * np.ones(cells)
     x = np.array([middles(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])

@@ -40,11 +40,11 @@ def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
     return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
-def counting(function: Callable[..., Any], calls: list[int], each: int = 1) -> Callable[..., Any]:
-    """The function, every call of which adds ``each`` to ``calls``."""
+def counting(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
+    """The function, every call of which adds ``increment`` to ``calls``."""
 
     def counted(*arguments: Any) -> Any:
-        calls[0] += each
+        calls[0] += increment
         return function(*arguments)
 
     return counted

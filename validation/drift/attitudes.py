@@ -30,9 +30,9 @@ def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rates, product(product(about, tilt), conjugate(about))
 
 
-def largest_angle(first: np.ndarray, other: np.ndarray) -> float:
+def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
     """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(logarithm(product(conjugate(first), other))).max())
+    return float(np.abs(logarithm(product(conjugate(first), other_attitudes))).max())
 
 
 def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:

@@ -40,7 +40,7 @@ BAND = 15.0
 
 
 def at_period(deviation: float, period: float) -> float:
-    """Deviation per sample that has the intensity of ``deviation`` at 1 kHz."""
+    """Standard deviation per sample at a sampling period, with the noise intensity that ``deviation`` has at 1 kHz."""
     return deviation * float(np.sqrt(1e-3 / period))
 
 

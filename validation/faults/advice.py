@@ -13,11 +13,11 @@ from unittest.mock import patch
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder, recommendation, search, truth
+from models.advice.price import PricedRun, SettingLadder, recommendation, search, truth
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice
-from models.advice.price.truth import Truth, values_at
-from validation.faults.campaign import Campaign, Check, Fault
+from models.advice.price.truth import ReferenceTruth, values_at
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 
 STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
@@ -56,20 +56,20 @@ class Swing:
     title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """Methods of one engine; the default is of order 2; one of them breaks down on the way."""
         return [
-            Ladder("mujoco", "RK4", STEPS, 4),
-            Ladder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
-            Ladder("mujoco", "Euler", STEPS, 1),
-            Ladder("mujoco", "broken", STEPS, 1),
+            SettingLadder("mujoco", "RK4", STEPS, 4),
+            SettingLadder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
+            SettingLadder("mujoco", "Euler", STEPS, 1),
+            SettingLadder("mujoco", "broken", STEPS, 1),
         ]
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """RK4, whose first rung is known to no better than some of the settings tried."""
-        return Ladder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
+        return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
 
-    def second(self, last: Setting) -> None:
+    def second(self, reference_setting: Setting) -> None:
         """None, as no second method is needed: the checks know the closed form."""
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -84,10 +84,10 @@ class Swing:
         swing = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
         return times, np.array(swing), len(places) * n
 
-    def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> Answer:
+    def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
         """y."""
         times, values, calls = solution
-        return Answer(times, values[:, None], {"force calls": calls})
+        return PricedRun(times, values[:, None], {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
         """Lines for a scene file: the setting's name."""
@@ -131,7 +131,7 @@ def _choice_for(tolerance: float) -> Recommendation:
 
 
 def _largest_winner(
-    size: Callable[[SettingChoice, float], float], kind: str = "", asked: tuple[float, ...] = (TIGHT_TOLERANCE,)
+    size: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
 ) -> float:
     """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
     return max(
@@ -143,7 +143,7 @@ def _largest_winner(
             ),
             default=math.inf,
         )
-        for tolerance in asked
+        for tolerance in tolerances
     )
 
 
@@ -186,11 +186,11 @@ def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommend
     return attribute(f"models.advice.price.{module}:{name}", change)
 
 
-def _tenth(real: Any) -> Any:
+def _tenth(original: Any) -> Any:
     """Errors of the winners by ten."""
 
     def told(*arguments: Any) -> Any:
-        known, timed, winners = real(*arguments)
+        known, timed, winners = original(*arguments)
         return known, timed, {key: replace(choice, error=choice.error / 10.0) for key, choice in winners.items()}
 
     return told
@@ -204,29 +204,31 @@ def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> Setti
     return max(timed, key=lambda choice: choice.calls, default=None)
 
 
-def _mean(self: Truth, other: Answer) -> float:
-    exact = values_at(self.answer, other.times, self.kink_period)
-    return float(np.abs(other.values - exact).mean()) if np.isfinite(other.values).all() else np.inf
+def _mean(self: ReferenceTruth, other_answer: PricedRun) -> float:
+    exact = values_at(self.answer, other_answer.times, self.kink_period)
+    return float(np.abs(other_answer.values - exact).mean()) if np.isfinite(other_answer.values).all() else np.inf
 
 
-def _numbers_alone(self: Truth, other: Answer) -> float:
-    exact = values_at(self.answer, other.times, self.kink_period)
-    return float(np.nanmax(np.abs(other.values - exact)))
+def _numbers_alone(self: ReferenceTruth, other_answer: PricedRun) -> float:
+    exact = values_at(self.answer, other_answer.times, self.kink_period)
+    return float(np.nanmax(np.abs(other_answer.values - exact)))
 
 
-def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, rung: int, executor: object) -> Any:
+def _first_rung(
+    scene: Any, ladder: SettingLadder, tolerance: float, duration: float, rung: int, executor: object
+) -> Any:
     return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 
 
 FAULTS = (
-    Fault("predicted error a tenth of what was measured", "recommendation", _in_module("_resolved", _tenth)),
-    Fault(
+    CampaignFault("predicted error a tenth of what was measured", "recommendation", _in_module("_resolved", _tenth)),
+    CampaignFault(
         "the most accurate setting wins, not the cheapest",
         "recommendation",
         _in_module("_cheapest", lambda _: _by_error),
     ),
-    Fault("the dearest setting wins", "recommendation", _in_module("_cheapest", lambda _: _dearest_choice)),
-    Fault(
+    CampaignFault("the dearest setting wins", "recommendation", _in_module("_cheapest", lambda _: _dearest_choice)),
+    CampaignFault(
         "the engine's default dropped from the race",
         "recommendation",
         _in_module(
@@ -234,24 +236,28 @@ FAULTS = (
             lambda real: lambda search: [one for one in real(search) if not one.tried.setting.default],
         ),
     ),
-    Fault(
+    CampaignFault(
         "the default kept whatever it costs", "recommendation", _in_module("_slower", lambda _: lambda one, best: False)
     ),
-    Fault(
+    CampaignFault(
         "judged over the part that is searched alone",
         "recommendation",
         _in_module("_confirmed", lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners)),
     ),
-    Fault("mean difference for the largest", "truth", _in_module("Truth.error", lambda _: _mean, "truth")),
-    Fault(
-        "what is no number left out of the error", "truth", _in_module("Truth.error", lambda _: _numbers_alone, "truth")
+    CampaignFault(
+        "mean difference for the largest", "truth", _in_module("ReferenceTruth.error", lambda _: _mean, "truth")
     ),
-    Fault(
+    CampaignFault(
+        "what is no number left out of the error",
+        "truth",
+        _in_module("ReferenceTruth.error", lambda _: _numbers_alone, "truth"),
+    ),
+    CampaignFault(
         "the reference's first step taken for the truth",
         "truth",
         _in_module("_settled_answer", lambda _: _first_rung, "truth"),
     ),
-    Fault(
+    CampaignFault(
         "a tolerance three times too wide",
         "search",
         _in_module("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),

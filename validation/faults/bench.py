@@ -147,20 +147,20 @@ class Check:
     measure: Callable[[Bench, str, Make], float]
 
 
-def _audit(bench: Bench, engine: str, make: Make) -> float:
+def _audit(bench: Bench, engine: str, make_engine: Make) -> float:
     settings, states = bench.settings(engine), random_states()
     return max(
-        relative(checks.accelerations(make, getattr(bench, name), settings, states), bench.accelerations(name))
+        relative(checks.accelerations(make_engine, getattr(bench, name), settings, states), bench.accelerations(name))
         for name in ("road", "linear")
     )
 
 
-def _order(bench: Bench, engine: str, make: Make) -> float:
-    return order_gap(make, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
+def _order(bench: Bench, engine: str, make_engine: Make) -> float:
+    return order_gap(make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
 
 
-def _momentum(bench: Bench, engine: str, make: Make) -> float:
-    return max(momentum_gap(make, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
+def _momentum(bench: Bench, engine: str, make_engine: Make) -> float:
+    return max(momentum_gap(make_engine, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
 
 
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
@@ -228,9 +228,9 @@ CHECKS: dict[str, Check] = {
 """What every fault is put to, in the order of the table."""
 
 
-def size(check: Check, bench: Bench, engine: str, make: Make) -> float:
+def size(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
     """Size that a check finds; infinite where the engine refuses or fails."""
     try:
-        return check.measure(bench, engine, make)
+        return check.measure(bench, engine, make_engine)
     except (InputError, RunFailed):
         return float("inf")

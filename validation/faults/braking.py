@@ -20,18 +20,18 @@ from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
-from validation.braking.braked_truck import Moving, on_road
+from validation.braking.braked_truck import RollingTruck, on_road
 from validation.braking.quarter_stops import LITERAL, exact_distance, stopped
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 
 SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _first_step(course: Road, steer: float = 0.0) -> Moving:
+def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
     """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
     tables = tyre_table.stacked([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
-    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, go=advance)
+    truck = RollingTruck(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, step_function=advance)
     if not steer:
         truck.turning[:] = 0.0
     truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
@@ -148,7 +148,7 @@ def _brakes(change: Callable[[Any], Any]) -> Patch:
     return attribute("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
 
 
-def _force_of_step_start(real: Any) -> Any:
+def _force_of_step_start(original: Any) -> Any:
     """The vehicle driven by the force of the start of each step."""
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
@@ -160,59 +160,61 @@ def _force_of_step_start(real: Any) -> Any:
 
 
 def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    def stacked(real: Any) -> Any:
-        return lambda tables: (lambda of: of._replace(mu_x=np.ascontiguousarray(change(of.mu_x))))(real(tables))
+    def stacked(original: Any) -> Any:
+        return lambda tables: (lambda of: of._replace(mu_x=np.ascontiguousarray(change(of.mu_x))))(original(tables))
 
     return attribute("models.tyre.tyre_table:stacked", stacked)
 
 
-def _mirrored(real: Any) -> Any:
+def _mirrored(original: Any) -> Any:
     """Steer angles, and by them the slip angles of the steered wheels, with the other sign."""
-    return lambda motion, torques, step, steer, vehicle: real(motion, torques, step, -steer, vehicle)
+    return lambda motion, torques, step, steer, vehicle: original(motion, torques, step, -steer, vehicle)
 
 
 def _spin(factor: float) -> Patch:
     """Spin inertia of the quarter vehicle's wheel in the step, not in the closed form."""
 
-    def change(real: Any) -> Any:
-        return property(lambda truck: _changed(real.fget(truck), {"spin": lambda spin: factor * spin}))
+    def change(original: Any) -> Any:
+        return property(lambda truck: _changed(original.fget(truck), {"spin": lambda spin: factor * spin}))
 
     return attribute("models.brake.quarter:Quarter.plane", change)
 
 
-def _one_bit_less(real: Any) -> Any:
+def _one_bit_less(original: Any) -> Any:
     """Fault: a signal is converted with a bit less than stated."""
-    return lambda table, *rest: real(table.model_copy(update={"bits": table.bits - 1}), *rest)
+    return lambda table, *rest: original(table.model_copy(update={"bits": table.bits - 1}), *rest)
 
 
 FAULTS = (
-    Fault(
+    CampaignFault(
         "force of the start of the step",
         "step",
         attribute("validation.braking.quarter_stops:stop", _force_of_step_start),
     ),
-    Fault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
-    Fault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
-    Fault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),
-    Fault("track halved", "vehicle", _truck(place=lambda p: p * np.array([1.0, 0.5]))),
-    Fault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
-    Fault(
+    CampaignFault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
+    CampaignFault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
+    CampaignFault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),
+    CampaignFault("track halved", "vehicle", _truck(place=lambda p: p * np.array([1.0, 0.5]))),
+    CampaignFault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
+    CampaignFault(
         "height of the centre of mass 1 % too large",
         "vehicle",
         _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own),
     ),
-    Fault("spin inertia 1 % too large", "wheel", _spin(1.01)),
-    Fault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
-    Fault("conversion with a bit less", "port", attribute("models.brake.port.sensors:Channels", _one_bit_less)),
-    Fault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
-    Fault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
-    Fault(
+    CampaignFault("spin inertia 1 % too large", "wheel", _spin(1.01)),
+    CampaignFault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
+    CampaignFault("conversion with a bit less", "port", attribute("models.brake.port.sensors:Channels", _one_bit_less)),
+    CampaignFault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
+    CampaignFault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
+    CampaignFault(
         "hysteresis reversed", "brake", _brakes(lambda own: own._replace(release=own.push_out, push_out=own.release))
     ),
-    Fault("push-out pressure ignored", "brake", _brakes(lambda own: own._replace(push_out=0.0 * own.push_out))),
-    Fault("falling pressure by the rising gradient", "brake", _brakes(lambda own: own._replace(falling=own.rising))),
-    Fault("friction read one node late", "tyre", _tables(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
-    Fault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
+    CampaignFault("push-out pressure ignored", "brake", _brakes(lambda own: own._replace(push_out=0.0 * own.push_out))),
+    CampaignFault(
+        "falling pressure by the rising gradient", "brake", _brakes(lambda own: own._replace(falling=own.rising))
+    ),
+    CampaignFault("friction read one node late", "tyre", _tables(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
+    CampaignFault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
 )
 
 CAMPAIGN = Campaign("planted.braking", "braking", "anti-lock", CHECKS, FAULTS)

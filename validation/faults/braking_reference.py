@@ -18,7 +18,7 @@ from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
 from validation.braking.compiled_brakes import wheel_forces_in
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 
 ENGINE, COUNT, DURATION = "exudyn", 20, 0.05
@@ -65,9 +65,9 @@ CHECKS = {
 def _table(change: Callable[[Handling], None]) -> Patch:
     """The car's table of numbers changed after it was packed."""
 
-    def packed(real: Any) -> Any:
+    def packed(original: Any) -> Any:
         def make(*given: Any, **more: Any) -> Handling:
-            handling: Handling = real(*given, **more)
+            handling: Handling = original(*given, **more)
             change(handling)
             return handling
 
@@ -164,29 +164,31 @@ def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
 def _stacked(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
     """Tables as they are stacked for compiled code, with other mu_x and h."""
 
-    def stack(real: Any) -> Any:
-        return lambda tyres: _with_friction(real(tyres), change)
+    def stack(original: Any) -> Any:
+        return lambda tyres: _with_friction(original(tyres), change)
 
     return attribute("validation.braking.plain_brakes:stacked", stack)
 
 
-def _with_friction(of: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
-    mu_x, h = change(of)
-    return Tables(of.angles, of.slips, of.loads, np.ascontiguousarray(mu_x), of.g, np.ascontiguousarray(h))
+def _with_friction(tables: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
+    mu_x, h = change(tables)
+    return Tables(
+        tables.angles, tables.slips, tables.loads, np.ascontiguousarray(mu_x), tables.g, np.ascontiguousarray(h)
+    )
 
 
-def _heavy_wheel(real: Any) -> Any:
+def _heavy_wheel(original: Any) -> Any:
     """A wheel whose inertia is 1 % too large."""
-    return lambda tables, under, motion, load, of: real(
+    return lambda tables, under, motion, load, of: original(
         tables, under, motion, load, replace(of, inertia=1.01 * of.inertia)
     )
 
 
-def _other_share(real: Any) -> Any:
+def _other_share(original: Any) -> Any:
     """The share of the first stretch in the place of that of the second."""
 
     def under(*given: Any) -> np.ndarray:
-        surface: np.ndarray = real(*given)
+        surface: np.ndarray = original(*given)
         mixed = surface[:, 0] != surface[:, 1]
         surface[mixed, 2] = 1.0 - surface[mixed, 2]
         return surface
@@ -194,39 +196,39 @@ def _other_share(real: Any) -> Any:
     return under
 
 
-def _more_torque(real: Any) -> Any:
+def _more_torque(original: Any) -> Any:
     """Torques 1 % too large."""
 
     def planted(*given: Any) -> None:
-        real(*given)
+        original(*given)
         given[-1][:] *= 1.01
 
     return planted
 
 
-def _late_torque(real: Any) -> Any:
+def _late_torque(original: Any) -> Any:
     """Torques of the start of each step at its end."""
 
     def planted(*given: Any) -> None:
-        real(*given)
+        original(*given)
         given[-1][1:] = given[-1][:-1].copy()
 
     return planted
 
 
-def _quick_valves(real: Any) -> Any:
+def _quick_valves(original: Any) -> Any:
     """Valves without their delay within a sample."""
 
     def planted(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
         whole_samples = sample * int(chambers.delay / sample)
-        real(states, sample, air, chambers._replace(delay=whole_samples), *rest)
+        original(states, sample, air, chambers._replace(delay=whole_samples), *rest)
 
     return planted
 
 
-def _longer_relaxation(real: Any) -> Any:
+def _longer_relaxation(original: Any) -> Any:
     """Relaxation lengths 1 % too long."""
-    return lambda state, time, steer, slope, length, lag: real(state, time, steer, slope, 1.01 * length, lag)
+    return lambda state, time, steer, slope, length, lag: original(state, time, steer, slope, 1.01 * length, lag)
 
 
 def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
@@ -248,35 +250,37 @@ def _faster(contacts: Any, *rest: Any) -> tuple[Any, ...]:
 
 BENCH, COMPILED = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
 FAULTS = (
-    Fault(
+    CampaignFault(
         "preload of a spring 1 % too large", "vehicle", _preloads(lambda p: p._replace(parts=_first_larger(p.parts)))
     ),
-    Fault(
+    CampaignFault(
         "static load of a tyre 1 % too large", "vehicle", _preloads(lambda p: p._replace(tyres=_first_larger(p.tyres)))
     ),
-    Fault("stiffness and damping of a spring exchanged", "table", _table(_exchanged)),
-    Fault("stiffness of a spring's neighbour", "table", _table(_neighbour)),
-    Fault("anti-roll bars without stiffness", "table", _table(_without_bars)),
-    Fault("a spring's point 10 mm ahead", "table", _table(_moved_point)),
-    Fault("springs without dry friction", "table", _table(_smooth)),
-    Fault("springs without curves of travel", "table", _table(_straight)),
-    Fault("drag twice as large", "table", _table(_dragged)),
-    Fault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
-    Fault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
-    Fault("brake torque of the step's start", "step", attribute("models.brake.samples:by_valves", _late_torque)),
-    Fault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
-    Fault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
-    Fault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
-    Fault("slip angles that lag over half of each step", "lagging", _relaxed(_half_as_far)),
-    Fault("slip angles that lag by a speed 1 % too large", "lagging", _relaxed(_faster)),
-    Fault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
-    Fault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
-    Fault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),
-    Fault("friction along the wheel 1 % too large", "tyre", _stacked(lambda t: (1.01 * t.mu_x, t.h))),
-    Fault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
-    Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
-    Fault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
-    Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer_relaxation)),
+    CampaignFault("stiffness and damping of a spring exchanged", "table", _table(_exchanged)),
+    CampaignFault("stiffness of a spring's neighbour", "table", _table(_neighbour)),
+    CampaignFault("anti-roll bars without stiffness", "table", _table(_without_bars)),
+    CampaignFault("a spring's point 10 mm ahead", "table", _table(_moved_point)),
+    CampaignFault("springs without dry friction", "table", _table(_smooth)),
+    CampaignFault("springs without curves of travel", "table", _table(_straight)),
+    CampaignFault("drag twice as large", "table", _table(_dragged)),
+    CampaignFault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
+    CampaignFault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
+    CampaignFault(
+        "brake torque of the step's start", "step", attribute("models.brake.samples:by_valves", _late_torque)
+    ),
+    CampaignFault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
+    CampaignFault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
+    CampaignFault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
+    CampaignFault("slip angles that lag over half of each step", "lagging", _relaxed(_half_as_far)),
+    CampaignFault("slip angles that lag by a speed 1 % too large", "lagging", _relaxed(_faster)),
+    CampaignFault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
+    CampaignFault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
+    CampaignFault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),
+    CampaignFault("friction along the wheel 1 % too large", "tyre", _stacked(lambda t: (1.01 * t.mu_x, t.h))),
+    CampaignFault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
+    CampaignFault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
+    CampaignFault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
+    CampaignFault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer_relaxation)),
 )
 
 CAMPAIGN = Campaign("planted.braking_reference", "braking on the suspension", "anti-lock", CHECKS, FAULTS)

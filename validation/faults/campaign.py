@@ -35,8 +35,8 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A fault in words, where it is planted, and what it changes meanwhile."""
+class CampaignFault:
+    """A planted fault: its description, where it is planted, and the patch that plants it."""
 
     name: str
     place: str
@@ -51,7 +51,7 @@ class Campaign:
     what: str
     system: System
     checks: dict[str, Check]
-    faults: tuple[Fault, ...]
+    faults: tuple[CampaignFault, ...]
 
     def measure(self, every: int = 1) -> list[Record]:
         """Size over tolerance of every check, without a fault first and then with each, or with every such one."""
@@ -65,7 +65,7 @@ class Campaign:
             ),
         ]
 
-    def _ratios_with_fault(self, fault: Fault) -> dict[str, float]:
+    def _ratios_with_fault(self, fault: CampaignFault) -> dict[str, float]:
         with fault.inside()():
             return self._ratios()
 
@@ -94,7 +94,7 @@ class Campaign:
             Observed(
                 f"{self.id}.false_alarms",
                 SYSTEM,
-                f"alarms of the checks of {self.what} without a fault",
+                f"false alarms of the checks of {self.what} (no fault planted)",
                 len(seeing_checks(clean)),
                 "alarms",
             ).within(0, 0, "a check that cries without a fault is no check", "native"),

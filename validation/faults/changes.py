@@ -43,16 +43,16 @@ def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
     return vehicle(changed)
 
 
-def with_moved_points(place: Callable[[float, float, float], float]) -> Change:
+def with_moved_points(position_of: Callable[[float, float, float], float]) -> Change:
     """Suspension points and axles at place(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
         p, changed_vehicle = assembly.parameters, assembly.vehicle
         held = tuple(
-            replace(strut, upper=_point_moved_to(strut.upper, place(strut.upper.x, p.a, p.b)))
+            replace(strut, upper=_point_moved_to(strut.upper, position_of(strut.upper.x, p.a, p.b)))
             for strut in changed_vehicle.struts
         )
-        axles = tuple(replace(axle, x=place(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
+        axles = tuple(replace(axle, x=position_of(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
         return replace(assembly, vehicle=replace(changed_vehicle, struts=held, axles=axles))
 
     return changed
@@ -62,11 +62,11 @@ def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
-def swapped(first: str, other: str) -> Change:
+def swapped(first: str, other_strut: str) -> Change:
     """Stiffness and damping of two struts exchanged."""
 
-    def change(strut: Strut, named: dict[str, Strut]) -> Strut:
-        source = named.get({first: other, other: first}.get(strut.name, strut.name), strut)
+    def change(strut: Strut, struts: dict[str, Strut]) -> Strut:
+        source = struts.get({first: other_strut, other_strut: first}.get(strut.name, strut.name), strut)
         return replace(strut, stiffness=source.stiffness, damping=source.damping)
 
     return struts(change)
@@ -77,18 +77,18 @@ def stiffened(name: str, factor: float) -> Change:
     return struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
 
 
-def undamped_tyre(strut: Strut, named: dict[str, Strut]) -> Strut:
+def undamped_tyre(strut: Strut, struts: dict[str, Strut]) -> Strut:
     """A tyre without its damping."""
     return replace(strut, damping=0.0) if strut.name.startswith("tyre") else strut
 
 
-def swapped_wheel(body: Body, named: dict[str, Body]) -> Body:
+def swapped_wheel(body: Body, bodies: dict[str, Body]) -> Body:
     """A wheel with the mass of the other one."""
     other = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
-    return replace(body, mass=named[other].mass)
+    return replace(body, mass=bodies[other].mass)
 
 
-def mixed_inertia(body: Body, named: dict[str, Body]) -> Body:
+def mixed_inertia(body: Body, bodies: dict[str, Body]) -> Body:
     """The chassis with its inertia for its mass, and the other way round."""
     return body if body.pitch_inertia is None else replace(body, mass=body.pitch_inertia, pitch_inertia=body.mass)
 
@@ -97,7 +97,7 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
     """Pitch inertia about the front axle instead of the centre of mass."""
     b = assembly.parameters.b
 
-    def change(body: Body, named: dict[str, Body]) -> Body:
+    def change(body: Body, bodies: dict[str, Body]) -> Body:
         about = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
         return replace(body, pitch_inertia=about)
 
@@ -120,7 +120,7 @@ Values = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Altered:
+class AlteredSignal:
     """A signal read ``late`` (s) and passed through ``change``, values (n, channels) -> values."""
 
     signal: Any
@@ -140,7 +140,7 @@ class Altered:
 
 
 @dataclass(frozen=True)
-class HeldStages(Altered):
+class HeldStages(AlteredSignal):
     """A signal whose reading in the middle of a step is the one at its start."""
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
@@ -151,7 +151,7 @@ class HeldStages(Altered):
 
 
 @dataclass(frozen=True)
-class OtherTrack(Altered):
+class OtherTrack(AlteredSignal):
     """The road of one track where the mean was asked for: it differs by a class A road."""
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
@@ -179,7 +179,7 @@ def driven(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
 
 def channels(modes: tuple[str, ...], change: Values) -> Change:
     """The values of the input changed."""
-    return driven(modes, lambda signal: Altered(signal, 0.0, change))
+    return driven(modes, lambda signal: AlteredSignal(signal, 0.0, change))
 
 
 def times(factors: dict[int, float]) -> Values:
@@ -213,14 +213,14 @@ def moment(periods: float, change: Values = lambda values: values) -> Change:
         signal = assembly.moment
         if signal is None:
             return assembly
-        return replace(assembly, moment=Altered(signal, periods * (signal.period or 0.0), change))
+        return replace(assembly, moment=AlteredSignal(signal, periods * (signal.period or 0.0), change))
 
     return changed
 
 
 def with_late_input(periods: float, step: float = 1e-3) -> Change:
     """Input late by a part of its sampling period, or of a step of 1 ms where it has none."""
-    return driven(("road", "force", "pitch"), lambda signal: Altered(signal, periods * (signal.period or step)))
+    return driven(("road", "force", "pitch"), lambda signal: AlteredSignal(signal, periods * (signal.period or step)))
 
 
 def road(**factors: float) -> Change:

@@ -16,12 +16,12 @@ from models.advice.choice.screen import Screen
 from models.advice.ride_choice.choose import Chooser as LinearChooser
 from models.advice.ride_choice.choose import RideChoice
 from models.advice.ride_choice.screen import Screen as LinearScreen
-from validation.choice.drawn_scenes import Asked
+from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.drawn_scenes import draw_scene as drawn_run
 from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import attribute
-from validation.ride.drawn_rides import Drawn, drawn
+from validation.ride.drawn_rides import DrawnRide, drawn
 
 SEED, RUN = 14, 4
 """Of the linear scene, and of the half car that is run."""
@@ -33,12 +33,12 @@ TOLERANCE = 1e-3
 
 
 @cache
-def _linear() -> Drawn:
+def _linear() -> DrawnRide:
     return drawn(SEED)
 
 
 @cache
-def _run() -> Asked:
+def _run() -> ChoiceQuestion:
     run = drawn_run("pitch-plane", RUN)
     return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
 
@@ -115,29 +115,29 @@ CHECKS = {
 }
 
 
-def _other_sign(real: Any) -> Any:
+def _other_sign(original: Any) -> Any:
     def predicted(screen: LinearScreen, reduced: Any) -> np.ndarray:
         C = screen.base.system.C[screen.rows]
         full = np.einsum("ki,ij,kj->k", C, screen.P, C)
-        return np.maximum(2 * full - real(screen, reduced), 0.0)
+        return np.maximum(2 * full - original(screen, reduced), 0.0)
 
     return predicted
 
 
-def _any_tolerance(real: Any) -> Any:
+def _any_tolerance(original: Any) -> Any:
     def init(chooser: Any, first: Any, two: Any, quantities: Any, tolerance: float, *more: Any) -> None:
-        real(chooser, first, two, quantities, 0.9, *more)
+        original(chooser, first, two, quantities, 0.9, *more)
 
     return init
 
 
 def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
-    """Changes that are taken as confirmed without a run."""
+    """Fault: predicted changes are reported as confirmed without a run."""
 
-    def confirm(chooser: Chooser, chosen: frozenset[str]) -> np.ndarray:
-        times = chooser.reach(chosen)
-        shares = change(chooser, chosen, times)
-        chooser._confirmed[chosen] = times, shares, np.zeros_like(shares)
+    def confirm(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
+        times = chooser.reach(omitted_effects)
+        shares = change(chooser, omitted_effects, times)
+        chooser._confirmed[omitted_effects] = times, shares, np.zeros_like(shares)
         return shares
 
     return lambda real: confirm
@@ -145,41 +145,41 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
 
 LINEAR, RUNS = "models.advice.ride_choice", "models.advice.choice"
 FAULTS = (
-    Fault(
+    CampaignFault(
         "sign of the predicted change",
         "screen of linear scenes",
         attribute(f"{LINEAR}.screen:Screen.predicted", _other_sign),
     ),
-    Fault(
+    CampaignFault(
         "predictions reported as confirmed",
         "choice of linear scenes",
         attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen)),
     ),
-    Fault(
+    CampaignFault(
         "confirmed against itself",
         "choice of linear scenes",
         attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0]),
     ),
-    Fault(
+    CampaignFault(
         "tolerance ignored", "choice of linear scenes", attribute(f"{LINEAR}.choose:Chooser.__init__", _any_tolerance)
     ),
-    Fault(
+    CampaignFault(
         "parameters that are off taken as they stand",
         "choice of linear scenes",
         attribute(f"{LINEAR}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen)),
     ),
-    Fault(
+    CampaignFault(
         "predictions reported as confirmed",
         "choice by runs",
         attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, chosen, times: own.told(chosen, times))),
     ),
-    Fault(
+    CampaignFault(
         "confirmed against itself",
         "choice by runs",
         attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, *_: np.zeros(len(own.whole.quantities)))),
     ),
-    Fault("tolerance ignored", "choice by runs", attribute(f"{RUNS}.choose:Chooser.__init__", _any_tolerance)),
-    Fault(
+    CampaignFault("tolerance ignored", "choice by runs", attribute(f"{RUNS}.choose:Chooser.__init__", _any_tolerance)),
+    CampaignFault(
         "the least change of all quantities taken for each",
         "screen by runs",
         attribute(

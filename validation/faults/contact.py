@@ -12,13 +12,13 @@ from models.contact import hertz, normal_problem, rolling_problem
 from models.contact.fastsim_kernels import PLAIN
 from models.contact.inputs import Array
 from models.contact.linear_theory import forces
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Material, MaterialPair
 from models.contact.normal_problem import NormalSolution, centres
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 
-PAIR = Pair()
+PAIR = MaterialPair()
 LOAD, RADIUS, MU = 1e4, 0.3, 0.3
 A, B = 6e-3, 4e-3
 CELLS, DX, DY = (21, 31), 3.0e-4, 4.2e-4
@@ -61,7 +61,7 @@ def _normal() -> float:
 
 def _published() -> float:
     """Forces of small creepages and spin by Kalker's published coefficients."""
-    soft = Pair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
+    soft = MaterialPair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
     a, shear = 5e-3, 1e11
     motion = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
     answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, motion[0], motion[1], motion[2]), soft)
@@ -119,9 +119,9 @@ CHECKS = {
 def _contacts(change: Callable[[Array], None]) -> Patch:
     """CONTACT (n,) of FASTSIM changed in place."""
 
-    def contacts(real: Any) -> Any:
+    def contacts(original: Any) -> Any:
         def made(*given: Any) -> Any:
-            answer, shape = real(*given)
+            answer, shape = original(*given)
             change(answer)
             return answer, shape
 
@@ -145,22 +145,22 @@ def _exchanged(first: str, second: str) -> Patch:
 
 
 FAULTS = (
-    Fault(
+    CampaignFault(
         "one body's modulus for the pair's",
         "Hertz",
         attribute("models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair)),
     ),
-    Fault(
+    CampaignFault(
         "diameter for radius",
         "Hertz",
         attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(a / 2, b / 2, *arguments)),
     ),
-    Fault(
+    CampaignFault(
         "curvatures exchanged",
         "Hertz",
         attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(b, a, *arguments)),
     ),
-    Fault(
+    CampaignFault(
         "axes not squared up: p0 of a cylinder",
         "Hertz",
         attribute(
@@ -168,41 +168,41 @@ FAULTS = (
             lambda real: lambda *arguments: replace(real(*arguments), p0=2.0 / 3.0 * 4.0 / np.pi * real(*arguments).p0),
         ),
     ),
-    Fault(
+    CampaignFault(
         "sides of a cell exchanged",
         "normal problem",
         attribute(
             "models.contact.normal_problem:influence", lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair)
         ),
     ),
-    Fault(
+    CampaignFault(
         "influence of one body alone",
         "normal problem",
         attribute("models.contact.normal_problem:influence", lambda real: lambda *arguments: 0.5 * real(*arguments)),
     ),
-    Fault(
+    CampaignFault(
         "whole first step at the leading edge",
         "FASTSIM",
         attribute("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN}),
     ),
-    Fault("sign of the spin", "FASTSIM", _times("spin", -1.0)),
-    Fault("creepages exchanged", "FASTSIM", _exchanged("xi_x", "xi_y")),
-    Fault("semi-axes exchanged", "FASTSIM", _exchanged("a", "b")),
-    Fault("flexibilities along and across exchanged", "FASTSIM", _exchanged("l1", "l2")),
-    Fault("flexibility of spin 10 % off", "FASTSIM", _times("l3", 1.1)),
-    Fault("friction 1 % off", "FASTSIM", _times("mu", 1.01)),
-    Fault("bound of the cylinder", "FASTSIM", _times("load", 0.9)),
-    Fault(
+    CampaignFault("sign of the spin", "FASTSIM", _times("spin", -1.0)),
+    CampaignFault("creepages exchanged", "FASTSIM", _exchanged("xi_x", "xi_y")),
+    CampaignFault("semi-axes exchanged", "FASTSIM", _exchanged("a", "b")),
+    CampaignFault("flexibilities along and across exchanged", "FASTSIM", _exchanged("l1", "l2")),
+    CampaignFault("flexibility of spin 10 % off", "FASTSIM", _times("l3", 1.1)),
+    CampaignFault("friction 1 % off", "FASTSIM", _times("mu", 1.01)),
+    CampaignFault("bound of the cylinder", "FASTSIM", _times("load", 0.9)),
+    CampaignFault(
         "gradient taken downstream",
         "exact theory",
         attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *arguments: -real(*arguments)),
     ),
-    Fault(
+    CampaignFault(
         "gradient of half the length",
         "exact theory",
         attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * arguments for arguments in real)),
     ),
-    Fault(
+    CampaignFault(
         "sign of the spin",
         "exact theory",
         attribute(

@@ -11,7 +11,7 @@ from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import CutVehicle
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import by_jacobians, r19, static
 
@@ -48,11 +48,11 @@ CHECKS = {
 def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = "hub") -> Patch:
     """Wrenches (rows, hubs, 6) changed where they are read, or read in another frame."""
 
-    def table(real: Any) -> Any:
+    def table(original: Any) -> Any:
         def made(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:
             parts = hub_inputs.hubs.reshape(len(hub_inputs.hubs), -1, WRENCH)
             rows = parts if change is None else change(parts)
-            return real(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
+            return original(vehicle, replace(hub_inputs, hubs=rows.reshape(hub_inputs.hubs.shape), frame=frame), step)
 
         return made
 
@@ -60,12 +60,12 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
 
 
 FAULTS = (
-    Fault("left and right hubs swapped", "input", read(lambda parts: parts[:, [1, 0, 3, 2]])),
-    Fault("front and rear hubs swapped", "input", read(lambda parts: parts[:, [2, 3, 0, 1]])),
-    Fault("forces read along axes of the road", "input", read(frame="inertial")),
-    Fault("y turned round", "input", read(lambda parts: parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]))),
-    Fault("moments left out", "input", read(lambda parts: parts * np.repeat([1.0, 0.0], 3))),
-    Fault(
+    CampaignFault("left and right hubs swapped", "input", read(lambda parts: parts[:, [1, 0, 3, 2]])),
+    CampaignFault("front and rear hubs swapped", "input", read(lambda parts: parts[:, [2, 3, 0, 1]])),
+    CampaignFault("forces read along axes of the road", "input", read(frame="inertial")),
+    CampaignFault("y turned round", "input", read(lambda parts: parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]))),
+    CampaignFault("moments left out", "input", read(lambda parts: parts * np.repeat([1.0, 0.0], 3))),
+    CampaignFault(
         "one force 1 % off",
         "input",
         read(lambda parts: parts * np.r_[1.01, np.ones(parts[0].size - 1)].reshape(parts[0].shape)),

@@ -16,7 +16,7 @@ from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import SensorArray, in_space, sensor_array
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 
 LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
@@ -215,19 +215,19 @@ def _second_scaled(read: np.ndarray) -> np.ndarray:
     return read * np.array([1.0, 1.01, 1.0, 1.0])[:, None]
 
 
-def _every_way(real: Any) -> Any:
-    return lambda load, levels: real(load, levels) + real(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
+def _every_way(original: Any) -> Any:
+    return lambda load, levels: original(load, levels) + original(-np.asarray(load), -np.asarray(levels)[::-1])[::-1]
 
 
 FAULTS = (
-    Fault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
-    Fault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
-    Fault(
+    CampaignFault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
+    CampaignFault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
+    CampaignFault(
         "deviation for variance",
         "noise",
         attribute("models.core.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5),
     ),
-    Fault(
+    CampaignFault(
         "stream begins anew at every call",
         "noise",
         attribute(
@@ -235,12 +235,12 @@ FAULTS = (
             lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
         ),
     ),
-    Fault(
+    CampaignFault(
         "residue counted as whole cycles", "counting", _change_rainflow(lambda own: (own[0], own[1], np.ceil(own[2])))
     ),
-    Fault("residue lost", "counting", _change_rainflow(lambda own: (own[0], own[1], np.floor(own[2])))),
-    Fault("amplitude for range", "counting", _change_rainflow(lambda own: (own[0] / 2.0, own[1], own[2]))),
-    Fault(
+    CampaignFault("residue lost", "counting", _change_rainflow(lambda own: (own[0], own[1], np.floor(own[2])))),
+    CampaignFault("amplitude for range", "counting", _change_rainflow(lambda own: (own[0] / 2.0, own[1], own[2]))),
+    CampaignFault(
         "pairs beyond a range, not from it on",
         "counting",
         attribute(
@@ -248,14 +248,16 @@ FAULTS = (
             lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)),
         ),
     ),
-    Fault("levels crossed either way", "counting", attribute("models.fatigue.counting:level_crossings", _every_way)),
-    Fault("kN taken for N", "units", _factor("kN", 1e-3)),
-    Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
-    Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
-    Fault("sign of one channel", "units", _factor("mm", -1.0)),
-    Fault("a sample late", "clock", _change_resampling(1.0)),
-    Fault("half a sample late", "clock", _change_resampling(0.5)),
-    Fault(
+    CampaignFault(
+        "levels crossed either way", "counting", attribute("models.fatigue.counting:level_crossings", _every_way)
+    ),
+    CampaignFault("kN taken for N", "units", _factor("kN", 1e-3)),
+    CampaignFault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
+    CampaignFault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
+    CampaignFault("sign of one channel", "units", _factor("mm", -1.0)),
+    CampaignFault("a sample late", "clock", _change_resampling(1.0)),
+    CampaignFault("half a sample late", "clock", _change_resampling(0.5)),
+    CampaignFault(
         "gaps bridged",
         "clock",
         attribute(
@@ -263,25 +265,27 @@ FAULTS = (
             lambda real: lambda times, *own: np.zeros(7, dtype=bool) if len(times) < 100 else real(times, *own),
         ),
     ),
-    Fault(
+    CampaignFault(
         "section forces in the inertial frame",
         "sections",
         attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)),
     ),
-    Fault(
+    CampaignFault(
         "body turned the other way",
         "sections",
         attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
     ),
-    Fault(
+    CampaignFault(
         "front and rear sections exchanged",
         "sections",
         attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
     ),
-    Fault("gravity turned round", "motion", attribute("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real)),
-    Fault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
-    Fault("one sensor 1 % off", "motion", _read(_second_scaled)),
-    Fault(
+    CampaignFault(
+        "gravity turned round", "motion", attribute("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real)
+    ),
+    CampaignFault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
+    CampaignFault("one sensor 1 % off", "motion", _read(_second_scaled)),
+    CampaignFault(
         "lever of the sensors left out",
         "motion",
         attribute(
@@ -289,12 +293,14 @@ FAULTS = (
             lambda real: lambda a, r, o, alpha, w, down: real(a, r, o, 0.0 * alpha, 0.0 * w, down),
         ),
     ),
-    Fault(
+    CampaignFault(
         "two-sided density for one-sided",
         "road",
         attribute("models.road.iso8608:SIDES", lambda real: {**real, "one-sided": 2.0}),
     ),
-    Fault("class D for C", "road", attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})),
+    CampaignFault(
+        "class D for C", "road", attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})
+    ),
 )
 
 WHAT = "noise, sensors, units, clocks, counting and roads"

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import rough_car
 from validation.spatial.native_builds import acceleration_error, random_states
@@ -34,9 +34,9 @@ CHECKS = {
 def _in_model(change: Callable[[Any], None]) -> Patch:
     """A change of MuJoCo's compiled model after its laws were written."""
 
-    def set_laws(real: Any) -> Any:
+    def set_laws(original: Any) -> Any:
         def written(model: Any, parts: Any) -> None:
-            real(model, parts)
+            original(model, parts)
             if parts:
                 change(model)
 
@@ -85,29 +85,29 @@ def _corner(model: Any) -> None:
 def _law(**factors: float) -> Patch:
     """Stiffness, damping or preload of the first of Exudyn's elements by a factor."""
 
-    def add_parts(real: Any) -> Any:
+    def add_parts(original: Any) -> Any:
         def added(built: Any, node: Any, parts: Any) -> None:
             first = parts[0].element
             changed = replace(first, **{name: factor * getattr(first, name) for name, factor in factors.items()})
-            real(built, node, (replace(parts[0], element=changed), *parts[1:]))
+            original(built, node, (replace(parts[0], element=changed), *parts[1:]))
 
         return added
 
     return attribute("models.engines.free_vehicle_exudyn:add_parts", add_parts)
 
 
-def _bar_factor(real: Any) -> Any:
+def _bar_factor(original: Any) -> Any:
     """The first coordinate of a bar counts 1 % more."""
 
     def add(self: Any, element: Any, travel: Any) -> None:
         first, *others = travel.factors
         scaled = replace(travel, factors=(1.01 * first, *others))
-        real(self, element, scaled if element.name.endswith("bar") else travel)
+        original(self, element, scaled if element.name.endswith("bar") else travel)
 
     return add
 
 
-def _in_space(real: Any) -> Any:
+def _in_space(original: Any) -> Any:
     """Mounts are measured along axes of the space: the connector hangs on the vehicle's tree."""
 
     def tree(self: Any, frame: str) -> Any:
@@ -117,18 +117,18 @@ def _in_space(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("a stiffness 1 % off", "MuJoCo", _scale("tendon_stiffness")),
-    Fault("a damping 1 % off", "MuJoCo", _scale("tendon_damping")),
-    Fault("a preload 1 % off", "MuJoCo", _scale("tendon_lengthspring")),
-    Fault("a bar's factor 1 % off", "MuJoCo", _in_model(_bar_tendon)),
-    Fault("a mount's axis fixed in the engine", "MuJoCo", _in_model(_swap_sites)),
-    Fault("a mount's preload 1 % off", "MuJoCo", _in_model(_mount_preload)),
-    Fault("a curve without its corner", "MuJoCo", _in_model(_corner)),
-    Fault("a stiffness 1 % off", "Exudyn", _law(stiffness=1.01)),
-    Fault("a damping 1 % off", "Exudyn", _law(damping=1.01)),
-    Fault("a preload 1 % off", "Exudyn", _law(held=1.01)),
-    Fault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:Coordinates.add", _bar_factor)),
-    Fault("mounts' axes fixed in the space", "Exudyn", attribute(f"{EXUDYN}:_Trees._tree", _in_space)),
+    CampaignFault("a stiffness 1 % off", "MuJoCo", _scale("tendon_stiffness")),
+    CampaignFault("a damping 1 % off", "MuJoCo", _scale("tendon_damping")),
+    CampaignFault("a preload 1 % off", "MuJoCo", _scale("tendon_lengthspring")),
+    CampaignFault("a bar's factor 1 % off", "MuJoCo", _in_model(_bar_tendon)),
+    CampaignFault("a mount's axis fixed in the engine", "MuJoCo", _in_model(_swap_sites)),
+    CampaignFault("a mount's preload 1 % off", "MuJoCo", _in_model(_mount_preload)),
+    CampaignFault("a curve without its corner", "MuJoCo", _in_model(_corner)),
+    CampaignFault("a stiffness 1 % off", "Exudyn", _law(stiffness=1.01)),
+    CampaignFault("a damping 1 % off", "Exudyn", _law(damping=1.01)),
+    CampaignFault("a preload 1 % off", "Exudyn", _law(held=1.01)),
+    CampaignFault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:Coordinates.add", _bar_factor)),
+    CampaignFault("mounts' axes fixed in the space", "Exudyn", attribute(f"{EXUDYN}:_Trees._tree", _in_space)),
 )
 
 CAMPAIGN = Campaign("planted.native", "springs of the engines' own", "drift", CHECKS, FAULTS)

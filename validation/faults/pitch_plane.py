@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from validation.common.rows import Drawn, Observed, Row, Saved, Table
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
-from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
+from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, EngineFault, planted
 
 TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
 DURATION = 0.1
@@ -22,7 +22,9 @@ HIDDEN = (
 
 
 def measure(
-    faults: Sequence[Fault] = FAULTS, clean: Sequence[Fault] = CLEAN, vehicles: Sequence[str] = (TWIN, SYMMETRIC)
+    faults: Sequence[EngineFault] = FAULTS,
+    clean: Sequence[EngineFault] = CLEAN,
+    vehicles: Sequence[str] = (TWIN, SYMMETRIC),
 ) -> Saved:
     """Records of engines without a fault and with each of some, on some vehicles, under every check."""
     benches = [Bench(name, DURATION) for name in vehicles]
@@ -32,7 +34,7 @@ def measure(
     }
 
 
-def _record(fault: Fault, benches: list[Bench]) -> Saved:
+def _record(fault: EngineFault, benches: list[Bench]) -> Saved:
     """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
     ratios = {
         bench.parameters: {
@@ -44,7 +46,7 @@ def _record(fault: Fault, benches: list[Bench]) -> Saved:
     return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
 
 
-def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
+def _ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
     check = CHECKS[name]
     ratio = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
     return ratio if math.isfinite(ratio) else None

@@ -30,7 +30,7 @@ def _as_asked(settings: Settings) -> Settings:
 
 
 @dataclass(frozen=True)
-class Fault:
+class EngineFault:
     """A fault in words, the engines it is planted in, and what it changes before or while they work."""
 
     name: str
@@ -62,7 +62,7 @@ class Planted:
         return self.model.plan()
 
 
-def planted(fault: Fault, engine: str) -> Make:
+def planted(fault: EngineFault, engine: str) -> Make:
     """The engine with the fault, as the checks take it."""
 
     def make(assembly: Assembly, settings: Settings) -> Planted:
@@ -79,112 +79,119 @@ def _euler(settings: Settings) -> Settings:
     return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
 
 
-CLEAN = (Fault("no fault", (*BOTH_ENGINES, *HAND)), Fault("no fault, equations interpreted", HAND, inside=rewritten()))
+CLEAN = (
+    EngineFault("no fault", (*BOTH_ENGINES, *HAND)),
+    EngineFault("no fault, equations interpreted", HAND, inside=rewritten()),
+)
 
 DESCRIPTION = (
-    Fault("a and b swapped", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
-    Fault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
-    Fault("front and rear suspension swapped", BOTH_ENGINES, change.swapped("suspension3", "suspension4")),
-    Fault("front and rear tyre swapped", BOTH_ENGINES, change.swapped("tyre1", "tyre2")),
-    Fault("front and rear wheel mass swapped", BOTH_ENGINES, change.bodies(change.swapped_wheel)),
-    Fault("mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.bodies(change.mixed_inertia)),
-    Fault("pitch inertia about the front axle", BOTH_ENGINES, change.inertia_about_axle),
-    Fault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened("suspension3", 1.01)),
-    Fault("front suspension in N/mm", BOTH_ENGINES, change.stiffened("suspension3", 1e-3)),
-    Fault("tyre damping dropped", BOTH_ENGINES, change.struts(change.undamped_tyre)),
-    Fault(
+    EngineFault("a and b swapped", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
+    EngineFault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
+    EngineFault("front and rear suspension swapped", BOTH_ENGINES, change.swapped("suspension3", "suspension4")),
+    EngineFault("front and rear tyre swapped", BOTH_ENGINES, change.swapped("tyre1", "tyre2")),
+    EngineFault("front and rear wheel mass swapped", BOTH_ENGINES, change.bodies(change.swapped_wheel)),
+    EngineFault("mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.bodies(change.mixed_inertia)),
+    EngineFault("pitch inertia about the front axle", BOTH_ENGINES, change.inertia_about_axle),
+    EngineFault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened("suspension3", 1.01)),
+    EngineFault("front suspension in N/mm", BOTH_ENGINES, change.stiffened("suspension3", 1e-3)),
+    EngineFault("tyre damping dropped", BOTH_ENGINES, change.struts(change.undamped_tyre)),
+    EngineFault(
         "linear geometry where exact was asked for",
         BOTH_ENGINES,
         change.vehicle(lambda v: replace(v, geometry="linear")),
     ),
-    Fault("gravity upward", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
-    Fault("gravity 9.80665 for 9.81", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=9.80665))),
-    Fault("start from zero heave", BOTH_ENGINES, change.unstressed_start),
-    Fault("dead band missing", BOTH_ENGINES, change.springs(lambda spring: replace(spring, dead_band=0.0))),
-    Fault(
+    EngineFault("gravity upward", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
+    EngineFault("gravity 9.80665 for 9.81", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=9.80665))),
+    EngineFault("start from zero heave", BOTH_ENGINES, change.unstressed_start),
+    EngineFault("dead band missing", BOTH_ENGINES, change.springs(lambda spring: replace(spring, dead_band=0.0))),
+    EngineFault(
         "dead band counted as a width", BOTH_ENGINES, change.springs(lambda s: replace(s, dead_band=s.dead_band / 2))
     ),
 )
 """In the description that an engine is built from."""
 
 INPUT = (
-    Fault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
-    Fault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
-    Fault("road held at the middle stages", BOTH_ENGINES, change.driven(("road",), change.HeldStages)),
-    Fault("rear wheel ahead of the front one", BOTH_ENGINES, change.road(wheelbase=-1.0)),
-    Fault("rear delay missing", BOTH_ENGINES, change.road(wheelbase=0.0)),
-    Fault("speed in km/h", BOTH_ENGINES, change.road(speed=3.6)),
-    Fault("rate of the road missing", BOTH_ENGINES, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
-    Fault("left track instead of the mean", BOTH_ENGINES, change.driven(("road",), change.OtherTrack)),
-    Fault("wheel forces in kN", BOTH_ENGINES, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
-    Fault("wheel forces with the other sign", BOTH_ENGINES, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))),
-    Fault("front wheel force at both wheels", BOTH_ENGINES, change.channels(FORCES, change.front_twice)),
-    Fault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed),
-    Fault(
+    EngineFault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
+    EngineFault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
+    EngineFault("road held at the middle stages", BOTH_ENGINES, change.driven(("road",), change.HeldStages)),
+    EngineFault("rear wheel ahead of the front one", BOTH_ENGINES, change.road(wheelbase=-1.0)),
+    EngineFault("rear delay missing", BOTH_ENGINES, change.road(wheelbase=0.0)),
+    EngineFault("speed in km/h", BOTH_ENGINES, change.road(speed=3.6)),
+    EngineFault("rate of the road missing", BOTH_ENGINES, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
+    EngineFault("left track instead of the mean", BOTH_ENGINES, change.driven(("road",), change.OtherTrack)),
+    EngineFault("wheel forces in kN", BOTH_ENGINES, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
+    EngineFault(
+        "wheel forces with the other sign", BOTH_ENGINES, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))
+    ),
+    EngineFault("front wheel force at both wheels", BOTH_ENGINES, change.channels(FORCES, change.front_twice)),
+    EngineFault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed),
+    EngineFault(
         "prescribed pitch in degrees",
         BOTH_ENGINES,
         change.channels(("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi))),
     ),
-    Fault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
-    Fault("rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))),
-    Fault(
+    EngineFault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
+    EngineFault(
+        "rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))
+    ),
+    EngineFault(
         "prescribed heave upward",
         BOTH_ENGINES,
         change.channels(("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0))),
     ),
-    Fault("added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.times({0: -1.0}))),
-    Fault("added moment half a sample late", BOTH_ENGINES, change.moment(0.5)),
-    Fault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_euler),
+    EngineFault("added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.times({0: -1.0}))),
+    EngineFault("added moment half a sample late", BOTH_ENGINES, change.moment(0.5)),
+    EngineFault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_euler),
 )
 """In the input or the settings that an engine is run with."""
 
 ADAPTER = (
-    Fault(
+    EngineFault(
         "held sample of the step's end",
         EXUDYN,
-        inside=attribute("models.engines.exudyn:Clock.advance", patches.index_of_the_end),
+        inside=attribute("models.engines.exudyn:SignalClock.advance", patches.index_of_the_end),
     ),
-    Fault(
+    EngineFault(
         "time cut off instead of rounded",
         EXUDYN,
-        inside=attribute("models.engines.exudyn:Clock.reader", patches.truncated_time),
+        inside=attribute("models.engines.exudyn:SignalClock.reader", patches.truncated_time),
     ),
-    Fault(
+    EngineFault(
         "constraint starts without its acceleration",
         EXUDYN,
         inside=attribute("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
     ),
-    Fault(
+    EngineFault(
         "enforced moment with the other sign",
         EXUDYN,
         inside=attribute("models.engines.exudyn:ExudynModel._enforced", patches.negative),
     ),
-    Fault(
+    EngineFault(
         "gravity missing on one wheel",
         MUJOCO,
         inside=attribute("models.engines.mujoco:specification", patches.weightless_wheel),
     ),
-    Fault(
+    EngineFault(
         "strut measured along the rotating body",
         MUJOCO,
         inside=attribute("models.engines.mujoco:_suspension", patches.turning_reference),
     ),
-    Fault(
+    EngineFault(
         "chassis row of eq. (39) with the other sign",
         MUJOCO,
         inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row),
     ),
-    Fault(
+    EngineFault(
         "callback never installed", MUJOCO, inside=attribute("models.engines.mujoco:installed", patches.not_installed)
     ),
 )
 """In the code of an engine's adapter."""
 
 EQUATIONS = (
-    Fault("cos(pitch) missing in the moment", HAND, inside=rewritten(newton_euler=patches.moment_without_cosine)),
-    Fault("cos(pitch) missing in the damper", HAND, inside=rewritten(suspension=patches.damper_without_cosine)),
-    Fault("forces from the state before", HAND, inside=rewritten(suspension=patches.stale_state)),
-    Fault("no reaction on the front wheel", HAND, inside=rewritten(newton_euler=patches.no_reaction)),
+    EngineFault("cos(pitch) missing in the moment", HAND, inside=rewritten(newton_euler=patches.moment_without_cosine)),
+    EngineFault("cos(pitch) missing in the damper", HAND, inside=rewritten(suspension=patches.damper_without_cosine)),
+    EngineFault("forces from the state before", HAND, inside=rewritten(suspension=patches.stale_state)),
+    EngineFault("no reaction on the front wheel", HAND, inside=rewritten(newton_euler=patches.no_reaction)),
 )
 """In the hand-written equations."""
 

@@ -16,9 +16,9 @@ from models.ride.weighting import WEIGHTINGS, weighting
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel, poles
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, poles
 from models.vehicles.spatial import SpatialVehicle
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 from validation.ride.rides import R19_FREQUENCIES, STANDARD, off
 
@@ -170,25 +170,25 @@ def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
     return attribute("models.ride.excited:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed))
 
 
-def _reversed(real: Any) -> Any:
+def _reversed(original: Any) -> Any:
     def hits(system: DelayedSystem) -> Any:
-        met = real(system)
+        met = original(system)
         delays = [met.delays[-1] - delay for delay in met.delays[::-1]]
         return met._replace(B=met.B[::-1], D=met.D[::-1], delays=delays)
 
     return hits
 
 
-def _on_front_track(real: Any) -> Any:
-    def row(wheel: Wheel, mean: Any, roll: Any, word: str, wheels: tuple[Wheel, ...]) -> Any:
+def _on_front_track(original: Any) -> Any:
+    def row(wheel: WheelPosition, mean: Any, roll: Any, word: str, wheels: tuple[WheelPosition, ...]) -> Any:
         y = np.copysign(abs(wheels[0].y), wheel.y)
-        return real(replace(wheel, y=y), mean, roll, word, wheels)
+        return original(replace(wheel, y=y), mean, roll, word, wheels)
 
     return row
 
 
-def _other_twist(real: Any) -> Any:
-    return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - real(motion, bar)
+def _other_twist(original: Any) -> Any:
+    return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - original(motion, bar)
 
 
 def _mirrored(vehicle: SpatialVehicle) -> SpatialVehicle:
@@ -208,13 +208,13 @@ def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:
     return replace(vehicle, bodies=tuple(replace(body, inertia=tensor(body.inertia)) for body in vehicle.bodies))
 
 
-def _wrong_wk(real: Any) -> Any:
-    return {**real, "Wk": weighting("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
+def _wrong_wk(original: Any) -> Any:
+    return {**original, "Wk": weighting("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
 
 
-def _lossy(real: Any) -> Any:
+def _lossy(original: Any) -> Any:
     def matrices(weighting: Any) -> Any:
-        A, B, C = real(weighting)
+        A, B, C = original(weighting)
         A = A.copy()
         A[5, 2:4] = 0.0  # what the third section hears of the second
         return A, B, C
@@ -223,31 +223,33 @@ def _lossy(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("rear axle ahead of the front one", "covariance", attribute("models.ride.covariance:hits", _reversed)),
-    Fault(
+    CampaignFault(
+        "rear axle ahead of the front one", "covariance", attribute("models.ride.covariance:hits", _reversed)
+    ),
+    CampaignFault(
         "cross terms of the axles missing",
         "covariance",
         attribute(
             "models.ride.covariance:_responses", lambda real: lambda A, met, moved: [np.zeros_like(b) for b in met.B]
         ),
     ),
-    Fault(
+    CampaignFault(
         "noise without the root of the speed",
         "road",
         _excited(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B))),
     ),
-    Fault(
+    CampaignFault(
         "noise with the speed, not its root",
         "road",
         _excited(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B))),
     ),
-    Fault(
+    CampaignFault(
         "delay by the speed in km/h",
         "road",
         _excited(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays))),
     ),
-    Fault("rear wheels on the front track", "road", attribute("models.road.two_track:_row", _on_front_track)),
-    Fault(
+    CampaignFault("rear wheels on the front track", "road", attribute("models.road.two_track:_row", _on_front_track)),
+    CampaignFault(
         "one-sided level taken for two-sided",
         "road",
         attribute(
@@ -255,16 +257,22 @@ FAULTS = (
             lambda real: lambda y, level=two_track.LEVEL, **own: real(y, 2.0 * level, **own),
         ),
     ),
-    Fault("a and b swapped", "vehicle", _vehicle(_mirrored)),
-    Fault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
-    Fault("sign of the anti-roll bar", "vehicle", attribute("models.vehicles.spatial_linear:_twist", _other_twist)),
-    Fault(
+    CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored)),
+    CampaignFault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
+    CampaignFault(
+        "sign of the anti-roll bar", "vehicle", attribute("models.vehicles.spatial_linear:_twist", _other_twist)
+    ),
+    CampaignFault(
         "tyre stiffness per axle for per wheel",
         "vehicle",
         _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres))),
     ),
-    Fault("Wk: upward step turned round", "weighting", attribute("validation.faults.ride:WEIGHTINGS", _wrong_wk)),
-    Fault("Wk: a section hears too little", "weighting", attribute("models.ride.weighting:Weighting.matrices", _lossy)),
+    CampaignFault(
+        "Wk: upward step turned round", "weighting", attribute("validation.faults.ride:WEIGHTINGS", _wrong_wk)
+    ),
+    CampaignFault(
+        "Wk: a section hears too little", "weighting", attribute("models.ride.weighting:Weighting.matrices", _lossy)
+    ),
 )
 
 

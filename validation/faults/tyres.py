@@ -11,7 +11,7 @@ from models.systems.handling.energy import bodies_energy
 from models.systems.handling.run import build
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import cornering_error, mirrored
 
@@ -67,7 +67,7 @@ def _balance() -> float:
 
 
 def _sliding() -> float:
-    """Locked wheels: their force beside mu N against the sliding."""
+    """Check of locked wheels: deviation of their force from mu N against the sliding velocity."""
     car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
     report, _ = _read(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
@@ -92,15 +92,15 @@ CHECKS = {
 ALL_WHEELS = (0, 1, 2, 3)
 
 
-def tyre(column: int, factor: float, which: tuple[int, ...] = (0,), more: float = 0.0) -> Patch:
-    """One number of tyres by a factor and something more in the table."""
+def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), offset: float = 0.0) -> Patch:
+    """Fault: a number of the tyres is multiplied by a factor and shifted by an offset in the table."""
 
-    def table(real: Any) -> Any:
+    def table(original: Any) -> Any:
         def made(car: Handling) -> np.ndarray:
-            numbers: np.ndarray = real(car)
-            for i in which:
+            numbers: np.ndarray = original(car)
+            for i in index:
                 place = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
-                numbers[place] = factor * numbers[place] + more
+                numbers[place] = factor * numbers[place] + offset
             return numbers
 
         return made
@@ -109,14 +109,14 @@ def tyre(column: int, factor: float, which: tuple[int, ...] = (0,), more: float 
 
 
 FAULTS = tuple(
-    Fault(name, "tyre", patch)
+    CampaignFault(name, "tyre", patch)
     for name, patch in (
         ("bristles of one tyre 1 % stiffer", tyre(at.BRISTLES, 1.01)),
         ("bristles of all tyres 1 % stiffer", tyre(at.BRISTLES, 1.01, ALL_WHEELS)),
         ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL_WHEELS)),
         ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
         ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
-        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, more=9e-3)),
+        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, offset=9e-3)),
     )
 )
 

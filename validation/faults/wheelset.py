@@ -19,7 +19,7 @@ from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.wheelset import CHOSEN
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
 Law = Literal["linear", "fastsim"]
@@ -148,9 +148,9 @@ def written(**functions: Any) -> Patch:
 def after(change: Callable[..., None]) -> Patch:
     """The rates changed after they were found: change(state, body, rates)."""
 
-    def with_change(real: Any) -> Any:
+    def with_change(original: Any) -> Any:
         def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
-            real(state, speed, body, *rest)
+            original(state, speed, body, *rest)
             change(state, eq.Body(*body), rest[-2])
 
         return rates
@@ -179,16 +179,16 @@ def touching(change: Callable[[Any], None]) -> Patch:
     return written(contact_points=contact_points)
 
 
-def times(name: str, factor: float, which: int = 0) -> Callable[..., None]:
+def times(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
     """Multiply a field of one of the arrays."""
 
     def change(*arrays: Any) -> None:
-        arrays[which][name] *= factor
+        arrays[field_index][name] *= factor
 
     return change
 
 
-spin_reversed = times("turn", -1.0, which=1)
+spin_reversed = times("turn", -1.0, field_index=1)
 
 
 def _shared(contacts: Any, slip: Any) -> None:
@@ -219,27 +219,27 @@ def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
     rates[eq.ROLL_RATE] -= body.along * state[eq.SPIN] / body.across * state[eq.YAW_RATE]
 
 
-def _damped_twice(real: Any) -> Any:
+def _damped_twice(original: Any) -> Any:
     def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
         given = eq.Body(*body)
         x, y, z = given.damping
-        real(state, speed, tuple(given._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *rest)
+        original(state, speed, tuple(given._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *rest)
 
     return rates
 
 
 FAULTS = (
-    Fault("sign of the spin creepage", "creep law", creeping(spin_reversed)),
-    Fault("sign of the spin moment", "creep law", written(creep=_turned_back)),
-    Fault("creepage by a speed 2 % off", "creep law", creeping(lambda contacts, slip: None, 1.02)),
-    Fault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
-    Fault("friction 1 % off", "creep law", creeping(times("mu", 1.01))),
-    Fault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
-    Fault("normal leans the other way", "contact", touching(times("n_y", -1.0))),
-    Fault("arm of the contact forces 1 % off", "contact", touching(times("z", 1.01))),
-    Fault("no gyroscopic moments", "body", after(_no_gyroscope)),
-    Fault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
-    Fault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),
+    CampaignFault("sign of the spin creepage", "creep law", creeping(spin_reversed)),
+    CampaignFault("sign of the spin moment", "creep law", written(creep=_turned_back)),
+    CampaignFault("creepage by a speed 2 % off", "creep law", creeping(lambda contacts, slip: None, 1.02)),
+    CampaignFault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
+    CampaignFault("friction 1 % off", "creep law", creeping(times("mu", 1.01))),
+    CampaignFault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
+    CampaignFault("normal leans the other way", "contact", touching(times("n_y", -1.0))),
+    CampaignFault("arm of the contact forces 1 % off", "contact", touching(times("z", 1.01))),
+    CampaignFault("no gyroscopic moments", "body", after(_no_gyroscope)),
+    CampaignFault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
+    CampaignFault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),
 )
 
 CAMPAIGN = Campaign("planted.wheelset", "a wheelset", "rolling-vehicle", CHECKS, FAULTS)

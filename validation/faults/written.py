@@ -20,7 +20,7 @@ from models.systems.handling.run import REFERENCE, build
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
 from validation.common.checks import largest_relative_difference
-from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute
 from validation.faults.tyres import ALL_WHEELS, tyre
 from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_input_sets, rolling_cars, rolling_states
@@ -61,9 +61,9 @@ CHECKS = {
 def _preload(module: str) -> Patch:
     """One spring bears 1 % more at rest."""
 
-    def changed(real: Any) -> Any:
+    def changed(original: Any) -> Any:
         def made(vehicle: SpatialVehicle) -> Preloads:
-            parts, tyres = real(vehicle)
+            parts, tyres = original(vehicle)
             first = max(parts, key=lambda name: abs(parts[name]))
             return Preloads(parts | {first: 1.01 * parts[first]}, tyres)
 
@@ -72,11 +72,11 @@ def _preload(module: str) -> Patch:
     return attribute(f"{module}:preloads", changed)
 
 
-def _waves(real: Any) -> Any:
+def _waves(original: Any) -> Any:
     """The first wave of the road is 1 % higher in the table."""
 
     def made(car: Any) -> np.ndarray:
-        numbers: np.ndarray = real(car)
+        numbers: np.ndarray = original(car)
         first = int(numbers[at.OF_WAVES])
         numbers[first + 2 : first + 4] *= 1.01
         return numbers
@@ -84,13 +84,13 @@ def _waves(real: Any) -> Any:
     return made
 
 
-def _sample(real: Any) -> Any:
+def _sample(original: Any) -> Any:
     """A road is read 0.1 mm higher under the first hub."""
 
     def made(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
         hubs = hub_inputs.hubs.copy()
         hubs[:, 0] += 1e-4
-        return np.asarray(real(vehicle, replace(hub_inputs, hubs=hubs), step))
+        return np.asarray(original(vehicle, replace(hub_inputs, hubs=hubs), step))
 
     return made
 
@@ -98,9 +98,9 @@ def _sample(real: Any) -> Any:
 def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[Any], Any]:
     """A column of the table's tyres or parts, which tells what is towed, is 0 of all of them."""
 
-    def changed(real: Any) -> Any:
+    def changed(original: Any) -> Any:
         def made(car: Any) -> np.ndarray:
-            numbers: np.ndarray = real(car)
+            numbers: np.ndarray = original(car)
             first = int(numbers[section])
             rows = numbers[first : first + int(numbers[count]) * per_row].reshape(-1, per_row)
             rows[:, column] = 0.0
@@ -111,11 +111,11 @@ def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[
     return changed
 
 
-def _stiff_bars(real: Any) -> Any:
+def _stiff_bars(original: Any) -> Any:
     """Bars of a car on tyres are 1 % stiffer."""
 
     def made(*arguments: Any) -> Iterator[Any]:
-        for row, curves in real(*arguments):
+        for row, curves in original(*arguments):
             yield [1.01 * row[0], *row[1:]], curves
 
     return made
@@ -124,9 +124,9 @@ def _stiff_bars(real: Any) -> Any:
 def _swapped(first: int, second: int) -> Callable[[Any], Any]:
     """Two numbers of a row of the table change places."""
 
-    def changed(real: Any) -> Any:
+    def changed(original: Any) -> Any:
         def made(*arguments: Any) -> list[float]:
-            row = list(real(*arguments))
+            row = list(original(*arguments))
             row[first], row[second] = row[second], row[first]
             return row
 
@@ -135,11 +135,11 @@ def _swapped(first: int, second: int) -> Callable[[Any], Any]:
     return changed
 
 
-def _turned_bar(real: Any) -> Any:
+def _turned_bar(original: Any) -> Any:
     """The bars of a cut car work the other way round: their axes are as long as the track's inverse."""
 
     def made(element: Any, joined: Any) -> list[float]:
-        row: list[float] = real(element, joined)
+        row: list[float] = original(element, joined)
         if not np.isclose(np.linalg.norm(element.axis), 1.0):
             row[cut_at.AXIS : cut_at.AXIS + 3] = [-value for value in row[cut_at.AXIS : cut_at.AXIS + 3]]
         return row
@@ -150,13 +150,13 @@ def _turned_bar(real: Any) -> Any:
 def _other_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
     """The heaviest body has another inertia in the engine."""
 
-    def changed(real: Any) -> Any:
+    def changed(original: Any) -> Any:
         def made(vehicle: SpatialVehicle, *others: Any) -> Any:
             heavy = max(vehicle.bodies, key=lambda body: body.mass)
             x, y, z = change(np.array(heavy.inertia)).tolist()
             other = replace(heavy, inertia=(tuple(x), tuple(y), tuple(z)))
             bodies = tuple(other if body is heavy else body for body in vehicle.bodies)
-            return real(replace(vehicle, bodies=bodies), *others)
+            return original(replace(vehicle, bodies=bodies), *others)
 
         return made
 
@@ -169,50 +169,50 @@ def _turned_products(inertia: np.ndarray) -> np.ndarray:
 
 TABLE, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
 FAULTS = (
-    Fault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL_WHEELS)),
-    Fault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
-    Fault("preload of a spring 1 % off, on tyres", "preload", _preload(TABLE)),
-    Fault("preload of a spring 1 % off, cut", "preload", _preload("models.vehicles.cut_vehicle")),
-    Fault("one wave of the road 1 % higher", "road", attribute(f"{TABLE}:table", _waves)),
-    Fault("road under one hub 0.1 mm higher", "road", attribute("models.engines.cut_vehicle:table", _sample)),
-    Fault(
+    CampaignFault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL_WHEELS)),
+    CampaignFault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
+    CampaignFault("preload of a spring 1 % off, on tyres", "preload", _preload(TABLE)),
+    CampaignFault("preload of a spring 1 % off, cut", "preload", _preload("models.vehicles.cut_vehicle")),
+    CampaignFault("one wave of the road 1 % higher", "road", attribute(f"{TABLE}:table", _waves)),
+    CampaignFault("road under one hub 0.1 mm higher", "road", attribute("models.engines.cut_vehicle:table", _sample)),
+    CampaignFault(
         "axes of springs fixed in space",
         "frame",
         attribute("models.multibody.plain.parts:frame_of", lambda real: lambda part, default: None),
     ),
-    Fault(
+    CampaignFault(
         "wheels of a trailer keep to the car's heading",
         "towing",
         attribute(f"{TABLE}:table", _of_towed(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
     ),
-    Fault(
+    CampaignFault(
         "springs of a trailer keep to the car's heading",
         "towing",
         attribute(f"{TABLE}:table", _of_towed(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
     ),
-    Fault("bars 1 % stiffer, on tyres", "bar", attribute(f"{TABLE}:_bars", _stiff_bars)),
-    Fault("a bar turned round, cut", "bar", attribute(f"{CUT_TABLE}:_element", _turned_bar)),
-    Fault(
+    CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute(f"{TABLE}:_bars", _stiff_bars)),
+    CampaignFault("a bar turned round, cut", "bar", attribute(f"{CUT_TABLE}:_element", _turned_bar)),
+    CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
         "inertia",
         attribute("models.systems.handling.run:Driven", _other_inertia(lambda inertia: 1.01 * inertia)),
     ),
-    Fault(
+    CampaignFault(
         "products of inertia with the other sign, cut",
         "inertia",
         attribute("models.engines.cut_vehicle:Driven", _other_inertia(_turned_products)),
     ),
-    Fault(
+    CampaignFault(
         "shares of brake and drive swapped in the table",
         "packing",
         attribute(f"{TABLE}:_tyre", _swapped(at.BRAKED, at.DRIVEN)),
     ),
-    Fault(
+    CampaignFault(
         "stiffness and damping swapped in the table, cut",
         "packing",
         attribute(f"{CUT_TABLE}:_element", _swapped(cut_at.STIFFNESS, cut_at.DAMPING)),
     ),
-    Fault(
+    CampaignFault(
         "cornering stiffness and roll steer swapped in the table, cut",
         "packing",
         attribute(f"{CUT_TABLE}:_hub", _swapped(cut_at.CORNERING, cut_at.ROLL_STEER)),

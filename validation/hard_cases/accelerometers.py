@@ -59,10 +59,10 @@ def _turning(states: np.ndarray) -> np.ndarray:
     return states[:, 7:] * [0.0, 1.0, 0.0]
 
 
-def _plain(places: dict[str, Any], felt: np.ndarray) -> np.ndarray:
+def _plain(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
     """Pitch acceleration by eq. (18) as printed, with numpy's pseudo-inverse and nothing checked."""
     positions = np.array(list(places.values()))
-    relative = np.swapaxes(felt - felt[:, -1:], 1, 2)[:, :, :-1]
+    relative = np.swapaxes(specific_forces - specific_forces[:, -1:], 1, 2)[:, :, :-1]
     m = relative @ np.linalg.pinv((positions[:-1] - positions[-1]).T)
     return 0.5 * (m[:, 0, 2] - m[:, 2, 0])
 

@@ -54,7 +54,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseOutcome:
     """Outcome of a hard case. word : how it ended; error : in the case's unit, None where there is no answer; message :
     what was said."""
 
@@ -63,12 +63,12 @@ class Outcome:
     message: str = ""
 
 
-def judge(case: Case, implementation: str, folder: Path) -> Outcome:
+def judge(case: Case, implementation: str, folder: Path) -> CaseOutcome:
     """Outcome of a case in one implementation; any error but the project's own passes through."""
     try:
         error = float(case.error(implementation, folder))
     except InputError as refusal:
-        return Outcome("refused", message=str(refusal))
+        return CaseOutcome("refused", message=str(refusal))
     except RunFailed as failure:
-        return Outcome("raised", message=str(failure))
-    return Outcome("right" if error <= case.tolerance else "SILENT", error)
+        return CaseOutcome("raised", message=str(failure))
+    return CaseOutcome("right" if error <= case.tolerance else "SILENT", error)

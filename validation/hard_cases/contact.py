@@ -11,10 +11,10 @@ from models.contact import hertz
 from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.linear_theory import forces
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from validation.hard_cases.case import Case
 
-PAIR = Pair()
+PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from models.contact import hertz
 from models.contact.fastsim import March, RollingEllipse, fastsim
 from models.contact.linear_theory import forces
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 
-PAIR = Pair()
+PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 SMALL_CREEPAGE = 1e-7
 CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
@@ -73,10 +73,10 @@ def only_spin(implementation: str, folder: Path) -> float:
     return max(abs(float(small.fy) / wanted - 1.0), float(np.abs(large.fx).max()) / (MU * LOAD))
 
 
-def _balls(apart: float, load: float, cells: tuple[int, int] = (41, 101)) -> NormalSolution:
+def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 101)) -> NormalSolution:
     """Two balls side by side, their centres so far apart (m)."""
     y, x = (centres(n, CELL) for n in cells)
-    away = np.minimum((x - apart / 2) ** 2, (x + apart / 2) ** 2) + y[:, None] ** 2
+    away = np.minimum((x - centre_distance / 2) ** 2, (x + centre_distance / 2) ** 2) + y[:, None] ** 2
     return solve_normal(away / (2.0 * RADIUS), CELL, CELL, PAIR, load=load)
 
 

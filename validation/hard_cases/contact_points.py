@@ -57,7 +57,7 @@ def step_answer_naive(folder: Path) -> str:
 
 
 def linear_load(engine: str, folder: Path) -> float:
-    """A ramp of 1 kN in 20 ms: the compression lags by exactly what has not arrived."""
+    """A load ramp of 1 kN in 20 ms, whose compression must lag by exactly the closed form."""
     return max(_ramp_error(engine, step, IMPLICIT[engine]) for step in (1e-3, 5e-3, 2e-2))
 
 

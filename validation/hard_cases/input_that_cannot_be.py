@@ -82,12 +82,12 @@ def _vehicle(change: dict[str, float], _: str, folder: Path) -> float:
     return float(not plausible_plane(TWIN.model_copy(update=change)))
 
 
-def _case(name: str, error: Callable[[str, Path], float], wanted: Word, said: str) -> Case:
-    expected: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, wanted) if wanted != "right" else {}
+def _case(name: str, error: Callable[[str, Path], float], expected_ending: Word, message: str) -> Case:
+    expected: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, expected_ending) if expected_ending != "right" else {}
     return Case(
         name,
         "engines run it without a word",
-        said,
+        message,
         "unnamed",
         0.0,
         "it is named or it is not",

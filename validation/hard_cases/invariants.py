@@ -45,7 +45,7 @@ def rest_naive(folder: Path) -> str:
 
 
 def loads_at_rest(engine: str, folder: Path) -> float:
-    """Tyre loads of the vehicle at rest: half of (750 + 30) kg each, and by the lever for the twin."""
+    """Tyre loads of the vehicle at rest: half of (750 + 30) kg each; for the asymmetric vehicle by its lever arms."""
     worst = 0.0
     for parameters in VEHICLES:
         base = vehicle(parameters)
@@ -72,7 +72,8 @@ def nose_up(engine: str, folder: Path) -> float:
 
 
 def push(engine: str, folder: Path) -> float:
-    """Each wheel pushed up by 100 N beside the loads that carry it: the accelerations, whole, against 100 N / mass."""
+    """Error of the accelerations where each wheel is pushed up by 100 N in addition to its static load, against 100 N /
+    mass."""
     base = vehicle("asymmetric_twin")
     p, worst = base.parameters, 0.0
     for wheel, mass in enumerate((p.m1, p.m2)):

@@ -117,7 +117,7 @@ def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def stiff_process_noise(engine: str, folder: Path) -> float:
-    """Process noise of forces sampled at 10 Hz beside a pole of -697 1/s."""
+    """Process noise of a filter whose forces are sampled at 10 Hz, for a vehicle with a pole at -697 1/s."""
     base = vehicle(geometry="linear")
     forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
     step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)

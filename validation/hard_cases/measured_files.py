@@ -8,7 +8,7 @@ from models.measured.formats.mdf4 import opened as mdf4_opened
 from models.measured.formats.tdms import Bounded, opened
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
-from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, Odd, raw
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, raw
 
 CHECKS = {
     "right": "times, values and names as they were written",
@@ -46,7 +46,7 @@ NAIVE = {
 }
 
 
-def of_file(odd: Odd) -> Case:
+def of_file(odd: OddFile) -> Case:
     """The hard case of one file."""
     return Case(
         name=odd.name,

@@ -13,7 +13,7 @@ import xarray as xr
 
 from models.contact.accuracy import rolled
 from models.contact.hertz import by_axes
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.contact.profiles import profile
 from models.contact.standard_profiles import built_in
 from models.contact.theories import ExactOnEllipse, Fastsim
@@ -72,7 +72,7 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
     """A case of an ellipse under spin: FASTSIM's distance from the exact theory by the error that it states."""
 
     def error(implementation: str, folder: Path) -> float:
-        pair = Pair()
+        pair = MaterialPair()
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
         (fast, told), (exact, rest) = (

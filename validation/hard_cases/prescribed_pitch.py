@@ -78,15 +78,15 @@ def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
     return moment
 
 
-def moment_error(path: Trajectory, wanted: np.ndarray) -> float:
+def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
     """Rms difference of the enforced moment in N m, from 20 ms on.
 
     Before, generalised-alpha forgets that its start has the right acceleration but not the right change of
     it: 6 N m that shrink by 0.6 per step, which the enforced-moment case shows on its own.
     """
     assert path.moment is not None
-    every = (len(path.moment) - 1) // (len(wanted) - 1)
-    return rms((path.moment[::every] - wanted)[20:])
+    every = (len(path.moment) - 1) // (len(exact_moment) - 1)
+    return rms((path.moment[::every] - exact_moment)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
@@ -209,7 +209,7 @@ class Straight:
 
     @property
     def resolution(self) -> float:
-        """The sampling period (s)."""
+        """Sampling period (s) of the prescribed pitch."""
         return self.period
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:

@@ -41,7 +41,8 @@ WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
 
 
 def asked_again(engine: str, folder: Path) -> float:
-    """Largest difference of accelerations asked forwards, backwards and twice, noise of 800 N on the samples."""
+    """Largest difference of accelerations evaluated forwards, backwards and twice in time, with noise of 800 N on the
+    samples."""
     base = setups.vehicle("asymmetric_twin")
     forces = static_forces(base, 200, 1e-3, noise=800.0)
     model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))

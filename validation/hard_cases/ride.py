@@ -1,4 +1,5 @@
-"""Ride: roads without a variance, motions that nothing pulls back or holds, rates many decades apart, bad vehicles.
+"""Ride: roads without a finite variance, motions without stiffness or damping, eigenvalues many decades apart, invalid
+vehicles.
 
 Where an implementation takes part, the linear vehicle is its own; the covariance behind it is the same for all.
 """

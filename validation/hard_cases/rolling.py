@@ -43,8 +43,7 @@ def displaced_state(equations: Equations, **values: float) -> np.ndarray:
 
 
 def beyond_friction(motion: Motion, mu: float) -> float:
-    """Largest tangential force divided by mu N less 1, or infinity for one that has power or is there without a
-    bound."""
+    """Largest tangential force / (mu N) - 1; infinite for a force that adds energy, or that acts at zero friction."""
     force = np.hypot(motion.contacts["fx"], motion.contacts["fy"])
     bound = mu * motion.contacts["load"]
     if motion.contacts["power"].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
@@ -205,17 +204,17 @@ def ran(
     *,
     duration: float = 0.01,
     step: float = STEP,
-    every: int = 1,
+    stride: int = 1,
     speed: float = 40.0,
     **moved: float,
 ) -> Motion:
     """A run from a state that is off rest."""
     wheelset = built_wheelset(implementation, speed=speed)
-    return wheelset.run(displaced_state(wheelset, **moved), duration, step, every)
+    return wheelset.run(displaced_state(wheelset, **moved), duration, step, stride)
 
 
 def fails(implementation: str, folder: Path, **moved: Any) -> float:
-    """A case that fails, and says when: in its first half."""
+    """A hard case whose run must fail within its first half, with the time in the message."""
     try:
         ran(implementation, duration=0.1, **moved)
     except RunFailed as failure:
@@ -397,7 +396,7 @@ CASES = (
             ("spin that is infinite", "state[9]", partial(ran, SPIN=np.inf)),
             ("duration between two steps on rails", "duration", partial(ran, duration=0.0013)),
             ("wheelset that runs for no time", "duration", partial(ran, duration=0.0)),
-            ("every third of twenty steps", "every", partial(ran, every=3)),
+            ("every third of twenty steps", "every", partial(ran, stride=3)),
             ("wheelset at 300 m/s", "speed", partial(ran, speed=300.0)),
             ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=np.nan)),
             ("strips of two cells", "cells", lambda name: built_wheelset(name, cells=2).rest),

@@ -106,7 +106,8 @@ def too_long(implementation: str, folder: Path) -> float:
 
 
 def jumping(implementation: str, folder: Path) -> float:
-    """Energy that the ledger of a wheelset leaves open while contacts come and go, by what creep took."""
+    """Error of the energy balance of a wheelset whose contacts open and close, relative to the energy dissipated by
+    creep."""
     equations = built_wheelset(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
     motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0

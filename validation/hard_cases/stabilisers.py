@@ -66,11 +66,11 @@ def kink_naive(folder: Path) -> str:
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
-def _limit_stop(built: exudyn_engine.Build, spring: PitchSpring) -> None:
-    state = built.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
-    built.mbs.AddObject(
+def _limit_stop(build: exudyn_engine.Build, spring: PitchSpring) -> None:
+    state = build.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
+    build.mbs.AddObject(
         items.CoordinateSpringDamperExt(
-            markerNumbers=[exudyn_engine.ground_marker(built.mbs), built.places[spring.body, "pitch"]],
+            markerNumbers=[exudyn_engine.ground_marker(build.mbs), build.places[spring.body, "pitch"]],
             nodeNumber=state,
             useLimitStops=True,
             limitStopsUpper=spring.dead_band,
@@ -109,7 +109,7 @@ def _moving_truth() -> Trajectory:
 
 
 def moving_moment_naive(folder: Path) -> str:
-    """The moment held like the forces that it stands beside."""
+    """Error with a stabilising moment that is constant over a sample, like the forces."""
     path = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
     return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
@@ -148,7 +148,7 @@ def _guided(engine: str, assembly: Assembly) -> Trajectory:
 
 
 def missing_mass(engine: str, folder: Path) -> float:
-    """A chassis that is 5 % too light: mean force, by 0.05 m3 (g - z3'')."""
+    """Mean stabilising force of a model whose chassis is 5 % too light, relative to 0.05 m3 (g - z3'')."""
     p, states = vehicle("asymmetric_twin").parameters, _free_motion()
     force = _guided(engine, on_rails(mass=0.95)).force
     assert force is not None

@@ -14,7 +14,7 @@ from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import Hold, SectionRun, run
+from models.systems.measured.section_run import AttitudeHold, SectionRun, run
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.common.peak_memory import peak_memory
@@ -87,12 +87,12 @@ def run_of(
     seconds: float,
     repeated: float = 20.0,
     engine: str = "mujoco",
-    hold: Hold | None = None,
+    hold: AttitudeHold | None = None,
     step: float | None = None,
 ) -> SectionRun:
     """A run of a recording in this folder, which is made unless it is there."""
     recording = recorded(seconds, folder / "recording.f64", repeated)
-    return SectionRun(r19(), recording, sections(), engine, hold or Hold(), step)
+    return SectionRun(r19(), recording, sections(), engine, hold or AttitudeHold(), step)
 
 
 def answers_of(folder: Path, name: str = "run") -> bytes:

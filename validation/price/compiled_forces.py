@@ -1,4 +1,4 @@
-"""The vehicle in MuJoCo with every force in one compiled callback, beside the adapter's native springs.
+"""The vehicle in MuJoCo with every force in one compiled callback, compared with native springs.
 
 Written once more from eqs (35) and (36): an independent route, and the price of compiled callbacks.
 """

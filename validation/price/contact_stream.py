@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.ensemble.workers import processes
 from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built
@@ -26,7 +26,7 @@ HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
 
 
 class Taken(NamedTuple):
-    """Largest memory (bytes) of the process that answered, and seconds."""
+    """Peak memory (bytes) and computing time (s) of the process that computed the contacts."""
 
     memory: int
     seconds: float
@@ -46,7 +46,7 @@ def answered(folder: Path, rows: int) -> Taken:
     write(folder / "cases.csv", rows)
     begun = time.perf_counter()
     counts = answer_table(
-        folder / "cases.csv", folder / "forces.csv", partial(Built, Pair()), Method(cells=5), errors=False
+        folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
     )
     if counts != {"rows": rows, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {rows} sound rows")

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from models.advice.price.runner import Measured, Point
+from models.advice.price.runner import MeasuredPoints, Point
 from models.drawing.figures import (
     BAD,
     BLUE,
@@ -59,32 +59,32 @@ CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.lin
 """Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
-def draw(measured: Measured) -> Figure:
+def draw(measured_points: MeasuredPoints) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
-    styles = _styles(measured)
-    top = 8 * max(measured.error(p) for p in measured.points if p.status == "ok")
-    rounds = max(len(p.seconds) for p in measured.points)
+    styles = _styles(measured_points)
+    top = 8 * max(measured_points.error(p) for p in measured_points.points if p.status == "ok")
+    rounds = max(len(p.seconds) for p in measured_points.points)
     several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
-    for ax, kind in zip(axes, measured.costs, strict=True):
-        _floor(ax, measured)
-        _front(ax, measured, kind)
-        for curve, points in measured.curves().items():
-            _curve(ax, measured, points, kind, styles[curve])
+    for ax, kind in zip(axes, measured_points.costs, strict=True):
+        _floor(ax, measured_points)
+        _front(ax, measured_points, kind)
+        for curve, points in measured_points.curves().items():
+            _curve(ax, measured_points, points, kind, styles[curve])
         timed = kind == "seconds"
         label = "time [s] of a run, model built anew (median)" if timed else f"{kind} in the run [-]"
         ax.set(xscale="log", yscale="log", xlabel=label)
         ax.set_title(wrapped(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * COLUMN_WIDTH, TITLE_TEXT))
-    _failures(axes[0], measured, top)
-    axes[0].set_ylabel(f"error of the {measured.quantity} [{measured.unit}]")
-    axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 15 * top)
-    for ax, kind in zip(axes, measured.costs, strict=True):
-        _defaults(ax, measured, kind)
-    alike = "; ".join(named(group[0], [group]) for group in measured.same())
-    heading(figure, f"What accuracy costs: {measured.title}")
+    _failures(axes[0], measured_points, top)
+    axes[0].set_ylabel(f"error of the {measured_points.quantity} [{measured_points.unit}]")
+    axes[0].set_ylim(0.3 * measured_points.uncertainty[measured_points.quantity], 15 * top)
+    for ax, kind in zip(axes, measured_points.costs, strict=True):
+        _defaults(ax, measured_points, kind)
+    alike = "; ".join(named(group[0], [group]) for group in measured_points.same())
+    heading(figure, f"What accuracy costs: {measured_points.title}")
     longest = max(map(len, map(named, styles)))
     figure.legend(
-        handles=_legend(measured, styles),
+        handles=_legend(measured_points, styles),
         loc="outside lower center",
         ncols=4 if longest <= LONGEST_LABEL else 3,
         fontsize=SMALL_TEXT,
@@ -97,11 +97,11 @@ def draw(measured: Measured) -> Figure:
     return figure
 
 
-def _styles(measured: Measured) -> dict[str, Style]:
+def _styles(measured_points: MeasuredPoints) -> dict[str, Style]:
     """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
     styles: dict[str, Style] = {}
-    for curve, (first, *_) in measured.curves().items():
-        setting, colour = first.setting, _colour(first, measured)
+    for curve, (first, *_) in measured_points.curves().items():
+        setting, colour = first.setting, _colour(first, measured_points)
         used = {style["marker"] for style in styles.values() if style["color"] == colour}
         marker = SHARED.get(setting.method) or next((m for m in MARKERS if m not in used), ".")
         line, size = STYLES.get(setting.order, "-"), SIZES.get(setting.engine, 5)
@@ -109,20 +109,20 @@ def _styles(measured: Measured) -> dict[str, Style]:
     return styles
 
 
-def _colour(point: Point, measured: Measured) -> str:
+def _colour(point: Point, measured_points: MeasuredPoints) -> str:
     """Colour of a point's implementation, or the next of FAMILY_COLOURS."""
     engine = point.setting.engine
-    others = [name for name in dict.fromkeys(p.setting.engine for p in measured.points) if name not in COLOURS]
+    others = [name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS]
     return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[others.index(engine) % len(FAMILY_COLOURS)]
 
 
-def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: Style) -> None:
+def _curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
     """One curve; points that the reference cannot judge are hollow."""
-    places = [(p.cost(kind), measured.error(p)) for p in points]
+    places = [(p.cost(kind), measured_points.error(p)) for p in points]
     ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     alike = defaultdict(list)
     for p, place in zip(points, places, strict=True):
-        alike[place[1] < measured.floor(), kind == "seconds" and p.changed is None].append(place)
+        alike[place[1] < measured_points.floor(), kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
         face = "white" if hollow else style["color"]
@@ -132,30 +132,30 @@ def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: 
             ax.plot(*place, **BROKEN)
 
 
-def _floor(ax: Axes, measured: Measured) -> None:
+def _floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     """The band in which the reference itself is not certain."""
-    known = measured.uncertainty[measured.quantity]
-    for low, high, alpha in ((1e-30, known, 0.6), (known, measured.floor(), 0.25)):
+    known = measured_points.uncertainty[measured_points.quantity]
+    for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
-    told = f"reference known to {known:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
+    told = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
     ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
-def _front(ax: Axes, measured: Measured, kind: str) -> None:
+def _front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
     """The settings that no other one beats, as a broad pale line behind the curves."""
-    front = measured.front(kind)
+    front = measured_points.front(kind)
     costs = [p.cost(kind) for p in front]
-    ax.plot(costs, list(map(measured.error, front)), **FRONT, solid_capstyle="round", zorder=1)
+    ax.plot(costs, list(map(measured_points.error, front)), **FRONT, solid_capstyle="round", zorder=1)
 
 
-def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
+def _defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
     """Ring and name each engine's default setting, where the panel is emptiest."""
     taken, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
-    for owner, p in measured.defaults.items():
+    for owner, p in measured_points.defaults.items():
         if p.status != "ok":
             continue
-        place = (p.cost(kind), measured.error(p))
+        place = (p.cost(kind), measured_points.error(p))
         ax.plot(*place, "o", **ring, zorder=5)
         around = _fractions_of_panel(ax, [place])[0]
         corner = _emptiest_corner(taken, around, names)
@@ -203,25 +203,25 @@ def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarr
     return np.asarray(CORNERS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
-def _failures(ax: Axes, measured: Measured, top: float) -> None:
+def _failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
     """A cross where each failed setting would have stood: stages times steps on the cost axis."""
-    failed = [p for p in measured.points if p.status != "ok"]
+    failed = [p for p in measured_points.points if p.status != "ok"]
     for p in failed:
-        if calls := _expected(p, measured):
+        if calls := _expected(p, measured_points):
             size = 1.4 * SIZES.get(p.setting.engine, 5)
-            ax.plot(calls, top, "x", color=_colour(p, measured), markersize=size, markeredgewidth=1.6)
+            ax.plot(calls, top, "x", color=_colour(p, measured_points), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
         text = wrapped(text, 0.42 * COLUMN_WIDTH, SMALL_TEXT)
         ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
-def _expected(p: Point, measured: Measured) -> float:
+def _expected(p: Point, measured_points: MeasuredPoints) -> float:
     """Expected cost of a failed setting, from its neighbours on the curve."""
-    work = measured.costs[0]
+    work = measured_points.costs[0]
     if p.counts:
         return p.cost(work)
-    first = next(iter(measured.curves().get(p.setting.curve, ())), None)
+    first = next(iter(measured_points.curves().get(p.setting.curve, ())), None)
     return 0.0 if first is None or p.setting.adaptive else first.cost(work) * first.setting.value / p.setting.value
 
 
@@ -241,14 +241,14 @@ def _who(failed: list[Point], status: str) -> str:
     return ", ".join(parts)
 
 
-def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
+def _legend(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
     """Handles of the legend: those of the curves first, then those of the other marks."""
     names = sorted(styles, key=named)
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
-    for text in dict.fromkeys(text for p in measured.points for text in p.broken):
+    for text in dict.fromkeys(text for p in measured_points.points for text in p.broken):
         handles.append(Line2D([], [], **BROKEN, label=fill(f"assumption broken: {text}", LONGEST_LABEL)))
-    if any(p.status != "ok" for p in measured.points):
+    if any(p.status != "ok" for p in measured_points.points):
         failed = "no answer to rely on"
         handles.append(Line2D([], [], color=GREY, marker="x", linestyle="none", label=failed))
     return handles

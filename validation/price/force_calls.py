@@ -22,7 +22,7 @@ def _counted_loads() -> Iterator[list[int]]:
 
     calls = [0]
 
-    class CountingClock(exudyn.Clock):
+    class CountingClock(exudyn.SignalClock):
         def reader(self, column: int, scale: float) -> Any:
             read = super().reader(column, scale)
             if column:

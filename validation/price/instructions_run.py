@@ -89,20 +89,20 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     return [lambda steps, method=method: march(method, steps) for method in methods]
 
 
-def main(given: dict[str, Any]) -> None:
+def main(settings: dict[str, Any]) -> None:
     """Every march once for warmth, then all of them in two copies of the process."""
-    law = law_of(given["damping"], given["stiffness"])
+    law = law_of(settings["damping"], settings["stiffness"])
     marches = [
         march
         for engine, make in (("exudyn", exudyn_marches), ("mujoco", mujoco_marches))
-        for march in make(given["masses"], law, given["methods"][engine])
+        for march in make(settings["masses"], law, settings["methods"][engine])
     ]
     gc.disable()
     for march in marches:
-        march(given["steps"][0])
+        march(settings["steps"][0])
     start_counting()
     for _ in range(2):
-        copied(marches, given["steps"])
+        copied(marches, settings["steps"])
 
 
 def start_counting() -> None:

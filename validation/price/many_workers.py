@@ -58,7 +58,7 @@ class Ensemble:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class WorkerShares:
     """Share of the time for which workers compute, and for which each station is busy; blocks per second."""
 
     workers: float
@@ -72,7 +72,7 @@ class Outcome:
         return max(shares, key=lambda name: shares[name])
 
 
-def simulated(ensemble: Ensemble, workers: int, blocks: int) -> Outcome:
+def simulated(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
     """A run of so many blocks by so many workers, from the first block that is sent to the last that is kept."""
     seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, SCATTER, blocks).clip(0.5, 1.5)
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
@@ -108,7 +108,7 @@ def simulated(ensemble: Ensemble, workers: int, blocks: int) -> Outcome:
             begun = waiting.pop(0)
             heappush(events, (now + float(seconds[begun]), next(order), "computed", begun))
     busy = {name: blocks * takes / now for name, takes in ensemble.stations.items()}
-    return Outcome(float(seconds.sum()) / (workers * now), busy, blocks / now)
+    return WorkerShares(float(seconds.sum()) / (workers * now), busy, blocks / now)
 
 
 SETTINGS = {
@@ -121,8 +121,8 @@ SETTINGS = {
 
 
 def table(rounds: int = 20) -> Iterator[str]:
-    """Rows of the table in the docs: share of the time for which workers compute, and what is busiest with the most of
-    them; rounds : blocks of each worker."""
+    """Rows of the table in the docs: share of time in which workers compute, and the busiest station at the largest
+    number of workers; rounds : blocks of each worker."""
     for name, ensemble in SETTINGS.items():
         outcomes = [simulated(ensemble, workers, rounds * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)

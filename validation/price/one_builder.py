@@ -146,7 +146,7 @@ def one_tree() -> Iterator[None]:
         yield
 
 
-def ratios(rounds: int, least: float) -> dict[str, tuple[float, float, float]]:
+def ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
     """Ratios of the processor's time of a run, by the builder of today, with their intervals."""
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
@@ -155,7 +155,7 @@ def ratios(rounds: int, least: float) -> dict[str, tuple[float, float, float]]:
             names.append(f"{system}, {engine}: the free builder to today's")
     with one_tree():
         jobs += [ride("exudyn").system.run]
-    seconds = interleave(jobs, rounds, least, clock=time.process_time)
+    seconds = interleave(jobs, rounds, minimum_seconds, clock=time.process_time)
     told = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
     return told | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
 

@@ -1,4 +1,4 @@
-"""What accuracy costs in ride: standard deviations of R19-ride by every route, error beside counts and seconds.
+"""Cost of accuracy in ride: standard deviations of R19-ride by every method, their errors over counts and seconds.
 
 All routes take the same linear vehicle on the paper's road at one speed. The reference is the quadrature that halves
 its panels until nothing changes, an integral over frequencies with the delay in closed form; it knows its own error.
@@ -97,15 +97,19 @@ def fast(ride: PricedRide, count: int) -> np.ndarray:
     return sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
-def grid(ride: PricedRide, count: int, last: float, even: bool = False) -> np.ndarray:
-    """Standard deviations by the trapezoidal rule on a grid of frequencies up to ``last`` (Hz), in their logarithm or
-    evenly."""
-    frequency = np.linspace(last / count, last, count) if even else np.geomspace(LOWEST, last, count)
+def grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = False) -> np.ndarray:
+    """Standard deviations by the trapezoidal rule on a grid up to ``highest_frequency`` (Hz), evenly spaced in the
+    frequency or in its logarithm."""
+    frequency = (
+        np.linspace(highest_frequency / count, highest_frequency, count)
+        if even
+        else np.geomspace(LOWEST, highest_frequency, count)
+    )
     omega = 2 * np.pi * frequency
     return np.sqrt(2 * np.trapezoid(spectra(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
 
 
-def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, rounds: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
     """All routes; counts and errors are judged, seconds are not."""
     ride = problem()
     swept = 3 if quick else SWEPT
@@ -125,7 +129,7 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
         name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - begun
         points.append(RoutePoint(name, "copies", copies, errors, seconds, z))
     few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
-    for i, times in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True):
+    for i, times in zip(few, interleave([jobs[i] for i in few], rounds, minimum_seconds), strict=True):
         points[i] = replace(points[i], seconds=float(np.median(times)))
     points[1] = replace(points[1], seconds=points[1].seconds / (5 * swept))  # of the sweep a point
     return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}

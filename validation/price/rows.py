@@ -1,8 +1,8 @@
 """Rows that every work-precision problem answers for."""
 
-from models.advice.price.curves import Reach
+from models.advice.price.curves import ToleranceCost
 from models.advice.price.problem import Problem, Setting
-from models.advice.price.runner import Measured, Point, attempt, cheapest
+from models.advice.price.runner import MeasuredPoints, Point, attempt, cheapest
 from validation.common.rows import Observed, Row, System
 from validation.price.tables import named
 
@@ -18,22 +18,23 @@ PROMISE = 1.25
 """Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
 
 
-def rows_of(problem: Problem, measured: Measured, quick: bool) -> list[Row]:
+def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> list[Row]:
     """All rows of one problem; the width of the sweep is asked of the full run only."""
-    points, repeated = measured.points, [p for p in measured.points if p.changed is not None]
+    points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
     return [
-        _reference(problem, measured),
-        *_orders(measured),
+        _reference(problem, measured_points),
+        *_orders(measured_points),
         _none_of(
             f"price.{problem.key}.silent",
             f"wrong answers without a word, of {len(points)} settings",
             [_label(p) for p in points if p.status == "SILENT"],
-            f"an error that is not finite, or beyond {problem.bound:.3g} {measured.unit}, must come with an exception",
+            f"an error that is not finite, or beyond {problem.bound:.3g} {measured_points.unit}, "
+            "must come with an exception",
         ),
         _none_of(
             f"price.{problem.key}.counts.said",
             "settings whose force calls are not stages times steps",
-            measured.miscounted(),
+            measured_points.miscounted(),
             "exact: stages from the methods' tableaux",
         ),
         _none_of(
@@ -42,9 +43,9 @@ def rows_of(problem: Problem, measured: Measured, quick: bool) -> list[Row]:
             [_label(p) for p in repeated if p.changed],
             "exact: all counts, and errors to the last digit",
         ),
-        _rows_of_promises(problem, measured),
-        *([] if quick else [_sweep(measured)]),
-        *_losses(measured),
+        _rows_of_promises(problem, measured_points),
+        *([] if quick else [_sweep(measured_points)]),
+        *_losses(measured_points),
     ]
 
 
@@ -58,15 +59,15 @@ def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
     return Observed(name, SYSTEM, what + offenders, len(those), "settings").within(0, 0, why, "closed form")
 
 
-def _reference(problem: Problem, measured: Measured) -> Row:
+def _reference(problem: Problem, measured_points: MeasuredPoints) -> Row:
     """The reference must know more than the finest tolerance asks."""
-    quantity, share = measured.quantity, getattr(problem, "sure", REFERENCE_SHARE)
+    quantity, share = measured_points.quantity, getattr(problem, "sure", REFERENCE_SHARE)
     return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,
         f"uncertainty of the reference ({problem.reference}) in the {quantity}",
         problem.uncertainty[quantity],
-        measured.unit,
+        measured_points.unit,
     ).at_most(
         share * min(problem.tolerances),
         "what the reference states of itself or solvers of different "
@@ -75,12 +76,12 @@ def _reference(problem: Problem, measured: Measured) -> Row:
     )
 
 
-def _orders(measured: Measured) -> list[Row]:
+def _orders(measured_points: MeasuredPoints) -> list[Row]:
     """Observed order of every fixed-step method that declares one, for every quantity."""
-    settings = {p.setting.curve: p.setting for p in measured.points}
+    settings = {p.setting.curve: p.setting for p in measured_points.points}
     return [
         Observed(
-            f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
+            f"price.{measured_points.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
             f"observed order of the largest error of the {quantity}, {named(curve)}",
             order,
@@ -92,20 +93,20 @@ def _orders(measured: Measured) -> list[Row]:
             "the step still shows in it",
             "closed form",
         )
-        for quantity in measured.units
-        for curve, order in measured.orders(quantity).items()
+        for quantity in measured_points.units
+        for curve, order in measured_points.orders(quantity).items()
         if (setting := settings[curve]).order and not setting.adaptive
     ]
 
 
-def _rows_of_promises(problem: Problem, measured: Measured) -> Row:
+def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
     """Run the winners of the table of cheapest settings: their error must be what the table promises."""
     worst = 0.0
     for target in problem.tolerances:
-        best = cheapest(measured.reaches(target, measured.costs[0]))
+        best = cheapest(measured_points.reaches(target, measured_points.costs[0]))
         if best is not None:
-            point = attempt(problem, _runnable_setting(problem, measured, *best))
-            worst = max(worst, point.errors.get(measured.quantity, float("inf")) / target)
+            point = attempt(problem, _runnable_setting(problem, measured_points, *best))
+            worst = max(worst, point.errors.get(measured_points.quantity, float("inf")) / target)
     return Observed(
         f"price.{problem.key}.cheapest",
         SYSTEM,
@@ -120,21 +121,21 @@ def _rows_of_promises(problem: Problem, measured: Measured) -> Row:
     )
 
 
-def _runnable_setting(problem: Problem, measured: Measured, curve: str, least: Reach) -> Setting:
+def _runnable_setting(problem: Problem, measured_points: MeasuredPoints, curve: str, least: ToleranceCost) -> Setting:
     """The setting that the table names, a fixed step as the nearest one that divides the run."""
-    like = measured.curves()[curve][0].setting
+    like = measured_points.curves()[curve][0].setting
     value = least.value if like.adaptive else problem.duration / round(problem.duration / least.value)
     return problem.setting(like.engine, like.method, value)
 
 
-def _sweep(measured: Measured) -> Row:
+def _sweep(measured_points: MeasuredPoints) -> Row:
     """Six settings of each method, and from order 4 up four decades of them, or of error where nothing ends a curve."""
-    tried, short = measured.curves(None), []
-    for curve, points in measured.curves().items():
-        errors, setting = list(map(measured.error, points)), points[0].setting
+    tried, short = measured_points.curves(None), []
+    for curve, points in measured_points.curves().items():
+        errors, setting = list(map(measured_points.error, points)), points[0].setting
         wide = errors[0] >= 1e4 * errors[-1] or setting.value >= 1e4 * points[-1].setting.value
         ended = tried[curve][0].status != "ok" or setting.cells
-        whole = ended and errors[-1] <= min(measured.tolerances)
+        whole = ended and errors[-1] <= min(measured_points.tolerances)
         settled = len(points) > 1 and errors[-1] >= SETTLED_RATIO * errors[-2]
         low = 0 < (setting.order or setting.nominal) < 4
         if len(points) < 6 or not (wide or whole or settled or low):
@@ -143,32 +144,32 @@ def _sweep(measured: Measured) -> Row:
         "methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
         "of error although coarser settings answer, or the finest tolerance is not met and the error still falls"
     )
-    return _none_of(f"price.{measured.key}.sweep", what, short, "what the study was asked to cover")
+    return _none_of(f"price.{measured_points.key}.sweep", what, short, "what the study was asked to cover")
 
 
-def _losses(measured: Measured) -> list[Row]:
+def _losses(measured_points: MeasuredPoints) -> list[Row]:
     """Rows: loss of each default at the middle tolerance."""
     return [
         row
-        for owner, p in measured.defaults.items()
+        for owner, p in measured_points.defaults.items()
         if p.status == "ok"
         for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
-        for kind in measured.costs
-        for row in _loss(measured, owner, among, words, kind)
+        for kind in measured_points.costs
+        for row in _loss(measured_points, owner, among, words, kind)
     ]
 
 
-def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> list[Row]:
-    target, unit, p = measured.middle, measured.unit, measured.defaults[owner]
-    lost = measured.loss(target, kind, p.setting.curve, among)
+def _loss(measured_points: MeasuredPoints, owner: str, engine: str, words: str, kind: str) -> list[Row]:
+    target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner]
+    lost = measured_points.loss(target, kind, p.setting.curve, engine)
     if lost is None:
         return []
     how = ", extrapolated by its order" if lost.how == "extrapolated" else ""
-    shared = [default.setting.engine for default in measured.defaults.values()].count(p.setting.engine) > 1
+    shared = [default.setting.engine for default in measured_points.defaults.values()].count(p.setting.engine) > 1
     whose = f"{p.setting.engine}.{owner}" if shared else p.setting.engine
-    name = f"price.{measured.key}.default.{whose}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
+    name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{kind}".replace(" ", "-")
     told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     bounds = told if kind == "seconds" else "exact"
     what = f"ratio of {kind}: {owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, to {words}"
-    why = f"at its default {p.setting.label()} its error is {measured.error(p):.3g} {unit}"
+    why = f"at its default {p.setting.label()} its error is {measured_points.error(p):.3g} {unit}"
     return [Observed(name, SYSTEM, what, lost.factor, "times").beside(bounds, why, "none")]

@@ -16,7 +16,9 @@ from validation.price.compiled_forces import CompiledForces
 STEP = 1e-3
 
 
-def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: int, least: float) -> dict[str, Any]:
+def callback_cost(
+    driven: Assembly, duration: float, integrator: str, rounds: int, minimum_seconds: float
+) -> dict[str, Any]:
     """Paired ratios of one MuJoCo model: bare, with native springs and dampers, driven, all in one callback.
 
     driven : a vehicle on a road, whose input enters through a compiled callback.
@@ -29,7 +31,7 @@ def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: in
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]
     compiled = CompiledForces(driven, settings)
     runs: list[Callable[[], Any]] = [model.run for model in models]
-    seconds = interleave([*runs, compiled.coast, compiled.run], rounds, least)
+    seconds = interleave([*runs, compiled.coast, compiled.run], rounds, minimum_seconds)
     names = ("without forces", "springs and dampers", "with callback", "bare", "all in the callback")
     return {
         "gap": float(np.abs(compiled.run() - models[2].run().states).max()),
@@ -41,7 +43,7 @@ def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: in
     }
 
 
-def real_time(driven: Assembly, duration: float, rounds: int, least: float) -> dict[str, Any]:
+def real_time(driven: Assembly, duration: float, rounds: int, minimum_seconds: float) -> dict[str, Any]:
     """Ratio of simulated time to computing time of the reference at 1 ms, with and without making its road table.
 
     The road is timed by itself beside the run and subtracted within each round.
@@ -49,7 +51,7 @@ def real_time(driven: Assembly, duration: float, rounds: int, least: float) -> d
     signal, steps = driven.input, round(duration / STEP)
     assert signal is not None
     model = build("reference", driven, Settings("RK4", STEP, duration))
-    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, least)
+    run, table = interleave([model.run, lambda: signal.sample(0.0, STEP / 2, 2 * steps + 1)], rounds, minimum_seconds)
     known = (run > table).all()  # else the machine's other work is larger than what is told
     return {
         "with table": median(duration / run),

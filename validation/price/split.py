@@ -62,7 +62,7 @@ ZEROS = [0.0] * 4
 
 
 def nothing(positions: Any, rates: Any) -> Any:
-    """No forces, whatever the state."""
+    """Force function that returns zero forces at every state."""
     return ZEROS
 
 
@@ -129,9 +129,9 @@ MARCHES = {
 """What makes the three runs, by problem and engine."""
 
 
-def measure(rounds: int, least: float) -> list[Saved]:
+def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
     """Seconds of the three runs in every round, by problem and engine."""
-    seconds = interleave([job for make in MARCHES.values() for job in make()], rounds, least)
+    seconds = interleave([job for make in MARCHES.values() for job in make()], rounds, minimum_seconds)
     return [
         {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
         for (problem, engine), rows in zip(MARCHES, seconds.reshape(len(MARCHES), 3, -1), strict=True)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from models.advice.price import runner
-from models.advice.price.curves import HOLLOW, Reach
-from models.advice.price.runner import Loss, Measured, Point, Reaches
+from models.advice.price.curves import HOLLOW, ToleranceCost
+from models.advice.price.runner import Loss, MeasuredPoints, Point, Reaches
 from models.drawing.figures import LABELS
 from models.machine.timing import describe
 from validation.common.rows import Table
@@ -16,9 +16,9 @@ from validation.common.rows import Table
 STATUSES = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
 
 
-def tables(measured: Measured) -> list[Table]:
+def tables(measured_points: MeasuredPoints) -> list[Table]:
     """All tables of one problem from its saved data."""
-    return [make(measured) for make in (cheapest, losses, every_curve, outcomes, failures)]
+    return [make(measured_points) for make in (cheapest, losses, every_curve, outcomes, failures)]
 
 
 def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
@@ -32,23 +32,23 @@ def _plain(curve: str) -> str:
     return f"{LABELS[engine]} {method}"
 
 
-def cheapest(measured: Measured) -> Table:
+def cheapest(measured_points: MeasuredPoints) -> Table:
     """The cheapest setting that meets each tolerance."""
-    work, groups = measured.costs[0], measured.same()
-    rivals = [engine for engine in runner.RIVALS if any(p.setting.engine == engine for p in measured.points)]
+    work, groups = measured_points.costs[0], measured_points.same()
+    rivals = [engine for engine in runner.RIVALS if any(p.setting.engine == engine for p in measured_points.points)]
     rows = []
-    for target in measured.tolerances:
-        calls, seconds = (measured.reaches(target, kind) for kind in measured.costs)
-        timed = (_text_of_winner(measured, seconds, among, "ms") for among in ("", *rivals))
-        rows.append((f"{target:g}", _text_of_winner(measured, calls, "", work.split()[-1], groups), *timed))
+    for target in measured_points.tolerances:
+        calls, seconds = (measured_points.reaches(target, kind) for kind in measured_points.costs)
+        timed = (_text_of_winner(measured_points, seconds, among, "ms") for among in ("", *rivals))
+        rows.append((f"{target:g}", _text_of_winner(measured_points, calls, "", work.split()[-1], groups), *timed))
     note = (
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
         "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
         f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
-        f"everything built anew. {rounds_of(measured.points)}"
+        f"everything built anew. {rounds_of(measured_points.points)}"
     )
     heads = (
-        f"{measured.quantity} error at most [{measured.unit}]",
+        f"{measured_points.quantity} error at most [{measured_points.unit}]",
         f"fewest {work}",
         "fewest seconds",
         *(f"fewest in {LABELS[engine]}" for engine in rivals),
@@ -75,43 +75,50 @@ def rounds_of(points: list[Point]) -> str:
 
 
 def _text_of_winner(
-    measured: Measured, reaches: Reaches, among: str, unit: str, groups: list[tuple[str, ...]] | None = None
+    measured_points: MeasuredPoints,
+    reaches: Reaches,
+    engine: str,
+    unit: str,
+    groups: list[tuple[str, ...]] | None = None,
 ) -> str:
-    best = runner.cheapest(reaches, among)
+    best = runner.cheapest(reaches, engine)
     if best is None:
         return "none of those tried"
     curve, least = best
-    label = replace(measured.curves()[curve][0].setting, value=least.value).label() + _coarsest(least)
+    label = replace(measured_points.curves()[curve][0].setting, value=least.value).label() + _coarsest(least)
     paid = f"{1e3 * least.cost:.3g} ms" if unit == "ms" else f"{least.cost:,.0f} {unit}"
     return f"{named(curve, groups)}, {label}: {paid}"
 
 
-def _coarsest(least: Reach) -> str:
-    return " (coarsest)" if least.how == "coarsest" else ""
+def _coarsest(cheapest_reach: ToleranceCost) -> str:
+    return " (coarsest)" if cheapest_reach.how == "coarsest" else ""
 
 
-def losses(measured: Measured) -> Table:
+def losses(measured_points: MeasuredPoints) -> Table:
     """Table of the cost of each engine's default method divided by the cheapest's, for the same error."""
-    owners = measured.defaults
+    owners = measured_points.defaults
     rows = tuple(
         (
             f"{target:g}",
             *(
-                _text_of_loss(measured.loss(target, kind, usual.setting.curve, among))
+                _text_of_loss(measured_points.loss(target, kind, usual.setting.curve, among))
                 for usual in owners.values()
                 for among in (usual.setting.engine, "")
-                for kind in measured.costs
+                for kind in measured_points.costs
             ),
         )
-        for target in measured.tolerances
+        for target in measured_points.tolerances
     )
     heads = (
-        f"{owner} by best of {among}: {kind}" for owner in owners for among in (owner, "all") for kind in measured.costs
+        f"{owner} by best of {among}: {kind}"
+        for owner in owners
+        for among in (owner, "all")
+        for kind in measured_points.costs
     )
     as_is = "; ".join(
         f"{owner}: {usual.setting.method} at {usual.setting.label()}, which by itself "
         + (
-            f"gives {measured.error(usual):.3g} {measured.unit}"
+            f"gives {measured_points.error(usual):.3g} {measured_points.unit}"
             if usual.status == "ok"
             else f"is {STATUSES[usual.status]}"
         )
@@ -123,7 +130,9 @@ def losses(measured: Measured) -> Table:
         "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
         f"{runner.FEWEST_ROUNDS}."
     )
-    return Table("Factor that a default setting loses", note, (f"{measured.quantity} error at most", *heads), rows)
+    return Table(
+        "Factor that a default setting loses", note, (f"{measured_points.quantity} error at most", *heads), rows
+    )
 
 
 def _text_of_loss(loss: Loss | None) -> str:
@@ -135,23 +144,27 @@ def _text_of_loss(loss: Loss | None) -> str:
     return f"{factor}{mark}{told}"
 
 
-def every_curve(measured: Measured) -> Table:
+def every_curve(measured_points: MeasuredPoints) -> Table:
     """A row per curve: settings, errors, observed order, what an error of 1 costs."""
-    groups, orders, work = measured.same(), measured.orders(measured.quantity), measured.costs[0]
-    calls, seconds = (measured.reaches(measured.middle, kind) for kind in measured.costs)
+    groups, orders, work = (
+        measured_points.same(),
+        measured_points.orders(measured_points.quantity),
+        measured_points.costs[0],
+    )
+    calls, seconds = (measured_points.reaches(measured_points.middle, kind) for kind in measured_points.costs)
     rows = tuple(
         (
             _plain(curve),
             str(len(points)),
             f"{points[0].setting.label()} to {points[-1].setting.label()}",
-            f"{measured.error(points[0]):.2g} to {measured.error(points[-1]):.2g}",
+            f"{measured_points.error(points[0]):.2g} to {measured_points.error(points[-1]):.2g}",
             "-" if math.isnan(orders[curve]) else f"{orders[curve]:.2f}",
             str(points[0].setting.order or "varies"),
             _cost_text(calls.get(curve), 1, ",.0f"),
             _mark_of_single_runs(points, seconds.get(curve)) + _cost_text(seconds.get(curve), 1e3, ".3g"),
             named(curve, groups).partition(" = ")[2] or "-",
         )
-        for curve, points in measured.curves().items()
+        for curve, points in measured_points.curves().items()
     )
     note = (
         f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
@@ -163,29 +176,35 @@ def every_curve(measured: Measured) -> Table:
         "curve",
         "settings",
         "from, to",
-        f"{measured.quantity} error [{measured.unit}]",
+        f"{measured_points.quantity} error [{measured_points.unit}]",
         "observed order",
         "declared",
-        f"{work} for {measured.middle:g} {measured.unit}",
-        f"ms for {measured.middle:g} {measured.unit}",
+        f"{work} for {measured_points.middle:g} {measured_points.unit}",
+        f"ms for {measured_points.middle:g} {measured_points.unit}",
         "coincides with",
     )
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
-def _mark_of_single_runs(points: list[Point], least: Reach | None) -> str:
+def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | None) -> str:
     """A mark for what rests on a setting that has no rounds."""
-    return "~" if least is not None and any(p.changed is None for p in runner.resting(points, least)) else ""
+    return (
+        "~"
+        if cheapest_reach is not None and any(p.changed is None for p in runner.resting(points, cheapest_reach))
+        else ""
+    )
 
 
-def _cost_text(least: Reach | None, scale: float, form: str) -> str:
-    return "not met" if least is None else format(scale * least.cost, form) + _coarsest(least)
+def _cost_text(cheapest_reach: ToleranceCost | None, scale: float, form: str) -> str:
+    return (
+        "not met" if cheapest_reach is None else format(scale * cheapest_reach.cost, form) + _coarsest(cheapest_reach)
+    )
 
 
-def outcomes(measured: Measured) -> Table:
+def outcomes(measured_points: MeasuredPoints) -> Table:
     """Table of how many settings of each engine ended in which way."""
-    ended = Counter((p.setting.engine, status) for p in measured.points for status in ("", p.status))
-    engines = dict.fromkeys(p.setting.engine for p in measured.points)
+    ended = Counter((p.setting.engine, status) for p in measured_points.points for status in ("", p.status))
+    engines = dict.fromkeys(p.setting.engine for p in measured_points.points)
     rows = tuple((LABELS[engine], *(str(ended[engine, status]) for status in ("", *STATUSES))) for engine in engines)
     note = (
         "Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
@@ -195,10 +214,10 @@ def outcomes(measured: Measured) -> Table:
     return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
 
 
-def failures(measured: Measured) -> Table:
+def failures(measured_points: MeasuredPoints) -> Table:
     """Table of the settings without a reliable answer, with their messages."""
     labels_of = defaultdict(list)
-    for p in measured.points:
+    for p in measured_points.points:
         if p.status != "ok":
             labels_of[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in labels_of.items())

@@ -118,10 +118,10 @@ def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]
         }
 
 
-def lines(told: dict[str, dict[str, Any]]) -> list[str]:
+def lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
     """The measurement in words."""
     answer = []
-    for name, crew in told.items():
+    for name, crew in measurement.items():
         ratio, low, high = crew["efficiency"]
         answer.append(
             f"{name}: efficiency {ratio:.3f} ({low:.3f} to {high:.3f}) of two lone processes, "

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer
+from models.advice.price import PricedRun
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import (
     SHORTEST_TURN,
@@ -24,9 +24,9 @@ from models.advice.price.recommendation import (
     priced,
     recommend,
 )
-from models.advice.price.search import Tried
+from models.advice.price.search import TriedSetting
 from models.advice.price.systems.pitch_plane import PricedPitchPlane
-from models.advice.price.truth import Truth
+from models.advice.price.truth import ReferenceTruth
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.machine.timing import interleave, paired_ratio
@@ -51,7 +51,7 @@ CHANGED_PARAMETERS = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4",
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnScene:
     """A drawn scene with a quantity and a tolerance to price."""
 
     scene: Scene
@@ -90,7 +90,7 @@ class Verdict:
         return max(first, other) / min(first, other) if min(first, other) > 0.0 else math.inf
 
 
-def drawn(number: int, folder: Path) -> Drawn:
+def drawn(number: int, folder: Path) -> DrawnScene:
     """Scene ``number``; its files go into ``folder``."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
     kind = KINDS[number % len(KINDS)]
@@ -109,7 +109,7 @@ def drawn(number: int, folder: Path) -> Drawn:
     quantity, common = "enforced_moment", ["pitch", "z3", "f3,f4"]
     if "prescribed_pitch" not in effects:
         quantity = str(rng.choice(common if "wheel_forces" in effects else ["f1,f2", *common]))
-    return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS))
+    return DrawnScene(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS))
 
 
 Random = np.random.Generator
@@ -183,25 +183,27 @@ def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -
     return name
 
 
-def judge(drawn: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
+def judge(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
-    return verdicts(drawn, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings))
+    return verdicts(drawn_scene, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings))
 
 
 def verdicts(
-    drawn: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
+    drawn_scene: DrawnScene,
+    engines: tuple[str, ...],
+    true: Callable[[Recommendation, list[Setting]], dict[Setting, float]],
 ) -> list[Verdict]:
     """Verdicts on drawn recommendations, by a function that gives the true error of each recommended setting."""
-    recommendation = recommend(priced(drawn.scene, drawn.quantity, engines), drawn.tolerance)
+    recommendation = recommend(priced(drawn_scene.scene, drawn_scene.quantity, engines), drawn_scene.tolerance)
     errors = true(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))
     )
     return [
         Verdict(
-            drawn.scene.title,
+            drawn_scene.scene.title,
             choice.tried.setting.curve,
             choice.tried.setting.label(),
-            drawn.tolerance,
+            drawn_scene.tolerance,
             choice.error,
             errors[choice.tried.setting],
             recommendation.truth.uncertainty,
@@ -213,7 +215,8 @@ def verdicts(
 
 
 def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
-    """Largest error of each setting over the whole run, beside DOP853 on instants that all steps share if they can."""
+    """Largest error of each setting over the whole run, against DOP853 at instants common to all steps where there are
+    any."""
     runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine(scene, math.lcm(*parts.values()))
@@ -221,7 +224,10 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
         parts = {setting: _fine(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
-    exact = {n: Truth(_exact_answer(scene, scene.base / n), 0.0, "", 0, scene.kink_period) for n in set(parts.values())}
+    exact = {
+        n: ReferenceTruth(_exact_answer(scene, scene.base / n), 0.0, "", 0, scene.kink_period)
+        for n in set(parts.values())
+    }
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
@@ -230,7 +236,7 @@ def _fine(scene: PricedPitchPlane, parts: int) -> int:
     return parts * math.ceil(scene.base / parts / COARSE_SPACING * (1 - 1e-9))
 
 
-def _exact_answer(scene: PricedPitchPlane, spacing: float) -> Answer:
+def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
 
 
@@ -243,7 +249,7 @@ def slower(recommendation: Recommendation, key: tuple[str, str], choice: Setting
     return any(_is_slower_in_pairs(recommendation, choice, rival) for rival in rivals)
 
 
-def _defaults(recommendation: Recommendation) -> list[Tried]:
+def _defaults(recommendation: Recommendation) -> list[TriedSetting]:
     """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
     was searched: what is recommended may have forgotten one."""
     if not recommendation.whole:
@@ -260,7 +266,7 @@ def _defaults(recommendation: Recommendation) -> list[Tried]:
     return list({each.setting.curve: each for each in able}.values())
 
 
-def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: Tried) -> bool:
+def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: TriedSetting) -> bool:
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
     jobs = [

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer
+from models.advice.price import PricedRun
 from models.advice.price.meshed import MeshedScene
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation
-from models.advice.price.truth import Truth
+from models.advice.price.truth import ReferenceTruth
 from models.core.systems import SYSTEMS
-from validation.price.unseen import Drawn, Random, Verdict, verdicts
+from validation.price.unseen import DrawnScene, Random, Verdict, verdicts
 
 SEED = 908
 ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
@@ -39,7 +39,7 @@ Asked = tuple[dict[str, Any], list[str]]
 """Tables of a scene, and the quantities that may be asked about."""
 
 
-def drawn(system: str, number: int) -> Drawn:
+def drawn(system: str, number: int) -> DrawnScene:
     """Scene ``number`` of a system, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
     table, quantities = {"wheelset": _wheelset, "handling": _handling, "braking": _braking}[system](rng)
@@ -47,7 +47,7 @@ def drawn(system: str, number: int) -> Drawn:
     quantity = str(rng.choice(quantities))
     low, high = np.log(TOLERANCES[quantity])
     scene = import_module(SYSTEMS[system].scene).build(table, "", Path())
-    return Drawn(scene, quantity, float(np.exp(rng.uniform(low, high))))
+    return DrawnScene(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
 def _wheelset(rng: Random) -> Asked:
@@ -96,9 +96,9 @@ def _braking(rng: Random) -> Asked:
     }, quantities
 
 
-def judge(drawn: Drawn) -> list[Verdict]:
+def judge(drawn_scene: DrawnScene) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene."""
-    return verdicts(drawn, ENGINES[drawn.scene.system], true_errors)
+    return verdicts(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
 
 
 def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
@@ -115,12 +115,12 @@ def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict
             if isinstance(scene, MeshedScene)
             else scene.answer(scene.solve(finer, scene.whole))
         )
-        return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
+        return ReferenceTruth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
 
     return {setting: error(setting) for setting in settings}
 
 
-def _exact_answer(scene: MeshedScene, setting: Setting) -> Answer:
+def _exact_answer(scene: MeshedScene, setting: Setting) -> PricedRun:
     cells = min(MOST_CELLS, max(FEWEST_CELLS, TRUTH_CELLS_RATIO * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))

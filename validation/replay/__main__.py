@@ -31,27 +31,27 @@ def main(words: list[str]) -> int:
     return _check(given)
 
 
-def _record(given: argparse.Namespace) -> int:
-    given.folder.mkdir(parents=True, exist_ok=True)
-    if not (given.folder / JOBS).exists():
-        write_jobs(given.folder, asked.jobs(given.command))
-    left = [job for job in _chosen(given) if load(given.folder, job.name) is None]
-    for job, now in _answers(left, given):
-        save(given.folder, job.name, now)
+def _record(arguments: argparse.Namespace) -> int:
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    if not (arguments.folder / JOBS).exists():
+        write_jobs(arguments.folder, asked.jobs(arguments.command))
+    left = [job for job in _chosen(arguments) if load(arguments.folder, job.name) is None]
+    for job, now in _answers(left, arguments):
+        save(arguments.folder, job.name, now)
         codes = ", ".join(map(str, now.codes))
         print(f"{now.seconds:7.1f} s  {len(now.arrays):4} arrays  {job.name}: {codes}", flush=True)
     return 0
 
 
-def _check(given: argparse.Namespace) -> int:
-    renamed = tomllib.loads(given.renamed.read_text()) if given.renamed else {}
+def _check(arguments: argparse.Namespace) -> int:
+    renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
-    for job, now in _answers(_chosen(given), given):
-        before = load(given.folder, job.name)
+    for job, now in _answers(_chosen(arguments), arguments):
+        before = load(arguments.folder, job.name)
         if before is None:
             print(f"{job.name}: was not recorded")
             continue
-        told = difference(before, now, given.bound, renamed)
+        told = difference(before, now, arguments.bound, renamed)
         counts["differ" if told.wrong else "other words" if told.tolerated else "same"] += 1
         for text in (told.wrong or told.tolerated)[:5]:
             print(f"{job.name}: {'DIFFERS: ' if told.wrong else ''}{text}", flush=True)
@@ -59,17 +59,21 @@ def _check(given: argparse.Namespace) -> int:
     return 1 if counts["differ"] else 0
 
 
-def _chosen(given: argparse.Namespace) -> list[asked.Job]:
-    return [job for job in read_jobs(given.folder)[:: given.every] if fnmatch.fnmatch(job.name, given.only)]
+def _chosen(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
+    return [job for job in read_jobs(arguments.folder)[:: arguments.every] if fnmatch.fnmatch(job.name, arguments.only)]
 
 
-def _answers(jobs: list[asked.Job], given: argparse.Namespace) -> Iterator[tuple[asked.Job, CommandAnswer]]:
+def _answers(
+    jobs: list[asked.ReplayJob], arguments: argparse.Namespace
+) -> Iterator[tuple[asked.ReplayJob, CommandAnswer]]:
     """Answers as they come in the jobs' order, several commands at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 
     try:
-        with ThreadPoolExecutor(given.workers) as pool:
-            yield from zip(jobs, pool.map(lambda job: answer(job, given.command, folder / job.name), jobs), strict=True)
+        with ThreadPoolExecutor(arguments.workers) as pool:
+            yield from zip(
+                jobs, pool.map(lambda job: answer(job, arguments.command, folder / job.name), jobs), strict=True
+            )
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.replay.jobs import SCENES, Job
+from validation.replay.jobs import SCENES, ReplayJob
 
 LIMIT = 900.0
 """Seconds after which a command is ended."""
@@ -40,7 +40,7 @@ class CommandAnswer:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def answer(job: Job, command: str, folder: Path) -> CommandAnswer:
+def answer(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
     """Run the commands of a job in a new folder, which is gone afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -56,17 +56,19 @@ def answer(job: Job, command: str, folder: Path) -> CommandAnswer:
     return now
 
 
-def _run_command(words: list[str], folder: Path, now: CommandAnswer) -> None:
+def _run_command(words: list[str], folder: Path, answer: CommandAnswer) -> None:
     """Run one command, and add what it says."""
     begun = time.monotonic()
     code, said, wrong = _run(words, folder)
-    now.seconds += time.monotonic() - begun
+    answer.seconds += time.monotonic() - begun
     printed = _json(said)
     if printed is not None:
-        now.arrays |= {f": {len(now.codes)}{place}": np.array(value) for place, value in _values_with_places(printed)}
+        answer.arrays |= {
+            f": {len(answer.codes)}{place}": np.array(value) for place, value in _values_with_places(printed)
+        }
         said = ""
-    now.codes.append(code)
-    now.message += _masked(said + wrong)
+    answer.codes.append(code)
+    answer.message += _masked(said + wrong)
 
 
 def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
@@ -87,9 +89,9 @@ def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def _json(said: str) -> Any:
+def _json(text: str) -> Any:
     try:
-        return json.loads(said)
+        return json.loads(text)
     except ValueError:
         return None
 
@@ -112,11 +114,11 @@ def _masked(text: str) -> str:
     return text
 
 
-def _arrays_of_files(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
+def _arrays_of_files(folder: Path, given_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
     """Arrays of all files in the folder but those that were given."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
-        if read is not None and path.name not in given:
+        if read is not None and path.name not in given_files:
             yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
 
 
@@ -147,15 +149,15 @@ def _column(cells: list[str]) -> np.ndarray:
         return np.array([_masked(cell) for cell in cells])
 
 
-def write_jobs(folder: Path, jobs: list[Job]) -> None:
+def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
     """Keep what is asked, so that a later version is asked the same."""
     (folder / JOBS).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
 
 
-def read_jobs(folder: Path) -> list[Job]:
+def read_jobs(folder: Path) -> list[ReplayJob]:
     """The jobs of a recording."""
     return [
-        Job(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
+        ReplayJob(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
         for each in json.loads((folder / JOBS).read_text())
     ]
 
@@ -180,7 +182,7 @@ def load(folder: Path, name: str) -> CommandAnswer | None:
 
 
 @dataclass
-class Difference:
+class AnswerDifference:
     """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``tolerated`` (messages, new
     channels) is told."""
 
@@ -188,28 +190,30 @@ class Difference:
     tolerated: list[str] = field(default_factory=list)
 
 
-def difference(before: CommandAnswer, now: CommandAnswer, bound: float, renamed: Mapping[str, str]) -> Difference:
+def difference(
+    recorded: CommandAnswer, current: CommandAnswer, bound: float, renamed: Mapping[str, str]
+) -> AnswerDifference:
     """Difference of an answer from a recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
     names of channels to later ones; a channel that is in another file now is looked for by its name.
     """
-    told = Difference()
-    if before.codes != now.codes:
-        told.wrong.append(f"exit codes {before.codes} are {now.codes}: {now.message.strip()[-200:]}")
-    if before.message != now.message:
-        told.tolerated.append(f"message {before.message.strip()[:200]!r} is {now.message.strip()[:200]!r}")
+    told = AnswerDifference()
+    if recorded.codes != current.codes:
+        told.wrong.append(f"exit codes {recorded.codes} are {current.codes}: {current.message.strip()[-200:]}")
+    if recorded.message != current.message:
+        told.tolerated.append(f"message {recorded.message.strip()[:200]!r} is {current.message.strip()[:200]!r}")
     matched = set()
-    for name, array in before.arrays.items():
+    for name, array in recorded.arrays.items():
         if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED):
             continue
-        if (later := _later(name, now.arrays, renamed)) is None:
+        if (later := _later(name, current.arrays, renamed)) is None:
             told.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
-        if text := _changed(array, now.arrays[later], bound):
+        if text := _changed(array, current.arrays[later], bound):
             (told.tolerated if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
-    told.tolerated += [f"{name} is new" for name in now.arrays if name not in matched]
+    told.tolerated += [f"{name} is new" for name in current.arrays if name not in matched]
     return told
 
 
@@ -222,18 +226,18 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
     return others[0] if len(others) == 1 else None
 
 
-def _changed(before: np.ndarray, now: np.ndarray, bound: float) -> str:
+def _changed(recorded: np.ndarray, current: np.ndarray, bound: float) -> str:
     """Text on the changes of an array, "" if none is beyond the bound."""
-    if before.dtype.kind == now.dtype.kind == "U" and before.size == now.size == 1:
-        return "" if before == now else f"{before} is {now}"
-    if before.shape != now.shape or before.dtype != now.dtype:
-        return f"{before.dtype} {before.shape} is {now.dtype} {now.shape}"
-    if before.tobytes() == now.tobytes():
+    if recorded.dtype.kind == current.dtype.kind == "U" and recorded.size == current.size == 1:
+        return "" if recorded == current else f"{recorded} is {current}"
+    if recorded.shape != current.shape or recorded.dtype != current.dtype:
+        return f"{recorded.dtype} {recorded.shape} is {current.dtype} {current.shape}"
+    if recorded.tobytes() == current.tobytes():
         return ""
-    if before.dtype.kind != "f" or not bound:
-        return "other values" if before.size > 1 else f"{before} is {now}"
-    known = np.isfinite(before)
-    if not np.array_equal(before[~known], now[~known], equal_nan=True) or not np.isfinite(now[known]).all():
+    if recorded.dtype.kind != "f" or not bound:
+        return "other values" if recorded.size > 1 else f"{recorded} is {current}"
+    known = np.isfinite(recorded)
+    if not np.array_equal(recorded[~known], current[~known], equal_nan=True) or not np.isfinite(current[known]).all():
         return "numbers are finite elsewhere"
-    share = abs(before - now)[known].max(initial=0.0) / max(abs(before)[known].max(initial=0.0), 1e-300)
+    share = abs(recorded - current)[known].max(initial=0.0) / max(abs(recorded)[known].max(initial=0.0), 1e-300)
     return "" if share <= bound else f"a number changed by {share:.2g} of the largest"

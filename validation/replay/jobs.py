@@ -29,7 +29,7 @@ Table = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Job:
+class ReplayJob:
     """Commands in one folder: the words of each after ``twinrig``; the scene (TOML) that they read as ``scene.toml``,
     if there is one."""
 
@@ -38,12 +38,12 @@ class Job:
     scene: str = ""
 
 
-def jobs(command: str) -> list[Job]:
+def jobs(command: str) -> list[ReplayJob]:
     """All jobs; ``command``: the twinrig that lists the shipped scenes."""
-    return [Job("list", (("list",),)), *_shipped(command), *_written_jobs(), *_bases(), *_varied()]
+    return [ReplayJob("list", (("list",),)), *_shipped(command), *_written_jobs(), *_bases(), *_varied()]
 
 
-def _shipped(command: str) -> Iterator[Job]:
+def _shipped(command: str) -> Iterator[ReplayJob]:
     """Every scene that is listed: shown, and run."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
     said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
@@ -52,15 +52,15 @@ def _shipped(command: str) -> Iterator[Job]:
             return
         name = line.split()[0]
         less = [word for change in shorter.get(name, ()) for word in ("--set", change)]
-        yield Job(f"shipped-{name}", (("show", name), ("run", name, *less, "--json", "--out", "out")))
+        yield ReplayJob(f"shipped-{name}", (("show", name), ("run", name, *less, "--json", "--out", "out")))
 
 
-def _written_jobs() -> Iterator[Job]:
+def _written_jobs() -> Iterator[ReplayJob]:
     for job in tomllib.loads(COMMANDS.read_text())["jobs"]:
-        yield Job(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
+        yield ReplayJob(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
 
 
-def _bases() -> Iterator[Job]:
+def _bases() -> Iterator[ReplayJob]:
     """Every base scene as it is: shown, and run in every engine that it is for."""
     from tomli_w import dumps
 
@@ -68,14 +68,14 @@ def _bases() -> Iterator[Job]:
         scene = tomllib.loads(base.read_text())
         engines = scene.pop("engines_asked", ENGINES)
         for engine in engines or ("",):
-            yield Job(f"{base.stem}-{engine or 'plain'}", (("show", "scene.toml"), _run(engine)), dumps(scene))
+            yield ReplayJob(f"{base.stem}-{engine or 'plain'}", (("show", "scene.toml"), _run(engine)), dumps(scene))
 
 
 def _run(engine: str) -> tuple[str, ...]:
     return ("run", "scene.toml", *(("--engine", engine) if engine else ()), "--json", "--out", "out")
 
 
-def _varied() -> Iterator[Job]:
+def _varied() -> Iterator[ReplayJob]:
     bases = sorted(SCENES.glob("*.toml"))
     for i in range(VARIED):
         base = bases[i % len(bases)]
@@ -83,7 +83,7 @@ def _varied() -> Iterator[Job]:
         yield _draw_scene(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
 
 
-def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> Job:
+def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJob:
     """A base scene less some tables, with other numbers, another engine, perhaps a mistake."""
     from tomli_w import dumps
 
@@ -95,7 +95,7 @@ def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> Job:
             _change(scene, str(place), float(random.uniform(*FACTORS)))
     if random.random() < MISTAKE_CHANCE:
         engine = _mistake(scene, engine, random)
-    return Job(name, (_run(engine),), dumps(scene))
+    return ReplayJob(name, (_run(engine),), dumps(scene))
 
 
 def _drop(scene: Table, random: np.random.Generator) -> None:

@@ -1,4 +1,5 @@
-"""What the report tells of the kept blind-spot audit: what notices each shared function, and what none notices."""
+"""Part of the report on the saved blind-spot audit: the rows and tests that notice a fault of each shared function, and
+functions that none notices."""
 
 from collections import Counter
 from pathlib import Path
@@ -26,18 +27,18 @@ def blind_spots(path: Path = KEPT) -> Saved:
     }
 
 
-def _function_record(line: Line) -> Saved:
-    rows, tests = (text.split(JOINED) if text else [] for text in (line.rows, line.tests))
+def _function_record(audit_line: Line) -> Saved:
+    rows, tests = (text.split(JOINED) if text else [] for text in (audit_line.rows, audit_line.tests))
     return {
-        "function": line.function.replace(".<locals>", ""),
-        "independent": line.is_covered,
+        "function": audit_line.function.replace(".<locals>", ""),
+        "independent": audit_line.is_covered,
         "rows": rows[:SHOWN_IDS],
         "more_rows": len(rows[SHOWN_IDS:]),
         "tests": [test.rpartition("/")[2] for test in tests[:SHOWN_IDS]],
         "more_tests": len(tests[SHOWN_IDS:]),
-        "ended": line.ended,
-        "calling": line.calling,
-        "left": line.left,
+        "ended": audit_line.ended,
+        "calling": audit_line.calling,
+        "left": audit_line.left,
     }
 
 

@@ -41,7 +41,8 @@ assert set(KINDS) == set(get_args(Independence))
 
 
 def verdict(results: Saved) -> Saved:
-    """Rows by status, what a reader must know first of where they are from, the tightest passed row and the time."""
+    """Verdict of the report: number of rows by status, warnings on their source, the tightest passed row, and the
+    computing time."""
     rows = results["rows"]
     of = {status: [row for row in rows if row["status"] == status] for status in STATUSES}
     margins = [(ratio, row) for row in of["passed"] if (ratio := margin(row)) is not None]
@@ -66,17 +67,17 @@ def silent_systems(rows: list[Saved]) -> list[str]:
     return [system for system in get_args(System) if system not in run]
 
 
-def systems(results: Saved, drawn: dict[str, Saved]) -> list[Saved]:
+def systems(results: Saved, shown: dict[str, Saved]) -> list[Saved]:
     """Rows by system and, within it, by case, in the order of the report; drawn : what is shown of each case."""
     order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
     by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
     return [
-        {"name": system, "cases": list(_cases(list(rows), results["provenance"]["seconds"], drawn))}
+        {"name": system, "cases": list(_cases(list(rows), results["provenance"]["seconds"], shown))}
         for system, rows in groupby(by_system, key=lambda row: row["system"])
     ]
 
 
-def _cases(rows: list[Saved], seconds: dict[str, float], drawn: dict[str, Saved]) -> Iterator[Saved]:
+def _cases(rows: list[Saved], seconds: dict[str, float], shown: dict[str, Saved]) -> Iterator[Saved]:
     for name in dict.fromkeys(map(case_of, rows)):
         of_case = [row for row in rows if case_of(row) == name]
         groups: dict[str, list[Saved]] = {}
@@ -90,17 +91,17 @@ def _cases(rows: list[Saved], seconds: dict[str, float], drawn: dict[str, Saved]
             "count": len(of_case),
             "failed": statuses.count("failed"),
             "missed": statuses.count("missed"),
-            **drawn[name],
+            **shown[name],
         }
 
 
-def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
+def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
     """Number of rows of each case by the kind of their second side; drawn : the shown tables and figures of each case,
     by name."""
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
         kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
-        lines.append((name, drawn[name]["title"], [kinds.count(kind) for kind in KINDS]))
+        lines.append((name, shown[name]["title"], [kinds.count(kind) for kind in KINDS]))
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
 
 
@@ -156,7 +157,7 @@ def parameter_tables() -> list[Saved]:
 
 
 def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
-    """Parameter sets that follow the form: SOURCE and a pydantic PARAMETERS."""
+    """Modules of parameter sets: those with a SOURCE and a pydantic PARAMETERS."""
     import models.vehicles.parameters as package
 
     for name in sorted(named.name for named in pkgutil.iter_modules(package.__path__)):

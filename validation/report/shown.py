@@ -66,9 +66,9 @@ def _module(name: str) -> ModuleType | None:
         return None
 
 
-def _doc(what: Any) -> str:
+def _doc(documented: Any) -> str:
     """The first paragraph of what is said of a module or a function."""
-    return "" if what is None else (inspect.getdoc(what) or "").partition("\n\n")[0]
+    return "" if documented is None else (inspect.getdoc(documented) or "").partition("\n\n")[0]
 
 
 def _tables(module: Any, saved: Any, name: str) -> Iterable[Any]:

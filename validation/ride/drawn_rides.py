@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from models.advice.ride_choice.in_time import InTime, in_time
+from models.advice.ride_choice.in_time import CopiesInTime, in_time
 from models.advice.ride_choice.reduced import FullScene
 from models.ride.covariance import FINITE, stationary
 from models.systems.ride.omissions import wheels_of
@@ -27,7 +27,7 @@ _loaded = cache(load_vehicle)
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnRide:
     """One scene, its speed (m/s), the outputs that must stay right, and how right."""
 
     scene: ReducedScene
@@ -37,14 +37,14 @@ class Drawn:
 
 
 @dataclass(frozen=True)
-class Bent:
+class BentRide:
     """One scene with bent springs, what must stay right, and how right."""
 
     scene: ReducedScene
     quantities: tuple[str, ...]
     tolerance: float
 
-    def opened(self, copies: int = COPIES, seed: int = 1) -> InTime:
+    def opened(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
         """The drawn ride as run in time, with so many copies."""
         options = {"copies": copies, "lasting": LASTING, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
@@ -61,7 +61,7 @@ class Draw:
         return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
 
-def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> Drawn:
+def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> DrawnRide:
     """The scene of a seed; tolerance from 0.5 to 10 % where none is given.
 
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
@@ -79,7 +79,7 @@ def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> D
     told = [n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent]
     count = min(len(told), int(rng.integers(1, 3)))
     asked = tuple(map(str, rng.choice(told, count, replace=False)))
-    return Drawn(scene, speed, asked, tolerance or draw.between(0.005, 0.1))
+    return DrawnRide(scene, speed, asked, tolerance or draw.between(0.005, 0.1))
 
 
 def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
@@ -87,9 +87,9 @@ def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle:
     return ReducedScene(build(table, "drawn"), vehicle)
 
 
-def _vehicle(vehicle: SpatialVehicle, draw: Draw, detailed: bool) -> SpatialVehicle:
+def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> SpatialVehicle:
     """Light wheels, firm dampers, damped tyres in three of five; a fore-aft bushing and a part on mounts at times."""
-    rng, between, wheels = draw.random, draw.between, wheels_of(vehicle)
+    rng, between, wheels = generator.random, generator.between, wheels_of(vehicle)
     light, firm = between(0.15, 1.2), between(0.5, 4.0)
     damping = between(30.0, 400.0) if rng.random() < 0.6 else 0.0
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
@@ -116,7 +116,7 @@ def _vehicle(vehicle: SpatialVehicle, draw: Draw, detailed: bool) -> SpatialVehi
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))
 
 
-def drawn_bent(number: int) -> Bent:
+def drawn_bent(number: int) -> BentRide:
     """The scene of a number whose springs are bent."""
     draw = Draw([SEED, number])
     name = BENT_VEHICLES[number % len(BENT_VEHICLES)]
@@ -125,20 +125,20 @@ def drawn_bent(number: int) -> Bent:
     level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
     asked = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
     scene = _scene(f"bent {number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
-    return Bent(scene, tuple(map(str, asked)), TOLERANCES[number % len(TOLERANCES)])
+    return BentRide(scene, tuple(map(str, asked)), TOLERANCES[number % len(TOLERANCES)])
 
 
-def _bent(spring: SpringDamper, draw: Draw) -> SpringDamper:
+def _bent(spring: SpringDamper, generator: Draw) -> SpringDamper:
     """A digressive damper that is harder in rebound, stops at both ends, and friction: each in most of the springs."""
-    c, rebound, digressive = spring.damping, draw.between(1.0, 2.5), draw.between(0.3, 1.0)
+    c, rebound, digressive = spring.damping, generator.between(1.0, 2.5), generator.between(0.3, 1.0)
     curve = Curve(
         (-1.0, -0.2, 0.0, 0.2, 1.0),
         (-c * rebound * (0.2 + 0.8 * digressive), -0.2 * c * rebound, 0.0, 0.2 * c, c * (0.2 + 0.8 * digressive)),
     )
-    gap, hard = draw.between(0.02, 0.08), draw.between(2e4, 2e5)
+    gap, hard = generator.between(0.02, 0.08), generator.between(2e4, 2e5)
     stops = Curve((-gap - 0.05, -gap, gap, gap + 0.05), (-0.05 * hard, 0.0, 0.0, 0.05 * hard))
-    friction = draw.between(5.0, 80.0)
-    bent, stopped, dry = draw.random.random(3) < (0.8, 0.7, 0.7)
+    friction = generator.between(5.0, 80.0)
+    bent, stopped, dry = generator.random.random(3) < (0.8, 0.7, 0.7)
     bent = bent or not (stopped or dry)
     return replace(
         spring,

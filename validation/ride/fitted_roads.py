@@ -145,7 +145,7 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
     return Table("Mean and roll process fitted to two tracks", note, heads, tuple(rows))
 
 
-def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple[str, Any]:
+def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) -> tuple[str, Any]:
     """Left the spectra over the wavenumber, right the coherency of left and right; measured roads thin."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
@@ -165,7 +165,7 @@ def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple
     left.loglog(k, half_track**2 * road.roll.spectrum(k), "k:", label="roll process, times b²")
     right.semilogx(k, road.coherency(k, half_track, -half_track), "k", lw=2, label="mean and roll process")
     right.semilogx(k, isotropic.coherency(k, 2 * half_track), "k-.", label="isotropic, same track spectrum")
-    for i, shown in enumerate(measured):
+    for i, shown in enumerate(measured_roads):
         thin = {"color": f"C{i}", "lw": 0.8}
         left.loglog(shown["wavenumber"], shown["left"], label=_label(shown), **thin)
         if shown["fits"][1] is not None:

@@ -51,7 +51,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
             NONLINEAR_DRIVEN[not quick],
             seed=SEED,
             skipped=SKIPPED_SECONDS * (not quick),
-            every=5,
+            stride=5,
         )
         for engine in ENGINES
     }
@@ -104,7 +104,7 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     vehicle, excitation_ = ride("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
-        engine: ridden(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, every=2)
+        engine: ridden(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, stride=2)
         for engine in ENGINES
     }
     linear = linearise(vehicle)

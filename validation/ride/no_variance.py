@@ -20,7 +20,8 @@ CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 
 
 def weighting_rows(seed: int) -> list[Row]:
-    """Weighted seats of an asymmetric twin by states and by their frequency response."""
+    """Rows of the frequency-weighted seat accelerations of an asymmetric vehicle: by filter states, and by the
+    frequency response."""
     vehicle = linearise(twin(load_vehicle("r19_ride"), seed))
     road, rows = paper_road(vehicle.wheels), []
     for name in ("Wk", "Wd"):

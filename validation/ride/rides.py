@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from models.ride.closed_forms import QuarterCar
 from models.road.excitation import Excitation
 from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, half_track, on_track, road_of_level
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
 
 INTENSITY = 1e-4
@@ -81,14 +81,16 @@ def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
     return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
 
 
-def paper_road(wheels: Sequence[Wheel], *words: str, level: float = LEVEL, cutoff: float | None = None) -> Excitation:
+def paper_road(
+    wheels: Sequence[WheelPosition], *words: str, level: float = LEVEL, cutoff: float | None = None
+) -> Excitation:
     """The paper's road under wheels, in words of a case; wheels without a width run on one track."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
     return excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
 
 
-def five_cases(wheels: Sequence[Wheel], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
+def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
     """The paper's road, or another one, in the paper's five cases of correlation by their numbers."""
     road = road or road_of_level(half_track(wheels))
     return {str(number): excitation(road, wheels, *case) for number, case in CASES.items()}
@@ -124,7 +126,7 @@ def corners(
         Output("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
         Output("wheel", "m/s2", "acceleration", unit[b], no, no, none, none),
     )
-    wheels = tuple(Wheel(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(places))
+    wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(places))
     return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
 
 

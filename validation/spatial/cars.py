@@ -87,15 +87,15 @@ def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
     return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
 
 
-def by_jacobians(built: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
+def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
     """Joint forces (n,) of wrenches (6 h,) at the hubs, in axes of these or "inertial" ones, by MuJoCo's Jacobians."""
-    assert isinstance(built.model, FreeMujoco)
-    model, names = built.model.model, [body.name for body in built.vehicle.tree.bodies]
-    data, forces = mujoco.MjData(model), np.zeros(built.size)
+    assert isinstance(hub_model.model, FreeMujoco)
+    model, names = hub_model.model.model, [body.name for body in hub_model.vehicle.tree.bodies]
+    data, forces = mujoco.MjData(model), np.zeros(hub_model.size)
     data.qpos[:] = q
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    for tyre, wrench in zip(built.vehicle.uncut.tyres, wrenches.reshape(-1, 2, 3), strict=True):
+    for tyre, wrench in zip(hub_model.vehicle.uncut.tyres, wrenches.reshape(-1, 2, 3), strict=True):
         body = int(model.body(str(names.index(tyre.body))).id)
         force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
         mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)

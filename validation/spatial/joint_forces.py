@@ -106,11 +106,11 @@ class _Loaded:
         mujoco.mj_jac(self.model, self.data, jacobian, None, place, number)
         return place, jacobian @ self.data.qvel
 
-    def _add(self, body: str, place: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
+    def _add(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
         """A force at a place and a moment, in space."""
         number = self.ids[body]
         self.data.xfrc_applied[number, :3] += force
-        self.data.xfrc_applied[number, 3:] += moment + np.cross(place - self.data.xpos[number], force)
+        self.data.xfrc_applied[number, 3:] += moment + np.cross(point - self.data.xpos[number], force)
 
     def _load_hubs(self, wrenches: np.ndarray) -> None:
         for tyre, wrench in zip(self.vehicle.uncut.tyres, wrenches, strict=True):

@@ -1,4 +1,5 @@
-"""A cut vehicle whose springs are the engines' own, beside compiled forces and the equations of the whole tree."""
+"""A cut vehicle built with the engines' native springs, compared with compiled forces and with the equations of the
+whole tree."""
 
 from dataclasses import replace
 

@@ -65,10 +65,10 @@ def _waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 PATH = path()
 
 
-def readings(places: np.ndarray, moved: Path = PATH) -> np.ndarray:
+def readings(places: np.ndarray, motion: Path = PATH) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2 at local places (sensors, 3) in m, by eqs (16) and (17)."""
-    lever = skew(moved.alpha) + skew(moved.rates) @ skew(moved.rates)
-    felt = np.einsum("nji,nj->ni", matrix(moved.orientation), moved.acceleration - GRAVITY)
+    lever = skew(motion.alpha) + skew(motion.rates) @ skew(motion.rates)
+    felt = np.einsum("nji,nj->ni", matrix(motion.orientation), motion.acceleration - GRAVITY)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 
 

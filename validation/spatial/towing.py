@@ -28,7 +28,7 @@ class TurnErrors:
 
 
 def levers_error() -> float:
-    """Largest error of the shipped caravan's load on the ball and of all axle loads, over those of its levers."""
+    """Largest relative error of the caravan's hitch load and of all axle loads against the balance of moments."""
     car = Handling(caravan())
     free, (towed,) = car.vehicle, car.vehicle.towed
     loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]

@@ -36,7 +36,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RunQuantities:
     """Quantities by name; CPU seconds of the march alone; counts, which repeat: "steps", "calls" of the right-hand
     side, "states", and "terms", where a call goes through any beside them (cells of contact nets, waves of roads)."""
 
@@ -58,16 +58,16 @@ class Answer:
         raise InputError(file, "quantities", name, allowed, tuple(self.quantities))
 
 
-def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
+def sizes(full_results: Sequence[np.ndarray]) -> np.ndarray:
     """Sizes to which changes are relative, case by case: the standard deviation of a path, the magnitude of a number.
 
     A case that hardly moves beside the others is held to what it is of them.
     """
-    amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full])
+    amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full_results])
     return np.maximum(amounts, HARDLY * amounts.max(initial=0.0))
 
 
-def rounding(answer: Answer, unit: str) -> float:
+def rounding(answer: RunQuantities, unit: str) -> float:
     """Size up to which a quantity of a unit does not move, but for rounding."""
     alike = [
         np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
@@ -82,14 +82,14 @@ SURE = 0.9985
 """Probability that chance adds no more to either side than is said of it."""
 
 
-def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
+def by_chance(change: Cases, full_results: Cases) -> tuple[float, float]:
     """Largest relative change of a sampled quantity, and what chance may add to it, where that is largest.
 
     The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
     from it, times Student's t for m - 1.
     """
     worst = 0.0, 0.0
-    for moved, unmoved in zip(change, full, strict=True):
+    for moved, unmoved in zip(change, full_results, strict=True):
         ratio = 1.0 + moved.mean() / unmoved.mean()
         if not ratio > 0.0:  # nothing is left, or no mean square at all
             return (1.0, 0.0) if not (moved + unmoved).any() else (np.inf, np.inf)
@@ -99,12 +99,12 @@ def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
     return worst
 
 
-def less(run: Cases, full: Cases) -> Cases:
+def less(run: Cases, full_results: Cases) -> Cases:
     """Differences of two runs at the times that both have: the longer step's, every so many of the shorter one's.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
-    for few, many in (sorted(map(len, pair)) for pair in zip(run, full, strict=True)):
+    for few, many in (sorted(map(len, pair)) for pair in zip(run, full_results, strict=True)):
         if few != many and (few < 2 or (many - 1) % (few - 1)):
             raise InputError(
                 "",
@@ -113,7 +113,7 @@ def less(run: Cases, full: Cases) -> Cases:
                 "paths of runs that end by themselves cannot be compared: ask for "
                 "'rms' or 'max' of them, or for another number",
             )
-    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(run, full, strict=True))
+    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(run, full_results, strict=True))
 
 
 def _thinned(*paths: np.ndarray) -> list[np.ndarray]:

@@ -26,7 +26,7 @@ import numpy as np
 from models.advice.choice.answer import added
 from models.advice.choice.screen import Screen
 from models.advice.choice.variants import Set, Variants
-from models.core.assumptions import Broken
+from models.core.assumptions import BrokenAssumption
 from models.core.errors import InputError
 
 BUDGET = 0.8
@@ -77,7 +77,7 @@ class Choice:
     spent: int
     more: float
     ended: bool = False
-    barred: dict[str, list[Broken]] = field(default_factory=dict)
+    barred: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
 
 
 class Chooser:
@@ -134,59 +134,64 @@ class Chooser:
             longest = max(k for k in lengths if k < longest)
         return longest, error
 
-    def _longest(self, screen: Screen, chosen: Set, lengths: list[int], allowed: float) -> tuple[int, np.ndarray]:
+    def _longest(
+        self, screen: Screen, omitted_effects: Set, lengths: list[int], allowed: float
+    ) -> tuple[int, np.ndarray]:
         """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""
         low, high, shares = 0, len(lengths), np.zeros(len(screen.quantities))
         while high - low > 1:
             middle = (low + high) // 2
-            tried = screen.of_step(chosen, lengths[middle] // lengths[0])
+            tried = screen.of_step(omitted_effects, lengths[middle] // lengths[0])
             low, high, shares = (middle, high, tried) if (tried <= allowed).all() else (low, middle, shares)
         return lengths[low], shares
 
-    def share(self, chosen: Set) -> float:
+    def share(self, omitted_effects: Set) -> float:
         """Largest predicted change, with what may be left out of it, by the tolerance; infinite where an assumption
         would be broken that the scene keeps."""
-        if self.barred(chosen):
+        if self.barred(omitted_effects):
             return math.inf
-        error = self.error + self.screen.predicted(chosen) + self.screen.remainder(chosen)
+        error = self.error + self.screen.predicted(omitted_effects) + self.screen.remainder(omitted_effects)
         return float(np.max(error)) / self.tolerance
 
-    def barred(self, chosen: Set) -> bool:
+    def barred(self, omitted_effects: Set) -> bool:
         """Whether a run without these effects breaks an assumption that the scene keeps; of more than two it is
         foretold: an effect is missed whose every pair is."""
         runs = self.screen.variants
-        if len(chosen) <= 2:
-            return bool(runs.breaks(chosen))
-        return any(all(runs.breaks(frozenset([effect, other])) for other in chosen - {effect}) for effect in chosen)
+        if len(omitted_effects) <= 2:
+            return bool(runs.breaks(omitted_effects))
+        return any(
+            all(runs.breaks(frozenset([effect, other])) for other in omitted_effects - {effect})
+            for effect in omitted_effects
+        )
 
-    def reach(self, chosen: Set) -> int:
+    def reach(self, omitted_effects: Set) -> int:
         """Longest step, by the scene's own, that the predictions allow without these effects."""
-        if chosen not in self._reach:
-            left = max(0.0, BUDGET - self.share(chosen)) * self.tolerance
-            self._reach[chosen], _ = self._longest(self.screen, chosen, self.lengths, left)
-        return self._reach[chosen]
+        if omitted_effects not in self._reach:
+            left = max(0.0, BUDGET - self.share(omitted_effects)) * self.tolerance
+            self._reach[omitted_effects], _ = self._longest(self.screen, omitted_effects, self.lengths, left)
+        return self._reach[omitted_effects]
 
-    def work(self, chosen: Set) -> float:
+    def work(self, omitted_effects: Set) -> float:
         """Work of a run without these effects, at the longest step; infinite if it fails."""
-        return self.screen.variants.work(chosen, self.reach(chosen) // self.step_factor)
+        return self.screen.variants.work(omitted_effects, self.reach(omitted_effects) // self.step_factor)
 
-    def confirm(self, chosen: Set) -> np.ndarray:
+    def confirm(self, omitted_effects: Set) -> np.ndarray:
         """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so; what chance
         may add is added."""
-        if chosen not in self._confirmed:
-            longest = self.reach(chosen)
+        if omitted_effects not in self._confirmed:
+            longest = self.reach(omitted_effects)
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
                 self.rounds += 1
-                change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
+                change = self.whole.between(self.whole.variants.of(omitted_effects, times), self.whole.variants.of())
                 shares, chance = self.whole.shares(change), self.whole.chance(change)
-                if self.whole.variants.breaks(chosen, times):
+                if self.whole.variants.breaks(omitted_effects, times):
                     shares = np.full_like(shares, np.inf)
-                self._confirmed[chosen] = times, shares, chance
+                self._confirmed[omitted_effects] = times, shares, chance
                 if self.holds(shares + chance):
                     break
                 if (shares < self.tolerance).all():
                     self._doubtful.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
-        return np.add(*self._confirmed[chosen][1:])
+        return np.add(*self._confirmed[omitted_effects][1:])
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
@@ -233,18 +238,18 @@ class Chooser:
             f"{choice.more:.2g} times as many samples would tell",
         )
 
-    def _choice(self, chosen: Set) -> Choice:
-        times, shares, chance = self._confirmed[chosen]
+    def _choice(self, omitted_effects: Set) -> Choice:
+        times, shares, chance = self._confirmed[omitted_effects]
         none: Set = frozenset()
-        shown = [(none, 1), (none, self._confirmed[none][0]), (chosen, times)]
+        shown = [(none, 1), (none, self._confirmed[none][0]), (omitted_effects, times)]
         calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
         each = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
         return Choice(
             self.effects,
-            tuple(sorted(chosen)),
+            tuple(sorted(omitted_effects)),
             times,
-            self.told(chosen, times),
-            self.teller.remainder(chosen),
+            self.told(omitted_effects, times),
+            self.teller.remainder(omitted_effects),
             shares,
             chance,
             self.holds(shares + chance),
@@ -262,33 +267,35 @@ class Chooser:
         return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
     def _budget_spent(self) -> bool:
-        """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
+        """Whether the search has used all the calls that it may take; it has ``ended`` then."""
         whole_run = self.whole.variants.of()
         share = self._spent() / (RUNS * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
         self.progress(min(share, 1.0))
         return self.ended
 
-    def told(self, chosen: Set, times: int) -> np.ndarray:
+    def told(self, omitted_effects: Set, times: int) -> np.ndarray:
         """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
         screen, runs = self.teller, self.whole.variants
-        change = screen.change(chosen) if chosen else None
+        change = screen.change(omitted_effects) if omitted_effects else None
         if times == 1:
-            return screen.predicted(chosen)
+            return screen.predicted(omitted_effects)
         shorter = [k for k in reversed(runs.lengths()) if times % k == 0 and (SHARPER * k <= times or k == 1)]
-        step = screen.between(runs.of(chosen, times), next(filter(None, (runs.of(chosen, k) for k in shorter)), None))
+        step = screen.between(
+            runs.of(omitted_effects, times), next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None)
+        )
         if change is None or step is None or times % self.step_factor:
-            return screen.predicted(chosen) + screen.shares(step)
+            return screen.predicted(omitted_effects) + screen.shares(step)
         return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
 
-    def further(self, chosen: Set) -> dict[str, float]:
+    def further(self, omitted_effects: Set) -> dict[str, float]:
         """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
 
         Only those that may go, and whose going would save anything at the same step."""
-        shares, times = {}, self.reach(chosen) // self.step_factor
+        shares, times = {}, self.reach(omitted_effects) // self.step_factor
         for effect in self.effects:
-            further = chosen | {effect}
-            if effect not in chosen and self.screen.variants.work(further, times) < self.work(chosen):
+            further = omitted_effects | {effect}
+            if effect not in omitted_effects and self.screen.variants.work(further, times) < self.work(omitted_effects):
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
@@ -322,20 +329,24 @@ class Chooser:
             within += [pair] if self.share(pair) <= BUDGET else []
         return within
 
-    def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
+    def _next(self, omitted_effects: Set, banned: set[Set], steps: list[Set]) -> Set:
         """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
         best, most = frozenset[str](), 0.0
-        now, work = self.share(chosen), self.work(chosen)
-        steps = [step for step in steps if not (step <= chosen or step - chosen in banned or step in banned)]
+        now, work = self.share(omitted_effects), self.work(omitted_effects)
+        steps = [
+            step
+            for step in steps
+            if not (step <= omitted_effects or step - omitted_effects in banned or step in banned)
+        ]
         if steps and not self._budget_spent():
-            self.screen.ahead(chosen | step for step in steps)
+            self.screen.ahead(omitted_effects | step for step in steps)
         for step in steps:
-            further = chosen | step
+            further = omitted_effects | step
             if self._budget_spent():
                 break
             share = self.share(further)
             saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
             score = saved / max(share - now, LEAST) if saved > 0.0 else 0.0
             if score > most:
-                best, most = step - chosen, score
+                best, most = step - omitted_effects, score
         return best

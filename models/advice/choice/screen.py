@@ -14,7 +14,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, Cases, added, by_chance, less, relative, rounding
+from models.advice.choice.answer import Cases, RunQuantities, added, by_chance, less, relative, rounding
 from models.advice.choice.variants import Set, Variants
 from models.core.errors import InputError
 
@@ -49,12 +49,12 @@ class Screen:
     def _refuse(self, name: str, why: str) -> NoReturn:
         raise InputError(self.variants.scene.file, f"quantities.{name}", None, why)
 
-    def between(self, run: Answer | None, other: Answer | None) -> Changes | None:
+    def between(self, run: RunQuantities | None, other_answer: RunQuantities | None) -> Changes | None:
         """Differences of two runs, quantity by quantity; None where one of them is missing."""
-        if run is None or other is None:
+        if run is None or other_answer is None:
             return None
         try:
-            return {name: less(run.of(name).cases, other.of(name).cases) for name in self.quantities}
+            return {name: less(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities}
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
@@ -97,43 +97,46 @@ class Screen:
         """Have the runs computed that ``change`` of these sets will ask for."""
         self.variants.ahead((part, 1) for chosen in sets for part in _parts(chosen))
 
-    def change(self, chosen: Set) -> Changes | None:
+    def change(self, omitted_effects: Set) -> Changes | None:
         """Predicted differences of a set; None where they cannot be told."""
         parts: list[Changes | None] = [None]
-        if len(chosen) > 2:
-            parts = [*map(self.alone, chosen), *(self.second(*pair) for pair in combinations(sorted(chosen), 2))]
+        if len(omitted_effects) > 2:
+            parts = [
+                *map(self.alone, omitted_effects),
+                *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
+            ]
         if None in parts:
-            return self.between(self.variants.of(chosen), self.variants.of())
+            return self.between(self.variants.of(omitted_effects), self.variants.of())
         return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
 
-    def predicted(self, chosen: Set) -> np.ndarray:
+    def predicted(self, omitted_effects: Set) -> np.ndarray:
         """Relative changes (quantities,) of a set, without the remainder."""
-        return self.shares(self.change(chosen)) if chosen else np.zeros(len(self.quantities))
+        return self.shares(self.change(omitted_effects)) if omitted_effects else np.zeros(len(self.quantities))
 
-    def remainder(self, chosen: Set) -> np.ndarray:
+    def remainder(self, omitted_effects: Set) -> np.ndarray:
         """Bound on changes of third and higher orders (quantities,): the second, by as much as it lies below the
         first."""
         none = np.zeros(len(self.quantities))
-        if len(chosen) <= 2:
+        if len(omitted_effects) <= 2:
             return none
-        first = np.sum([self.shares(self.alone(effect)) for effect in chosen], axis=0)
-        second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(chosen), 2)], axis=0)
+        first = np.sum([self.shares(self.alone(effect)) for effect in omitted_effects], axis=0)
+        second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0)
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
             return none  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
-    def of_step(self, chosen: Set, times: int) -> np.ndarray:
+    def of_step(self, omitted_effects: Set, times: int) -> np.ndarray:
         """Relative changes (quantities,) by longer steps alone, without these effects."""
         if times == 1:
             return np.zeros(len(self.quantities))
-        return self.shares(self.between(self.variants.of(chosen, times), self.variants.of(chosen)))
+        return self.shares(self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects)))
 
 
-def _parts(chosen: Set) -> list[Set]:
+def _parts(omitted_effects: Set) -> list[Set]:
     """Sets whose runs tell what a set changes."""
-    if len(chosen) <= 2:
-        return [chosen]
-    return [frozenset(few) for count in (1, 2) for few in combinations(sorted(chosen), count)]
+    if len(omitted_effects) <= 2:
+        return [omitted_effects]
+    return [frozenset(few) for count in (1, 2) for few in combinations(sorted(omitted_effects), count)]
 
 
 def _minus(cases: Cases) -> Cases:

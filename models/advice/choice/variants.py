@@ -10,8 +10,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from models.advice.choice.answer import Answer
-from models.core.assumptions import Broken, breaches, watching
+from models.advice.choice.answer import RunQuantities
+from models.core.assumptions import BrokenAssumption, breaches, watching
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.core.scene_effects import (
@@ -29,7 +29,7 @@ from models.ensemble.runner import block_results
 Set = frozenset[str]
 Key = tuple[Set, int]
 """A variant: the effects that are left out, and how many times as long its steps are."""
-Outcome = tuple[Answer | None, dict[str, Broken]]
+Outcome = tuple[RunQuantities | None, dict[str, BrokenAssumption]]
 """A variant's run, and the assumptions that it breaks."""
 LONGEST = 128
 """No step is tried that is more times as long as the scene's."""
@@ -68,9 +68,9 @@ class Variants:
     executor: Executor | None = None
     system: ModuleType = field(init=False)
     calls: int = 0
-    _kept: dict[Key, Answer | None] = field(default_factory=dict)
+    _kept: dict[Key, RunQuantities | None] = field(default_factory=dict)
     _costs: dict[Set, float] = field(default_factory=dict)
-    _broken: dict[Key, dict[str, Broken]] = field(default_factory=dict)
+    _broken: dict[Key, dict[str, BrokenAssumption]] = field(default_factory=dict)
     _ready: dict[Key, Outcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -102,9 +102,9 @@ class Variants:
         told = self.scene.said if self._opened else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
-    def of(self, left_out: Iterable[str] = (), times: int = 1) -> Answer | None:
+    def of(self, omitted_effects: Iterable[str] = (), times: int = 1) -> RunQuantities | None:
         """The run without these effects, with steps so many times as long."""
-        key = (frozenset(left_out), times)
+        key = (frozenset(omitted_effects), times)
         if key not in self._kept:
             answer, self._broken[key] = self._ready.pop(key) if key in self._ready else self.run(key)
             self._kept[key] = answer
@@ -123,58 +123,61 @@ class Variants:
         with breaches() as broken:
             return self._run(*key), broken
 
-    def _run(self, left_out: Set, times: int) -> Answer | None:
+    def _run(self, omitted_effects: Set, times: int) -> RunQuantities | None:
         try:
-            answer: Answer = self.system.computed_quantities(self.changed(left_out, times), self.engine)
+            answer: RunQuantities = self.system.computed_quantities(self.changed(omitted_effects, times), self.engine)
         except (InputError, RunFailed):
             return None
         return answer
 
-    def breaks(self, left_out: Set, times: int = 1) -> list[Broken]:
+    def breaks(self, omitted_effects: Set, times: int = 1) -> list[BrokenAssumption]:
         """Assumptions that the run without these effects breaks, and the scene itself keeps."""
-        if self.of(left_out, times) is None or self.of() is None:
+        if self.of(omitted_effects, times) is None or self.of() is None:
             return []
         known = self._broken[frozenset(), 1]
-        return [broken for name, broken in self._broken[left_out, times].items() if name not in known]
+        return [broken for name, broken in self._broken[omitted_effects, times].items() if name not in known]
 
-    def stated(self, left_out: Set, times: int = 1) -> list[Result]:
+    def stated(self, omitted_effects: Set, times: int = 1) -> list[Result]:
         """The results of a variant with the errors that they state, which takes its runs once more and their
         estimates."""
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
-            self.system.computed_quantities(self.changed(left_out, times), self.engine, error=True)
+            self.system.computed_quantities(self.changed(omitted_effects, times), self.engine, error=True)
         return results
 
-    def changed(self, left_out: Set, times: int = 1) -> Any:
+    def changed(self, omitted_effects: Set, times: int = 1) -> Any:
         """The scene of a variant; InputError where it cannot be."""
         if self._opened:
-            return self.scene.without(left_out).longer(times)
-        scene = without(self.scene, *sorted(left_out)) if left_out else self.scene
+            return self.scene.without(omitted_effects).longer(times)
+        scene = without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
         if times == 1:
             return scene
         table = own_table(scene)
         self.system.coarsen(table, scene, times)
         return rebuilt(table, scene)
 
-    def work(self, left_out: Set, times: int = 1) -> float:
+    def work(self, omitted_effects: Set, times: int = 1) -> float:
         """Work of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through,
         and one for each effect that is left; infinite where there is no run."""
-        run = self.of(left_out, times)
+        run = self.of(omitted_effects, times)
         if run is None:
             return math.inf
-        each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - left_out)
+        each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
         return float(run.counts["calls"] * max(each, 1))
 
-    def per_call(self, left_out: Set) -> float:
+    def per_call(self, omitted_effects: Set) -> float:
         """CPU seconds of one call, the least of a few runs of this process; infinite where there is none."""
-        if left_out not in self._costs:
-            took, run = list[float](), self.of(left_out) if self.executor is None else self._run(left_out, 1)
+        if omitted_effects not in self._costs:
+            took, run = (
+                list[float](),
+                self.of(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
+            )
             while run is not None and (len(took) < 2 or (len(took) < REPEATS and sum(took) < ENOUGH)):
                 took.append(run.seconds)
-                self._costs[left_out] = min(took) / run.counts["calls"]
-                run = self._run(left_out, 1)
-            self._costs.setdefault(left_out, math.inf)
-        return self._costs[left_out]
+                self._costs[omitted_effects] = min(took) / run.counts["calls"]
+                run = self._run(omitted_effects, 1)
+            self._costs.setdefault(omitted_effects, math.inf)
+        return self._costs[omitted_effects]
 
     def lengths(self) -> list[int]:
         """Factors by which a step may be longer, such that whole numbers of steps make up the run."""
@@ -182,7 +185,7 @@ class Variants:
         return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 
     def window(self, steps: int) -> "Variants":
-        """The first part of the run, of at least so many steps, or all of it if it has not many more.
+        """Variants of the run's first part, of at least ``steps`` steps; the run itself where it is hardly longer.
 
         Of a length that the scene may have: whole samples of what it measures, for one."""
         if self._opened:

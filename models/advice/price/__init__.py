@@ -12,7 +12,7 @@ from models.advice.price.problem import Setting
 
 
 @dataclass(frozen=True)
-class Ladder:
+class SettingLadder:
     """Settings of one engine's method, from coarse to fine.
 
     values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
@@ -36,9 +36,9 @@ class Ladder:
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
         return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
 
-    def work(self, before: float, now: float) -> float:
+    def work(self, old_value: float, new_value: float) -> float:
         """Ratio of the work at one setting's value to that at another: cells lie along and across."""
-        return 1.0 if self.adaptive else (before / now) ** (2 if self.cells else 1)
+        return 1.0 if self.adaptive else (old_value / new_value) ** (2 if self.cells else 1)
 
 
 class InCells(Setting):
@@ -50,7 +50,7 @@ class InCells(Setting):
 
 
 @dataclass(frozen=True)
-class Answer:
+class PricedRun:
     """times (n,) in s from 0; values (n, k) of the quantity's channels, in its unit; counts of what it took."""
 
     times: np.ndarray
@@ -101,15 +101,15 @@ class PricedScene(Protocol):
         """Name among the counts of what work is counted in."""
         ...
 
-    def ladders(self) -> list[Ladder]:
-        """Every method of every engine that was asked for."""
+    def ladders(self) -> list[SettingLadder]:
+        """Ladders of settings, one for each method of each requested engine."""
         ...
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """Settings that are refined until the truth is known; each step is half the one before."""
         ...
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """A setting of another family that must agree with the reference's last one; None where there is none."""
         ...
 
@@ -117,7 +117,7 @@ class PricedScene(Protocol):
         """Build and run; InputError or RunFailed where that cannot be done."""
         ...
 
-    def answer(self, solution: Any) -> Answer:
+    def answer(self, solution: Any) -> PricedRun:
         """The quantity in what ``solve`` gave."""
         ...
 

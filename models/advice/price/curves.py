@@ -45,7 +45,7 @@ def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
 
 
 @dataclass(frozen=True)
-class Reach:
+class ToleranceCost:
     """Cost of meeting a tolerance: cost, the setting's value, and how both were found.
 
     "tried" : the first setting that does, nothing in between; "coarsest" : already the coarsest setting
@@ -64,7 +64,7 @@ def reach(
     target: float,
     order: int = 0,
     extrapolate: bool = False,
-) -> Reach | None:
+) -> ToleranceCost | None:
     """Cost at which a curve meets ``target`` and stays below it.
 
     Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the
@@ -75,19 +75,19 @@ def reach(
     table = np.array(sorted(zip(values, errors, costs, strict=True), reverse=True))
     above = np.flatnonzero(table[:, 1] > target)
     if not len(above):
-        return Reach(float(table[0, 2]), float(table[0, 0]), "coarsest")
+        return ToleranceCost(float(table[0, 2]), float(table[0, 0]), "coarsest")
     last = int(above[-1])
     if last + 1 < len(table) and not order:
-        return Reach(float(table[last + 1, 2]), float(table[last + 1, 0]), "tried")
+        return ToleranceCost(float(table[last + 1, 2]), float(table[last + 1, 0]), "tried")
     if last + 1 < len(table):
         logs = np.log(table[last : last + 2])
         part = (logs[0, 1] - np.log(target)) / (logs[0, 1] - logs[1, 1])
         value, _, cost = np.exp(logs[0] + part * (logs[1] - logs[0]))
-        return Reach(float(cost), float(value), "interpolated")
+        return ToleranceCost(float(cost), float(value), "interpolated")
     if not (extrapolate and order):
         return None
     finer = (table[-1, 1] / target) ** (1 / order)
-    return Reach(float(table[-1, 2] * finer), float(table[-1, 0] / finer), "extrapolated")
+    return ToleranceCost(float(table[-1, 2] * finer), float(table[-1, 0] / finer), "extrapolated")
 
 
 def pareto(costs: Sequence[float], errors: Sequence[float]) -> list[int]:

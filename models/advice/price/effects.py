@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, by_chance, less, relative, rounding
+from models.advice.choice.answer import RunQuantities, by_chance, less, relative, rounding
 from models.advice.choice.variants import Variants, system_of
 from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
@@ -27,7 +27,7 @@ SEED = 11
 
 
 @dataclass(frozen=True)
-class Changed:
+class QuantityChange:
     """A quantity's largest change of all cases: rms of a path's difference, or a number's, and by its own size; what
     chance may add to the latter."""
 
@@ -39,7 +39,7 @@ class Changed:
 
 
 @dataclass(frozen=True)
-class Price:
+class EffectPrice:
     """An effect that a scene names (``there``) or could have; ``why`` it has no price, "" where it has.
 
     counts : steps, calls, states without and with it; micros : CPU microseconds of a step that it adds, median and
@@ -55,7 +55,7 @@ class Price:
     counts: tuple[dict[str, int], dict[str, int]] = ({}, {})
     micros: tuple[float, float] = (np.nan, np.nan)
     ratio: tuple[float, float, float] = (np.nan, np.nan, np.nan)
-    changes: tuple[Changed, ...] = ()
+    changes: tuple[QuantityChange, ...] = ()
     gone: tuple[str, ...] = ()
     keeps: tuple[str, ...] = ()
 
@@ -74,7 +74,7 @@ class PriceList:
     whole: int
     counts: dict[str, int]
     micros: tuple[float, float]
-    prices: tuple[Price, ...]
+    prices: tuple[EffectPrice, ...]
 
 
 def price_list(scene: Any, engine: str | None = None) -> PriceList:
@@ -90,8 +90,8 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     variants = all_of_it.window(STEPS)
     short, names = variants.scene, (*variants.effects, *variants.absent)
     with breaches() as broken_alone:
-        base: Answer = system.computed_quantities(short, engine)
-    runs: dict[str, Callable[[], Answer]] = {"": partial(system.computed_quantities, short, engine)}
+        base: RunQuantities = system.computed_quantities(short, engine)
+    runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
@@ -124,7 +124,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     )
 
 
-def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
+def _turns(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (turns,) of every run."""
     micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
@@ -146,20 +146,20 @@ def spread(values: np.ndarray) -> tuple[float, float]:
 def _price(
     variants: Variants,
     name: str,
-    base: Answer,
-    other_answer: Answer | None,
+    base: RunQuantities,
+    other_answer: RunQuantities | None,
     took: np.ndarray | None,
     unchanged: np.ndarray,
     why: str,
-) -> Price:
+) -> EffectPrice:
     there, says = name in variants.effects, variants.says(name)
     if other_answer is None or took is None:
-        return Price(name, there, says, why)
+        return EffectPrice(name, there, says, why)
     before, after = (other_answer, base) if there else (base, other_answer)
     slow, fast = (unchanged, took) if there else (took, unchanged)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in after.quantities if key not in before.quantities)
-    return Price(
+    return EffectPrice(
         name,
         there,
         says,
@@ -172,21 +172,21 @@ def _price(
     )
 
 
-def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
+def _changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
     """Changes of the quantities that both runs have, relative to the scene's size."""
     changed = []
     for name, quantity in base.quantities.items():
-        if name in other.quantities:
+        if name in other_answer.quantities:
             try:
-                change = less(other.quantities[name].cases, quantity.cases)
+                change = less(other_answer.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
             size = quantity.sizes
             if quantity.sampled:
                 share, chance = by_chance(change, quantity.cases)
-                changed.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
+                changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             most = max(float(np.sqrt(np.mean(difference**2))) for difference in change)
             moved = most > rounding(base, quantity.unit)
-            changed.append(Changed(name, quantity.unit, most, relative(change, size) if moved else 0.0))
+            changed.append(QuantityChange(name, quantity.unit, most, relative(change, size) if moved else 0.0))
     return tuple(sorted(changed, key=lambda difference: -difference.relative))

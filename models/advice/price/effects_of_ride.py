@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
+from models.advice.price.effects import ROUNDS, SEED, EffectPrice, PriceList, QuantityChange, spread
 from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import confirmed
@@ -38,7 +38,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
     micros = _turns(systems)
     says = listing(scene.system)
     prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
-    prices += [_price(whole, name, says[name], more[name], micros, there=False) for name in more]
+    prices += [_price(whole, name, says[name], more[name], micros, is_present=False) for name in more]
     return PriceList(
         f"{scene.title} (at {whole.speed:g} m/s)",
         "closed form",
@@ -95,17 +95,22 @@ def _step_microseconds(A: np.ndarray) -> float:
 
 
 def _price(
-    full_scene: FullScene, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray], there: bool = True
-) -> Price:
-    """Price of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
+    full_scene: FullScene,
+    name: str,
+    description: str,
+    other: Reduced | str,
+    micros: dict[str, np.ndarray],
+    is_present: bool = True,
+) -> EffectPrice:
+    """Price of an effect that is ``is_present``, by the scene without it, or of one more, by the scene with it."""
     if isinstance(other, str):
-        return Price(name, there, says, other)
-    without_it, with_it = ((other, micros[name]), (full_scene.full, micros[""]))[:: 1 if there else -1]
+        return EffectPrice(name, is_present, description, other)
+    without_it, with_it = ((other, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
     gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
-    return Price(
+    return EffectPrice(
         name,
-        there,
-        says,
+        is_present,
+        description,
         "",
         (_counts(without_it[0]), _counts(with_it[0])),
         spread(with_it[1] - without_it[1]),
@@ -115,7 +120,7 @@ def _price(
     )
 
 
-def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[Changed, ...]:
+def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
     """Standard deviations, exact; infinite where white noise reaches a quantity."""
     names = full_scene.full.system.names
     units = [output.unit for output in full_scene.linear.outputs]
@@ -126,7 +131,7 @@ def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[Changed, ...]:
     except InputError:
         return ()
     changes = [
-        Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
+        QuantityChange(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
         for name, unit, a, b in zip(names, units, full, left, strict=True)
         if np.isfinite(a) and a > 0.0
     ]

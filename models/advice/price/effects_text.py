@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price.effects import Changed, Price, PriceList
+from models.advice.price.effects import EffectPrice, PriceList, QuantityChange
 
 SHOWN_QUANTITIES = 3
 """Quantities of an effect that are printed; JSON has all."""
@@ -51,8 +51,8 @@ def _number(value: float, digits: int) -> str:
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
 
-def _price(price: Price, quantities: list[str]) -> list[str]:
-    """One effect: its cost in one line, what it changes in another."""
+def _price(price: EffectPrice, quantities: list[str]) -> list[str]:
+    """Text on an effect: a line on its cost, and a line on the quantities that it changes."""
     name = f"    {price.name:<{WIDTH}} "
     if price.why:
         return [f"{name}no price: {price.why}"]
@@ -66,21 +66,21 @@ def _price(price: Price, quantities: list[str]) -> list[str]:
     return [cost, *(f"    {'':<{WIDTH}} {row}" for row in rows)]
 
 
-def _counts(price: Price) -> str:
+def _counts(price: EffectPrice) -> str:
     """Text of the counts that an effect changes."""
     before, after = price.counts
     told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
     return "; " + ", ".join(told) if told else ""
 
 
-def _changes(price: Price, quantities: list[str]) -> str:
+def _changes(price: EffectPrice, quantities: list[str]) -> str:
     """The quantities that were asked for, or those that change most."""
     asked = [change for change in price.changes if change.name in quantities]
     shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
     return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
 
 
-def _changed(change: Changed) -> str:
+def _changed(change: QuantityChange) -> str:
     unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
     name = change.name.partition(" [")[0]
     beside = f" +- {_number(100 * change.chance, 2)} %" if change.chance else ""

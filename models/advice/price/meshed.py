@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 
@@ -76,24 +76,26 @@ class MeshedScene(ABC):
         steps = dict.fromkeys(self._part(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """Every step of every engine over the cells, or the steps alone."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, HALVINGS)))
-            return [Ladder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
+            return [SettingLadder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
         values = tuple(1.0 / n for n in sorted({*CELLS, self.cells}))
         usual = f"RK4 at {1e3 * self._part(self.step):.3g} ms"
         return [
-            Ladder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
+            SettingLadder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
             for engine in self.engines
             for method in self.steps
         ]
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """Twice the cells on every rung and half the step on every second; or half the step alone."""
         if not self.cells:
-            return Ladder(self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4)
-        return Ladder(
+            return SettingLadder(
+                self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4
+            )
+        return SettingLadder(
             self.reference_engine,
             REFINED_TOGETHER,
             tuple(1.0 / (FIRST_CELLS * 2**k) for k in range(RUNGS)),
@@ -102,9 +104,9 @@ class MeshedScene(ABC):
             sure=SURE,
         )
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """DOP853; None where there are cells, for all solvers share the error that these have."""
-        return None if self.cells else Setting("reference", OTHER_METHOD, last.value, 0)
+        return None if self.cells else Setting("reference", OTHER_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> Any:
         """Number of cells, 0 where the scene has none, and the run with a setting for a duration (s)."""
@@ -116,11 +118,11 @@ class MeshedScene(ABC):
             return cells, self.run(setting.engine, cells, self._tied(rung), duration)
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
-    def answer(self, solution: Any) -> Answer:
+    def answer(self, solution: Any) -> PricedRun:
         """The quantity, with the cells that it took."""
         cells, run = solution
         times, values, asked = self.read(run)
-        return Answer(times, values, {"force calls": asked, "contact cells": asked * cells**2})
+        return PricedRun(times, values, {"force calls": asked, "contact cells": asked * cells**2})
 
     def _tied(self, rung: int) -> float:
         return self._part(self.longest) / 2 ** (max(0, rung) // 2)

@@ -67,7 +67,7 @@ class Problem(Protocol):
     tolerances: tuple[float, ...]
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """All settings to try, or the named small share of them."""
+        """All settings to try, or the small share that quick runs use."""
         ...
 
     def setting(self, engine: str, method: str, value: float) -> Setting:

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder, PricedScene
+from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.advice.price.search import Search, Tried
-from models.advice.price.truth import Truth, truth
+from models.advice.price.search import Search, TriedSetting
+from models.advice.price.truth import ReferenceTruth, truth
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
 from models.ensemble.runner import block_results
@@ -58,7 +58,7 @@ class SettingChoice:
     its force calls, its seconds (median), and those of the rounds in which it was timed beside others; ``confirmed`` :
     over the whole run."""
 
-    tried: Tried
+    tried: TriedSetting
     error: float
     calls: float
     seconds: float
@@ -75,7 +75,7 @@ class Default:
     """An engine's default method: its error as it comes (None if it gave no answer, then ``reason``), and refined to
     meet the tolerance; ``extrapolated`` by its declared order where no step tried was fine enough."""
 
-    as_it_is: Tried
+    as_it_is: TriedSetting
     refined: SettingChoice | None
     extrapolated: bool
 
@@ -87,11 +87,11 @@ class Recommendation:
 
     scene: PricedScene
     tolerance: float
-    searched: Truth
-    truth: Truth
+    searched: ReferenceTruth
+    truth: ReferenceTruth
     winners: Winners
     defaults: dict[str, Default]
-    tried: tuple[Tried, ...]
+    tried: tuple[TriedSetting, ...]
 
     @property
     def whole(self) -> bool:
@@ -147,7 +147,7 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
 
 def _timed_settings(search: Search) -> list[SettingChoice]:
     """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
-    curves: dict[str, Tried] = {}
+    curves: dict[str, TriedSetting] = {}
     for attempt in search.meeting():
         coarsest = curves.setdefault(attempt.setting.curve, attempt)
         if attempt.setting.value > coarsest.setting.value:
@@ -163,9 +163,9 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     ]
 
 
-def _rivals(attempts: list[Tried]) -> list[Tried]:
+def _rivals(attempts: list[TriedSetting]) -> list[TriedSetting]:
     """The settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
-    rivals = dict[Tried, None]()
+    rivals = dict[TriedSetting, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
         alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
         least = min(attempt.seconds for attempt in alike)
@@ -178,7 +178,7 @@ def _rivals(attempts: list[Tried]) -> list[Tried]:
     return list(rivals)
 
 
-def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
+def _raced(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
     """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
     seconds = _rounds(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
@@ -201,7 +201,7 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     }
 
 
-def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, np.ndarray]:
+def _rounds(search: Search, rivals: list[TriedSetting], rounds: int) -> dict[Setting, np.ndarray]:
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
     taken = interleave(jobs, rounds, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
@@ -233,14 +233,14 @@ def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
     return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER_RATIO
 
 
-Known = tuple[Truth, list[SettingChoice], Winners]
+Known = tuple[ReferenceTruth, list[SettingChoice], Winners]
 
 
 def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None) -> Known:
     """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
     rung = max(0, search.truth.rung - 1)
-    known = truth(scene, search.tolerance, scene.whole, rung, twice=False, executor=executor)
+    known = truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
     able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed, winners)}
     over = Search(scene, known, search.tolerance, scene.whole)
@@ -262,25 +262,25 @@ class _Confirmed:
     than an error that is too large."""
 
     choice: SettingChoice | None
-    failed: list[Tried] = field(default_factory=list)
+    failed: list[TriedSetting] = field(default_factory=list)
 
 
-def _valid_over_run(over: Search, block: tuple[Ladder, SettingChoice]) -> _Confirmed:
+def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _Confirmed:
     """A setting, or the next finer one of its method that meets the tolerance over the whole run.
 
     The seconds of all attempts are told by the rounds in which the first was timed.
     """
-    (ladder, choice), failed = block, list[Tried]()
+    (ladder, choice), failed = block, list[TriedSetting]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
     for _ in range(ATTEMPTS):
         ratio = ladder.work(first.setting.value, ladder.values[i])
-        now = over.attempt(ladder.setting(i))
+        now = search.attempt(ladder.setting(i))
         now = replace(now, seconds=ratio * choice.seconds) if now.seconds else now
         failed += [now] if now.status != "ok" else []
-        if over.meets(now):
+        if search.meets(now):
             rounds = tuple(ratio * s for s in choice.rounds)
             return _Confirmed(SettingChoice(now, now.error, now.calls, now.seconds, True, rounds), failed)
-        finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
+        finer = (now.error / search.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
         if i < 0:
@@ -289,47 +289,47 @@ def _valid_over_run(over: Search, block: tuple[Ladder, SettingChoice]) -> _Confi
 
 
 def _resolved(
-    scene: PricedScene, known: Truth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+    scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> Known:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
     shown = _winners_and_defaults(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
-    if _blurred(known, errors):
+    if _blurred(truth, errors):
         answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
-        known, errors = _finer_truth(scene, known, answers, executor)
+        truth, errors = _finer_truth(scene, truth, answers, executor)
     told = {
-        choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], known.uncertainty))
+        choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], truth.uncertainty))
         for choice in shown
     }
     return (
-        known,
+        truth,
         [told.get(choice.tried.setting, choice) for choice in timed],
         {key: told[choice.tried.setting] for key, choice in winners.items()},
     )
 
 
-def _whole_answer(scene: PricedScene, setting: Setting) -> Answer:
+def _whole_answer(scene: PricedScene, setting: Setting) -> PricedRun:
     return scene.answer(scene.solve(setting, scene.whole))
 
 
-def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
+def _blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
     """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
     return (
-        min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty
-        and DEARER * known.seconds < LONG_ROUNDS_SECONDS
+        min(errors.values(), default=np.inf) < RESOLVED * truth.uncertainty
+        and DEARER * truth.seconds < LONG_ROUNDS_SECONDS
     )
 
 
 def _finer_truth(
-    scene: PricedScene, known: Truth, answers: dict[Setting, Answer], executor: Executor | None
-) -> tuple[Truth, dict[Setting, float]]:
+    scene: PricedScene, known: ReferenceTruth, answers: dict[Setting, PricedRun], executor: Executor | None
+) -> tuple[ReferenceTruth, dict[Setting, float]]:
     """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
     while _blurred(known, errors):
         try:
             tolerance = scene.reference().sure * known.uncertainty
-            finer = truth(scene, tolerance, scene.whole, known.rung, twice=False, executor=executor)
+            finer = truth(scene, tolerance, scene.whole, known.rung, second_method=False, executor=executor)
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
         if not finer.uncertainty < known.uncertainty:
@@ -338,7 +338,7 @@ def _finer_truth(
     return known, errors
 
 
-def _default_cost(search: Search, ladder: Ladder, timed: list[SettingChoice]) -> Default | None:
+def _default_cost(search: Search, ladder: SettingLadder, timed: list[SettingChoice]) -> Default | None:
     """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
@@ -355,6 +355,6 @@ def _default_cost(search: Search, ladder: Ladder, timed: list[SettingChoice]) ->
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)
     longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration
-    guess = Tried(setting, "ok", "", search.tolerance)
+    guess = TriedSetting(setting, "ok", "", search.tolerance)
     refined = SettingChoice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
     return Default(as_it_is, refined, True)

@@ -16,14 +16,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.advice.price.curves import HOLLOW, Reach, coinciding, observed_order, pareto, reach
+from models.advice.price.curves import HOLLOW, ToleranceCost, coinciding, observed_order, pareto, reach
 from models.advice.price.problem import Problem, Setting
 from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
-Reaches = dict[str, Reach]
+Reaches = dict[str, ToleranceCost]
 WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
 RIVALS = ("exudyn", "mujoco")
@@ -69,8 +69,8 @@ class Point:
 class Loss:
     """Cost of a default method divided by that of the cheapest setting, for the same error.
 
-    factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``Reach``, for the
-    default's side.
+    factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``ToleranceCost``,
+    for the default's side.
     """
 
     factor: float
@@ -80,7 +80,7 @@ class Loss:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredPoints:
     """All points of a problem, with what tables and figures need to know of it (see ``Problem``); as JSON keeps it."""
 
     key: str
@@ -178,16 +178,16 @@ class Measured:
 
     def _reach(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
-    ) -> Reach | None:
+    ) -> ToleranceCost | None:
         """``curves.reach`` on the points of one curve."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
         return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)
 
-    def loss(self, target: float, kind: str, default: str, among: str = "") -> Loss | None:
-        """Loss of the curve ``default`` against the cheapest one among ``among`` ("" for all); None if none meets
+    def loss(self, target: float, kind: str, default: str, engine: str = "") -> Loss | None:
+        """Loss of the curve ``default`` against the cheapest one among ``engine`` ("" for all); None if none meets
         it."""
-        best = cheapest(self.reaches(target, kind), among)
+        best = cheapest(self.reaches(target, kind), engine)
         usual = self.reaches(target, kind, extrapolate=True).get(default)
         if best is None or usual is None:
             return None
@@ -230,23 +230,23 @@ class Measured:
         return list({p.setting: p for p in chosen}.values())
 
 
-def measured(problem: Problem, points: Iterable[Point]) -> Measured:
+def measured(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
     """A problem with its points."""
-    told = {each.name: getattr(problem, each.name) for each in fields(Measured) if each.name != "points"}
-    return Measured(**told, points=list(points))
+    told = {each.name: getattr(problem, each.name) for each in fields(MeasuredPoints) if each.name != "points"}
+    return MeasuredPoints(**told, points=list(points))
 
 
 TUPLES = ("seconds", "broken")
 """What JSON keeps as lists."""
 
 
-def of_saved(saved: dict[str, Any]) -> Measured:
-    """A ``Measured`` from the dictionary that ``dataclasses.asdict`` made of it."""
+def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
+    """A ``MeasuredPoints`` from the dictionary that ``dataclasses.asdict`` made of it."""
     points = [
         Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLES})
-        for p in saved["points"]
+        for p in dictionary["points"]
     ]
-    return Measured(**{**saved, "points": points})
+    return MeasuredPoints(**{**dictionary, "points": points})
 
 
 def attempt(problem: Problem, setting: Setting) -> Point:
@@ -284,7 +284,7 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     )
 
 
-def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measured:
+def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) -> MeasuredPoints:
     """All points of a problem: with the seconds of ``rounds`` interleaved rounds where they decide something, else with
     those of one run.
 
@@ -294,11 +294,11 @@ def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measure
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
         attempt(problem, first)  # imports and compiled code are loaded before anything is timed
     once = measured(problem, [attempt(problem, setting) for setting in settings])
-    rerun = _timed_points(problem, once.racing(), rounds, least)
+    rerun = _timed_points(problem, once.racing(), rounds, minimum_seconds)
     return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
-def _timed_points(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
+def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_seconds: float) -> dict[Setting, Point]:
     """The points with the seconds of their rounds, and whether their last run counted and gave what their first did."""
     last: dict[Setting, Any] = {}
 
@@ -309,7 +309,7 @@ def _timed_points(problem: Problem, points: list[Point], rounds: int, least: flo
     apart = -(-rounds // FEWEST_ROUNDS) if rounds >= FEWEST_ROUNDS else rounds
     every = [apart if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
     jobs = [partial(run, p.setting) for p in points]
-    timed = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
+    timed = interleave(jobs, rounds, minimum_seconds, lasted=lasted, round_interval=every, clock=CLOCK)
     return {
         p.setting: replace(
             p,
@@ -321,24 +321,24 @@ def _timed_points(problem: Problem, points: list[Point], rounds: int, least: flo
     }
 
 
-def _nearly_cheapest(reaches: Reaches, among: str) -> Reaches:
+def _nearly_cheapest(reaches: Reaches, engine: str) -> Reaches:
     """The cheapest curve among those of one engine, or of all, and those that take little longer."""
-    best = cheapest(reaches, among)
+    best = cheapest(reaches, engine)
     return {
         curve: least
         for curve, least in reaches.items()
-        if best and curve.startswith(among) and least.cost <= CLOSE_SECONDS_RATIO * best[1].cost
+        if best and curve.startswith(engine) and least.cost <= CLOSE_SECONDS_RATIO * best[1].cost
     }
 
 
-def resting(points: list[Point], least: Reach) -> list[Point]:
+def resting(points: list[Point], cheapest_reach: ToleranceCost) -> list[Point]:
     """The one or two points of a curve that a reach is made of."""
-    coarser = [p for p in points if p.setting.value >= least.value * (1 - 1e-12)]
-    finer = [p for p in points if p.setting.value <= least.value * (1 + 1e-12)]
+    coarser = [p for p in points if p.setting.value >= cheapest_reach.value * (1 - 1e-12)]
+    finer = [p for p in points if p.setting.value <= cheapest_reach.value * (1 + 1e-12)]
     return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
 
 
-def cheapest(reaches: Reaches, among: str = "") -> tuple[str, Reach] | None:
+def cheapest(reaches: Reaches, engine: str = "") -> tuple[str, ToleranceCost] | None:
     """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
-    able = [item for item in reaches.items() if item[0].startswith(among)]
+    able = [item for item in reaches.items() if item[0].startswith(engine)]
     return min(able, key=lambda item: item[1].cost, default=None)

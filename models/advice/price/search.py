@@ -6,10 +6,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
-from models.advice.price import Ladder, PricedScene
+from models.advice.price import PricedScene, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.runner import Status
-from models.advice.price.truth import Truth
+from models.advice.price.truth import ReferenceTruth
 from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
 
@@ -32,7 +32,7 @@ LARGEST_RELATIVE_ERROR = 10.0
 
 
 @dataclass(frozen=True)
-class Tried:
+class TriedSetting:
     """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run, as the
     processor counts them: other work on the machine is not in them. It is "flagged" where it breaks an assumption that
     the reference keeps."""
@@ -50,10 +50,10 @@ class Search:
     """Settings of a scene tried over ``duration`` (s) against its truth."""
 
     scene: PricedScene
-    truth: Truth
+    truth: ReferenceTruth
     tolerance: float
     duration: float
-    tried: list[Tried] = field(default_factory=list)
+    tried: list[TriedSetting] = field(default_factory=list)
 
     @property
     def held(self) -> float:
@@ -68,7 +68,7 @@ class Search:
             self.climb(ladder)
         return self
 
-    def attempt(self, setting: Setting) -> Tried:
+    def attempt(self, setting: Setting) -> TriedSetting:
         """Try a setting, and keep its result."""
         begun = time.process_time()
         try:
@@ -76,12 +76,12 @@ class Search:
                 solution = self.scene.solve(setting, self.duration)
                 seconds, answer = time.process_time() - begun, self.scene.answer(solution)
         except InputError as error:
-            attempt = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
+            attempt = TriedSetting(setting, "refused", getattr(error, "why", "") or error.allowed)
         except RunFailed as error:
-            attempt = Tried(setting, "raised", str(error))
+            attempt = TriedSetting(setting, "raised", str(error))
         else:
             error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
-            attempt = Tried(setting, "ok", "", error_of, calls, seconds)
+            attempt = TriedSetting(setting, "ok", "", error_of, calls, seconds)
             if not error_of <= LARGEST_RELATIVE_ERROR * max(self.truth.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
                 attempt = replace(attempt, status="SILENT", reason=why)
@@ -92,12 +92,12 @@ class Search:
         self.tried.append(attempt)
         return attempt
 
-    def _warm(self, ladder: Ladder) -> None:
+    def _warm(self, ladder: SettingLadder) -> None:
         """One run that is not timed: an engine's first one imports and compiles."""
         with suppress(InputError, RunFailed):
             self.scene.solve(ladder.setting(_next(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration)
 
-    def climb(self, ladder: Ladder) -> None:
+    def climb(self, ladder: SettingLadder) -> None:
         """Find a ladder's coarsest setting that meets the tolerance: each one tried halves what is left, at least
         nearly always, and the declared order says where to try next, or another engine with the same method."""
         low, high, last, same = 0, len(ladder.values), None, self._elsewhere(ladder)
@@ -117,60 +117,64 @@ class Search:
             else:
                 low = i + 1
 
-    def meeting(self, engine: str = "") -> list[Tried]:
+    def meeting(self, engine: str = "") -> list[TriedSetting]:
         """The tried settings that meet the tolerance, of one engine or of all."""
         return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
-    def meets(self, attempt: Tried) -> bool:
+    def meets(self, attempt: TriedSetting) -> bool:
         """Whether a setting holds the tolerance, and keeps the assumptions that the reference keeps."""
         return attempt.status == "ok" and attempt.error <= self.held
 
-    def _elsewhere(self, ladder: Ladder) -> float:
+    def _elsewhere(self, ladder: SettingLadder) -> float:
         """The value that the method needs in another engine, 0 where none has it."""
         alike = [attempt.setting.value for attempt in self.meeting() if attempt.setting.method == ladder.method]
         return max((value for value in alike if value in ladder.values), default=0.0)
 
-    def _affordable(self, ladder: Ladder, last: Tried) -> int:
+    def _affordable(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
         """The finest rung whose run takes no longer than REFINED_SECONDS, or than what the engine has that meets."""
         best = min(attempt.seconds for attempt in self.meeting(ladder.engine))
-        most = max(REFINED_SECONDS, best) / max(last.seconds, 1e-9)
-        work = [ladder.work(last.setting.value, value) for value in ladder.values]
+        most = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
+        work = [ladder.work(last_tried.setting.value, value) for value in ladder.values]
         return max(i for i, times in enumerate(work) if i == 0 or times <= most)
 
-    def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+    def _hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
         """Whether a rung would cost far more than what its engine has that meets the tolerance."""
         best = self.meeting(ladder.engine)
-        if last is None or not last.seconds or ladder.default or not best:
+        if last_tried is None or not last_tried.seconds or ladder.default or not best:
             return False
-        finer = ladder.work(last.setting.value, ladder.values[i])
-        return all(finer * cost(last) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds, _calls))
+        finer = ladder.work(last_tried.setting.value, ladder.values[i])
+        return all(finer * cost(last_tried) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds, _calls))
 
-    def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+    def _too_long(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
         """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
         best = min((attempt.seconds for attempt in self.meeting()), default=float("inf"))
-        seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
+        seconds = (
+            0.0 if last_tried is None else ladder.work(last_tried.setting.value, ladder.values[i]) * last_tried.seconds
+        )
         if seconds <= max(TOO_LONG, GIVEN_UP_RATIO * best):
             return False
         why = f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s"
-        self.tried.append(Tried(ladder.setting(i), "refused", why))
+        self.tried.append(TriedSetting(ladder.setting(i), "refused", why))
         return True
 
 
 _seconds, _calls = attrgetter("seconds"), attrgetter("calls")
 
 
-def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
+def _next(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting | None, tolerance: float) -> int:
     """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
-    if last is None:
+    if last_tried is None:
         wanted = LOOSE if ladder.adaptive else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else START)
-    elif last.status == "ok" and last.error > 0.0:
-        wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
+    elif last_tried.status == "ok" and last_tried.error > 0.0:
+        wanted = last_tried.setting.value * (tolerance / last_tried.error) ** (
+            1 / (1 if ladder.adaptive else ladder.order or 2)
+        )
     else:
         return (low + high) // 2
     return _rung(ladder, wanted, low, high)
 
 
-def _rung(ladder: Ladder, wanted: float, low: int, high: int) -> int:
+def _rung(ladder: SettingLadder, target: float, low: int, high: int) -> int:
     """The coarsest rung that is no coarser than what is wanted, of those left."""
-    i = bisect_left(ladder.values, -wanted * (1 + 1e-9), key=lambda value: -value)
+    i = bisect_left(ladder.values, -target * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)

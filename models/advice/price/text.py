@@ -6,7 +6,7 @@ from typing import Any
 
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice, Winners
-from models.advice.price.search import Tried
+from models.advice.price.search import TriedSetting
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
 
@@ -117,9 +117,9 @@ def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | 
     return f"; {met}: {', '.join(parts) or 'nothing is cheaper'}"
 
 
-def _failures(tried: tuple[Tried, ...]) -> list[str]:
+def _failures(tried: tuple[TriedSetting, ...]) -> list[str]:
     """Settings without an answer, by method, with the reason of the last one that was tried."""
-    known = defaultdict[tuple[str, str], list[Tried]](list)
+    known = defaultdict[tuple[str, str], list[TriedSetting]](list)
     for attempt in tried:
         if attempt.status != "ok":
             known[attempt.status, f"{LABELS[attempt.setting.engine]} {attempt.setting.method}"].append(attempt)
@@ -177,7 +177,7 @@ def _choice(choice: SettingChoice) -> dict[str, Any]:
     return {**_tried(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
 
 
-def _tried(attempt: Tried) -> dict[str, Any]:
+def _tried(attempt: TriedSetting) -> dict[str, Any]:
     setting = {name: getattr(attempt.setting, name) for name in ("engine", "method", "value")}
     told = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
     return {**setting, **told, "error": attempt.error if attempt.status == "ok" else None}

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder, PricedScene
+from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.core.assumptions import Broken, breaches
+from models.core.assumptions import BrokenAssumption, breaches
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
@@ -24,30 +24,30 @@ MOST_ROWS = 4_000_000
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferenceTruth:
     """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder;
     kink_period : s between kinks of the quantity, 0 where there are none; seconds : of the processor that the reference
     took, which tell how patient to be and are no price; broken : assumptions that the reference breaks, and with it
     every setting that is right."""
 
-    answer: Answer
+    answer: PricedRun
     uncertainty: float
     how: str
     rung: int
     kink_period: float = 0.0
     seconds: float = 0.0
-    broken: tuple[Broken, ...] = ()
+    broken: tuple[BrokenAssumption, ...] = ()
 
-    def beside(self, broken: Mapping[str, Broken]) -> list[Broken]:
+    def beside(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
         """The broken assumptions that the reference keeps."""
         known = {assumption.name for assumption in self.broken}
         return [assumption for name, assumption in broken.items() if name not in known]
 
-    def error(self, other: Answer) -> float:
+    def error(self, other_answer: PricedRun) -> float:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
-        if not np.isfinite(other.values).all():
+        if not np.isfinite(other_answer.values).all():
             return float("inf")
-        return float(np.abs(other.values - values_at(self.answer, other.times, self.kink_period)).max())
+        return float(np.abs(other_answer.values - values_at(self.answer, other_answer.times, self.kink_period)).max())
 
     @property
     def size(self) -> float:
@@ -55,7 +55,7 @@ class Truth:
         return float(np.abs(self.answer.values).max())
 
 
-def values_at(answer: Answer, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
+def values_at(answer: PricedRun, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
     """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
     all of them of one period."""
     last = len(answer.times) - 1
@@ -82,10 +82,11 @@ def truth(
     tolerance: float,
     duration: float,
     rung: int = 0,
-    twice: bool = True,
+    second_method: bool = True,
     executor: Executor | None = None,
-) -> Truth:
-    """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``twice`` : by a second family too.
+) -> ReferenceTruth:
+    """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``second_method`` : also by
+    another family of methods.
 
     executor : computes the first two settings of the reference beside one another: fewer tell nothing.
 
@@ -94,10 +95,12 @@ def truth(
     ladder = scene.reference()
     settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)
     said = _named(ladder.setting(rung))
-    other = scene.second(ladder.setting(rung)) if twice else None
+    other = scene.second(ladder.setting(rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     finer = ladder.said or finer
-    alone = Truth(settled, change, f"{said}; {finer}", rung, scene.kink_period, seconds, tuple(broken.values()))
+    alone = ReferenceTruth(
+        settled, change, f"{said}; {finer}", rung, scene.kink_period, seconds, tuple(broken.values())
+    )
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
@@ -107,10 +110,10 @@ def truth(
     return replace(alone, uncertainty=max(change, differs), how=f"{both}, which differ by")
 
 
-def _change(scene: PricedScene, before: Answer, now: Answer) -> float:
+def _change(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
     """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
-    both = ((now, before), (before, now))
-    return max(Truth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
+    both = ((fine, coarse), (coarse, fine))
+    return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
 
 
 def _named(setting: Setting) -> str:
@@ -120,10 +123,10 @@ def _named(setting: Setting) -> str:
 class _Rung(NamedTuple):
     """A reference's answer, None where it failed; why it did; seconds of the processor; what it broke."""
 
-    answer: Answer | None
+    answer: PricedRun | None
     failure: str
     seconds: float
-    broken: dict[str, Broken]
+    broken: dict[str, BrokenAssumption]
 
 
 def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
@@ -137,11 +140,11 @@ def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
 
 
 def _settled_answer(
-    scene: PricedScene, ladder: Ladder, tolerance: float, duration: float, rung: int, executor: Executor | None
-) -> tuple[Answer, int, float, float, dict[str, Broken]]:
+    scene: PricedScene, ladder: SettingLadder, tolerance: float, duration: float, rung: int, executor: Executor | None
+) -> tuple[PricedRun, int, float, float, dict[str, BrokenAssumption]]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
     seconds that it took; what it broke."""
-    before: Answer | None = None
+    before: PricedRun | None = None
     change, failure = float("inf"), ""
     rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
     job = partial(_of_rung, scene, duration)

@@ -87,23 +87,23 @@ class Candidates:
         return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
 
     @remembered
-    def rest(self, chosen: Set) -> ReducedScene:
+    def rest(self, omitted_effects: Set) -> ReducedScene:
         """The scene less these effects."""
-        return without(self.scene, sorted(chosen, key=lambda effect: effect.name))
+        return without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
     @remembered
-    def system(self, full_scene: FullScene, chosen: Set) -> Reduced | None:
+    def system(self, full_scene: FullScene, omitted_effects: Set) -> Reduced | None:
         """The scene less these effects at a speed; None where nothing sensible is left."""
         try:
-            return full_scene.reduced(self.rest(chosen))
+            return full_scene.reduced(self.rest(omitted_effects))
         except InputError:
             return None
 
-    def screen(self, full_scene: FullScene, chosen: Set) -> Screen | None:
+    def screen(self, full_scene: FullScene, omitted_effects: Set) -> Screen | None:
         """Covariance and adjoints of the scene less the singular ones of these effects."""
-        base = frozenset(effect for effect in chosen if effect.singular)
+        base = frozenset(effect for effect in omitted_effects if effect.singular)
         needs = {name for effect in base for name in effect.needs}
-        return self._screen(full_scene, base | {effect for effect in chosen if effect.name in needs})
+        return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
 
     @remembered
     def _screen(self, full_scene: FullScene, base: Set) -> Screen | None:
@@ -115,19 +115,21 @@ class Candidates:
             return None
 
     @remembered
-    def predicted(self, chosen: Set) -> np.ndarray:
+    def predicted(self, omitted_effects: Set) -> np.ndarray:
         """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
-        return largest_changes(np.array([self._predicted_at(full_scene, chosen) for full_scene in self.screened]))
+        return largest_changes(
+            np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
+        )
 
     @remembered
-    def _predicted_at(self, full_scene: FullScene, chosen: Set) -> np.ndarray:
-        return self._change(full_scene, chosen, self._predict)
+    def _predicted_at(self, full_scene: FullScene, omitted_effects: Set) -> np.ndarray:
+        return self._change(full_scene, omitted_effects, self._predict)
 
-    def share(self, chosen: Set) -> float:
+    def share(self, omitted_effects: Set) -> float:
         """Largest predicted change by the tolerance; inf beyond it, by whichever speed shows so first."""
         worst = 0.0
         for i, full_scene in enumerate(self._suspects):
-            share = float(abs(self._predicted_at(full_scene, chosen)).max()) / self.tolerance
+            share = float(abs(self._predicted_at(full_scene, omitted_effects)).max()) / self.tolerance
             if not share <= 1.0:
                 self._suspects.insert(0, self._suspects.pop(i))  # what breaks it here is likely to break the next one
                 return inf
@@ -135,26 +137,26 @@ class Candidates:
         return worst
 
     @remembered
-    def confirm(self, chosen: Set) -> np.ndarray:
+    def confirm(self, omitted_effects: Set) -> np.ndarray:
         """The same by the exact solve, of all listed speeds."""
         return largest_changes(
-            np.array([self._change(full_scene, chosen, self._confirm) for full_scene in self.full_scenes])
+            np.array([self._change(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes])
         )
 
     @remembered
-    def solved(self, chosen: Set) -> np.ndarray:
+    def solved(self, omitted_effects: Set) -> np.ndarray:
         """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
         return largest_changes(
-            np.array([self._change(full_scene, chosen, self._solve) for full_scene in self.full_scenes])
+            np.array([self._change(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes])
         )
 
-    def certified(self, chosen: Set) -> bool:
+    def certified(self, omitted_effects: Set) -> bool:
         """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
         what the motions said of them."""
-        return all(self._exact(full_scene, chosen) for full_scene in self.screened)
+        return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened)
 
-    def _exact(self, full_scene: FullScene, chosen: Set) -> bool:
-        screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, chosen)
+    def _exact(self, full_scene: FullScene, omitted_effects: Set) -> bool:
+        screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, omitted_effects)
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
@@ -163,41 +165,41 @@ class Candidates:
         same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all())
         return same and bool((abs(two / variance - 1.0) <= IDENTITY_ERROR).all())
 
-    def _predict(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
-        screen = self.screen(full_scene, chosen)
+    def _predict(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
+        screen = self.screen(full_scene, omitted_effects)
         return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
 
-    def _confirm(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+    def _confirm(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         return confirmed(reduced, self.rows)
 
-    def _solve(self, full_scene: FullScene, chosen: Set, reduced: Reduced) -> np.ndarray:
+    def _solve(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         variances = solved_in_motions(reduced, self.rows)
         return confirmed(reduced, self.rows) if variances is None else variances
 
     def _change(
-        self, full_scene: FullScene, chosen: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
+        self, full_scene: FullScene, omitted_effects: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
     ) -> np.ndarray:
         """Changes (quantities,) at a speed; inf where there is no system, or an unstable one."""
-        reduced, full = self.system(full_scene, chosen), self.full[self.full_scenes.index(full_scene)]
+        reduced, full = self.system(full_scene, omitted_effects), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
         with suppress(InputError):  # unstable
-            left = left if reduced is None else variances(full_scene, chosen, reduced)
+            left = left if reduced is None else variances(full_scene, omitted_effects, reduced)
         return np.asarray(np.sqrt(left / full) - 1.0)
 
     @remembered
-    def between(self, chosen: Set) -> np.ndarray:
+    def between(self, omitted_effects: Set) -> np.ndarray:
         """Changes (quantities,) of the worst speed of the range; inf where there is no system."""
-        reduced = self.system(self.full_scenes[0], chosen)
+        reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
-        return largest_changes(self.near.changes(self.rest(chosen)))
+        return largest_changes(self.near.changes(self.rest(omitted_effects)))
 
     @remembered
-    def off(self, chosen: Set) -> np.ndarray:
+    def off(self, omitted_effects: Set) -> np.ndarray:
         """The same with parameters off, in the corner that is worst for each quantity."""
-        rest = self.rest(chosen)
+        rest = self.rest(omitted_effects)
         return largest_changes(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 
     def holds(self, changes: np.ndarray) -> bool:
@@ -210,40 +212,40 @@ class Candidates:
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
     @remembered
-    def cost(self, chosen: Set) -> Cost:
+    def cost(self, omitted_effects: Set) -> Cost:
         """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
-        rest = self.rest(chosen)
+        rest = self.rest(omitted_effects)
         alike = of_speed(rest.vehicle, 0.0) is None
         costs = [self._cost(full_scene, rest) for full_scene in (self.screened[:1] if alike else self.screened)]
         return max(costs, key=lambda c: c.calls)
 
-    def _cost(self, full_scene: FullScene, rest: ReducedScene) -> Cost:
+    def _cost(self, full_scene: FullScene, reduced_scene: ReducedScene) -> Cost:
         try:
-            return cost(full_scene.vehicles.of(rest, full_scene.speed), full_scene.road(rest))
+            return cost(full_scene.vehicles.of(reduced_scene, full_scene.speed), full_scene.road(reduced_scene))
         except InputError:
             return Cost(0, 0.0, inf)
 
     @remembered
-    def accurate(self, chosen: Set) -> Cost:
+    def accurate(self, omitted_effects: Set) -> Cost:
         """At the longest step that keeps the tolerance at all screened speeds, what is left out and steps together."""
-        return self.at_step(chosen, longest_step(self.marches(chosen), self.exact(), self.tolerance))
+        return self.at_step(omitted_effects, longest_step(self.marches(omitted_effects), self.exact(), self.tolerance))
 
     def exact(self) -> list[np.ndarray]:
         """Standard deviations (quantities,) of the whole scene at the screened speeds."""
         return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 
-    def marches(self, chosen: Set) -> list[March]:
+    def marches(self, omitted_effects: Set) -> list[March]:
         """Runs at the screened speeds."""
         weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
-        rest = self.rest(chosen)
+        rest = self.rest(omitted_effects)
         return [
             March(full_scene.reduced(rest), full_scene.speed, tuple(self.rows), weightings)
             for full_scene in self.screened
         ]
 
-    def at_step(self, chosen: Set, step: float) -> Cost:
+    def at_step(self, omitted_effects: Set, step: float) -> Cost:
         """Cost of runs in steps (s)."""
-        return Cost(self.cost(chosen).states, step, STAGES / step if step else inf)
+        return Cost(self.cost(omitted_effects).states, step, STAGES / step if step else inf)
 
 
 def largest_changes(changes: np.ndarray) -> np.ndarray:

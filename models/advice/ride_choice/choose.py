@@ -84,32 +84,32 @@ class Chooser(Candidates):
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
-    def within_tolerance(self, chosen: Set) -> bool:
+    def within_tolerance(self, omitted_effects: Set) -> bool:
         """Whether the tolerance holds without these effects, wherever and whatever of them is left out.
 
         A certificate is asked of what is chosen at last, and once it failed, of all that it failed for.
         """
-        if not chosen:
+        if not omitted_effects:
             return True
-        if not (self.holds(self.solved(chosen)) and self.holds(self.between(chosen))):
+        if not (self.holds(self.solved(omitted_effects)) and self.holds(self.between(omitted_effects))):
             return False
-        why = self._cancels(chosen)
-        off = np.zeros(len(self.rows)) if why else self.off(chosen)
+        why = self._cancels(omitted_effects)
+        off = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
         if not self.holds(off):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
-            self.refused[chosen] = why
-        return not why and chosen not in self.uncertified
+            self.refused[omitted_effects] = why
+        return not why and omitted_effects not in self.uncertified
 
-    def _cancels(self, chosen: Set) -> str:
+    def _cancels(self, omitted_effects: Set) -> str:
         """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
         is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
         alone = zip(self.effects, self.singles, strict=True)
-        parts = {f"{effect.name} alone changes": step for effect, step in alone if step < chosen}
-        parts |= {f"all but {effect.name} change": chosen - {effect} for effect in chosen}
+        parts = {f"{effect.name} alone changes": step for effect, step in alone if step < omitted_effects}
+        parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
         for said, part in parts.items():
             changes = np.zeros(len(self.rows)) if not part or illegal(part) else self.between(part)
             if np.isfinite(changes).all() and not self.holds(changes):
@@ -117,12 +117,12 @@ class Chooser(Candidates):
         return ""
 
     @remembered
-    def _by_run(self, chosen: Set) -> Cost:
+    def _by_run(self, omitted_effects: Set) -> Cost:
         """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
-        step, marches = self.accurate(chosen).step, self.marches(chosen)
+        step, marches = self.accurate(omitted_effects).step, self.marches(omitted_effects)
         while step and not confirms(marches[len(marches) // 2], step):
             step *= STEP_FACTOR
-        return self.at_step(chosen, step)
+        return self.at_step(omitted_effects, step)
 
     def choose(self) -> RideChoice:
         """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
@@ -159,9 +159,9 @@ class Chooser(Candidates):
             self.uncertified.add(chosen)
         return frozenset(), rounds
 
-    def _reasons(self, chosen: Set) -> tuple[str, ...]:
+    def _reasons(self, omitted_effects: Set) -> tuple[str, ...]:
         """Reasons why larger sets that kept the tolerance were refused."""
-        larger = {refused - chosen: why for refused, why in self.refused.items() if refused - chosen}
+        larger = {refused - omitted_effects: why for refused, why in self.refused.items() if refused - omitted_effects}
         return tuple(
             f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
             for more, why in larger.items()
@@ -187,32 +187,32 @@ class Chooser(Candidates):
             kept = path[: low + 1]
         return kept[-1], rounds
 
-    def _worthwhile(self, chosen: Set) -> Set:
+    def _worthwhile(self, omitted_effects: Set) -> Set:
         """The choice without every effect that may come back for hardly more calls at equal accuracy, or without a
         shorter stable step: calls that are fewer then are so because errors of what is left out and of steps make up
         for each other."""
-        fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
+        fewer = [omitted_effects - {effect} for effect in omitted_effects if not illegal(omitted_effects - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
-            if self._costs_the_same(less, chosen) and self.within_tolerance(less):
+            if self._costs_the_same(less, omitted_effects) and self.within_tolerance(less):
                 return self._worthwhile(less)
-        return chosen
+        return omitted_effects
 
-    def _costs_the_same(self, less: Set, chosen: Set) -> bool:
+    def _costs_the_same(self, less: Set, omitted_effects: Set) -> bool:
         """Whether a smaller set has no shorter stable step than a larger one, or as few calls at equal accuracy."""
         stable = self.cost(less).step
-        if stable >= self.cost(chosen).step * (1 - EQUAL_COST_LOG):
+        if stable >= self.cost(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return True
-        if stable < self.accurate(chosen).step * (1 - EQUAL_COST_LOG):
+        if stable < self.accurate(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return False  # what is in the larger one alone bounds the step
-        return self.accurate(less).calls <= self.accurate(chosen).calls * (1 + EQUAL_COST_LOG)
+        return self.accurate(less).calls <= self.accurate(omitted_effects).calls * (1 + EQUAL_COST_LOG)
 
-    def further(self, chosen: Set) -> dict[Effect, float]:
+    def further(self, omitted_effects: Set) -> dict[Effect, float]:
         """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
         would no longer matter. Only legal and finite ones."""
         changes = {
-            effect: float(abs(self.solved(chosen | step)).max())
+            effect: float(abs(self.solved(omitted_effects | step)).max())
             for effect, step in zip(self.effects, self.singles, strict=True)
-            if effect not in chosen and not illegal(chosen | step)
+            if effect not in omitted_effects and not illegal(omitted_effects | step)
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
@@ -226,14 +226,14 @@ class Chooser(Candidates):
             path.append(path[-1] | step)
         return path
 
-    def _calls_saved(self, chosen: Set, further: Set) -> float:
+    def _calls_saved(self, omitted_effects: Set, further: Set) -> float:
         """Logarithm, of savings worth the tolerance they take."""
         then = self.cost(further).calls
-        saved = log(self.cost(chosen).calls / then) if then < inf else 0.0
+        saved = log(self.cost(omitted_effects).calls / then) if then < inf else 0.0
         return saved if saved > EQUAL_COST_LOG else 0.0
 
-    def _work_saved(self, chosen: Set, further: Set) -> float:
-        now, then = self.cost(chosen), self.cost(further)
+    def _work_saved(self, omitted_effects: Set, further: Set) -> float:
+        now, then = self.cost(omitted_effects), self.cost(further)
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _steps(self) -> list[Set]:
@@ -243,18 +243,18 @@ class Chooser(Candidates):
         white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
         return self.singles + [step | damping for step in white]
 
-    def _best(self, chosen: Set, banned: set[Set], saved: Saved) -> Set:
+    def _best(self, omitted_effects: Set, banned: set[Set], saved: Saved) -> Set:
         """The step that saves most for what it adds to the predicted error; empty if none is within the tolerance."""
-        best, most, now = frozenset[Effect](), 0.0, self.share(chosen)
+        best, most, now = frozenset[Effect](), 0.0, self.share(omitted_effects)
         for step in self._steps():
-            further = chosen | step
-            if further == chosen or step - chosen in banned or step in banned or illegal(further):
+            further = omitted_effects | step
+            if further == omitted_effects or step - omitted_effects in banned or step in banned or illegal(further):
                 continue
-            saves = saved(chosen, further)
+            saves = saved(omitted_effects, further)
             if saves <= NEGLIGIBLE_SHARE * most:
                 continue  # whatever error it adds
             share = self.share(further)
             score = saves / max(share - now, NEGLIGIBLE_SHARE) if share <= 1.0 else 0.0
             if score > most:
-                best, most = step - chosen, score
+                best, most = step - omitted_effects, score
         return best

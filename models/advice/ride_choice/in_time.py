@@ -45,7 +45,7 @@ class Samples(Strict):
 
 
 @dataclass(frozen=True)
-class Pace:
+class CopySteps:
     """Time steps of the copies at a speed (m/s): the road's ``half`` step (s), steps before outputs count and while
     they do, and how the bent springs of the whole vehicle move."""
 
@@ -62,12 +62,12 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class InTime:
+class CopiesInTime:
     """A scene's copies at all its speeds, less ``left_out``, with steps so many ``times`` as long."""
 
     scene: ReducedScene
     samples: Samples
-    paces: tuple[Pace, ...]
+    paces: tuple[CopySteps, ...]
     effects: tuple[Effect, ...]
     left_out: frozenset[str] = frozenset()
     times: int = 1
@@ -93,7 +93,7 @@ class InTime:
         """Effects that the scene does not name."""
         return absent_effects(self.scene.ride)
 
-    def beside(self, name: str) -> "InTime":
+    def beside(self, name: str) -> "CopiesInTime":
         """The scene with an absent effect at its usual values; InputError where the effect cannot be added."""
         scene = ReducedScene.complete(with_effects(self.scene.ride, name))
         _check(scene)
@@ -104,7 +104,7 @@ class InTime:
         """Number of steps of all copies at all speeds."""
         return self.samples.copies * sum(pace.steps for pace in self.paces) // self.times
 
-    def without(self, names: Iterable[str]) -> "InTime":
+    def without(self, names: Iterable[str]) -> "CopiesInTime":
         """The scene without these effects; InputError where they may not be left out."""
         left_out = self.left_out | set(names)
         chosen = [effect for effect in self.effects if effect.name in left_out]
@@ -114,11 +114,11 @@ class InTime:
         fresh = [effect for effect in chosen if effect.name not in self.left_out]
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
-    def longer(self, times: int) -> "InTime":
+    def longer(self, times: int) -> "CopiesInTime":
         """The scene in steps so many times as long."""
         return replace(self, times=self.times * times)
 
-    def fewer(self, steps: int) -> "InTime":
+    def fewer(self, steps: int) -> "CopiesInTime":
         """The scene with as many copies as take about so many steps, and no fewer than tell a standard error."""
         copies = max(FEWEST_COPIES, -(-self.samples.copies * steps // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
@@ -127,16 +127,16 @@ class InTime:
     def _excitation(self) -> Excitation:
         return self.scene.excitation()
 
-    def vehicle(self, pace: Pace) -> SpatialVehicle:
+    def vehicle(self, pace: CopySteps) -> SpatialVehicle:
         """The vehicle without the effects at a speed; InputError where a run in time needs an effect."""
         return reduced_vehicle(self.scene, pace.springs)
 
-    def roads(self, pace: Pace) -> np.ndarray:
+    def roads(self, pace: CopySteps) -> np.ndarray:
         """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
         roads = _roads(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
         return np.ascontiguousarray(roads[:: self.times])
 
-    def squares(self, pace: Pace, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+    def squares(self, pace: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
         """Outputs, and each copy's mean square (copies, p) about the mean of all."""
         step = 2.0 * pace.half * self.times
         march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
@@ -150,14 +150,14 @@ class InTime:
         return march.plain.outputs, second - 2 * mean * first + mean**2
 
 
-def in_time(scene: ReducedScene) -> InTime:
+def in_time(scene: ReducedScene) -> CopiesInTime:
     """The copies in time of a whole scene; InputError for one that has a closed form, or that no copies answer."""
     _check(scene)
     speeds, options = scene.ride.speeds, scene.ride.options
     assert speeds is not None
     samples = Samples.model_validate({key: value for key, value in options.items() if key in Samples.model_fields})
     paces = tuple(_pace(scene, float(speed), samples.lasting) for speed in speeds.all())
-    return InTime(scene, samples, paces, tuple(effect for effect in effects_of(scene) if _may_go(scene, effect)))
+    return CopiesInTime(scene, samples, paces, tuple(effect for effect in effects_of(scene) if _may_go(scene, effect)))
 
 
 def _check(scene: ReducedScene) -> None:
@@ -171,13 +171,13 @@ def _check(scene: ReducedScene) -> None:
     check_rates(scene.vehicle, scene.excitation(), ride.file)
 
 
-def _pace(scene: ReducedScene, speed: float, lasting: float) -> Pace:
+def _pace(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
     excitation = scene.excitation()
     linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
     half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half
     unit = 2.0 * half * UNIT
     settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(linear.vehicle), lasting))
-    return Pace(speed, half, settling, counted, linear.springs)
+    return CopySteps(speed, half, settling, counted, linear.springs)
 
 
 def _may_go(scene: ReducedScene, effect: Effect) -> bool:
@@ -194,10 +194,12 @@ def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> Spati
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
 
-    def body(before: Body) -> Body:
-        if before.name in seats:
-            return replace(before, freedoms=(), parent=seats[before.name])
-        return replace(before, freedoms=tuple(f for f in before.freedoms if (before.name, f) not in scene.locked))
+    def body(full_body: Body) -> Body:
+        if full_body.name in seats:
+            return replace(full_body, freedoms=(), parent=seats[full_body.name])
+        return replace(
+            full_body, freedoms=tuple(f for f in full_body.freedoms if (full_body.name, f) not in scene.locked)
+        )
 
     return replace(
         scene.vehicle,

@@ -197,7 +197,7 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 
 
 def _between(steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]) -> float:
-    """The last of ``FINE`` steps (s), on a logarithmic axis, before the share is above 0, as it is at the second end.
+    """Longest of ``FINE`` logarithmically spaced steps (s) below the first one whose share is above 0.
 
     An error grows as a power of the step, so that a line tells where to look next.
     """
@@ -232,7 +232,6 @@ class Cost:
 
 
 def cost(vehicle: ReducedVehicle, excitation: Excitation) -> Cost:
-    """Cost of a vehicle whose every motion dies out on its road; one that grows has no stable step and costs without
-    end."""
+    """Cost of a run of a stable vehicle on its road; infinite for an unstable vehicle, which has no stable step."""
     states, step = len(vehicle.states.A) + len(excitation.heights) * len(excitation.F), vehicle.stable_step
     return Cost(states, step, STAGES / step if step else np.inf)

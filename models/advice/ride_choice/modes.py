@@ -62,7 +62,7 @@ class Modes:
 
 
 def modes_of(A: np.ndarray) -> Modes | None:
-    """Motions of x' = A x, A (n, n); None where they cannot be told apart."""
+    """Eigenvalues and eigenvectors of x' = A x, A (n, n); None where eigenvectors are nearly parallel."""
     rates, V = np.linalg.eig(A)
     try:
         return Modes(rates, V, np.linalg.inv(V)).of(A)

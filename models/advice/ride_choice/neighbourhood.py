@@ -73,20 +73,22 @@ class Neighbourhood:
         self._shifts: dict[Hashable, Shifts] = {}
         self.whole, self.at_few = self._variances(scene, self.vehicles), self._slopes(scene)
 
-    def changes(self, rest: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
+    def changes(self, reduced_scene: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
         """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
         if not factors:
-            return np.asarray(np.sqrt(self._variances(rest, self.vehicles) / self.whole) - 1.0)
-        scene, rest = (replace(each, vehicle=scaled_vehicle(each.vehicle, factors)) for each in (self.scene, rest))
+            return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.whole) - 1.0)
+        scene, reduced_scene = (
+            replace(each, vehicle=scaled_vehicle(each.vehicle, factors)) for each in (self.scene, reduced_scene)
+        )
         vehicles = Vehicles(scene.vehicle, float(self.speeds[0]), self.vehicles.roads)
-        changes = np.sqrt(self._variances(rest, vehicles) / self._variances(scene, vehicles)) - 1.0
+        changes = np.sqrt(self._variances(reduced_scene, vehicles) / self._variances(scene, vehicles)) - 1.0
         self.off += len(vehicles)
         return np.asarray(changes)
 
-    def corners(self, rest: ReducedScene) -> list[dict[Parameter, float]]:
+    def corners(self, reduced_scene: ReducedScene) -> list[dict[Parameter, float]]:
         """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few
         speeds."""
-        left, full = self._slopes(rest), self.at_few
+        left, full = self._slopes(reduced_scene), self.at_few
         ratio = np.sqrt(left.variances / full.variances)
         logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
@@ -166,7 +168,7 @@ def _signs(slopes: np.ndarray) -> np.ndarray:
 
 
 def _alike(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:
-    """Speeds (m/s) at which a vehicle is the same: each by itself where it depends on the speed."""
+    """Groups of speeds (m/s) at which the vehicle has the same matrices."""
     return [speeds] if of_speed(vehicle, 0.0) is None else [speeds[[i]] for i in range(len(speeds))]
 
 

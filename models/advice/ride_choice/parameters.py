@@ -36,10 +36,10 @@ def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
 def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with its values multiplied by these factors; factors of values that it does not have are ignored."""
 
-    def part(group: str, before: Any) -> Any:
-        known = [key for key in PARAMETERS_OF_PARTS[group] if (group, before.name, key) in factors]
-        after = {key: _times(getattr(before, key), factors[group, before.name, key]) for key in known}
-        return replace(before, **after) if after else before
+    def part(group: str, original_part: Any) -> Any:
+        known = [key for key in PARAMETERS_OF_PARTS[group] if (group, original_part.name, key) in factors]
+        after = {key: _times(getattr(original_part, key), factors[group, original_part.name, key]) for key in known}
+        return replace(original_part, **after) if after else original_part
 
     groups: dict[str, Any] = {
         group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARAMETERS_OF_PARTS

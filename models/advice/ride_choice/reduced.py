@@ -166,7 +166,7 @@ class Vehicles:
         left = limited(self.linear(scene.vehicle, speed), self._mass_of(scene), N)
         states = vehicle_states(left)
         if not len(states.A):
-            raise InputError("", "effects", None, "nothing is left that could move")
+            raise InputError("", "effects", None, "the reduced vehicle has no degree of freedom left")
         return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
 
     def _mass_of(self, scene: ReducedScene) -> np.ndarray:
@@ -211,14 +211,14 @@ class FullScene:
             made = self._made[key] = self._weighted(self._make(scene))
         return made
 
-    def _weighted(self, rest: Reduced) -> Reduced:
+    def _weighted(self, reduced: Reduced) -> Reduced:
         weightings = self.scene.ride.weighting
         if not weightings:
-            return rest
-        system = weighted(rest.system, weightings)
-        more, names = np.eye(len(system.A) - rest.states), tuple(weightings.values())
-        T, left = block_diag(rest.T, more), block_diag(rest.left, more)
-        return replace(rest, system=system, T=T, left=left, weightings=names)
+            return reduced
+        system = weighted(reduced.system, weightings)
+        more, names = np.eye(len(system.A) - reduced.states), tuple(weightings.values())
+        T, left = block_diag(reduced.T, more), block_diag(reduced.left, more)
+        return replace(reduced, system=system, T=T, left=left, weightings=names)
 
     def _make(self, scene: ReducedScene) -> Reduced:
         """Before weightings."""
@@ -247,17 +247,17 @@ class FullScene:
 
 
 def _of_road(
-    scene: ReducedScene, full: Excitation, less: ReducedScene, rest: Excitation
+    scene: ReducedScene, full_road: Excitation, less: ReducedScene, reduced_road: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
-    count, cutoff = full.G.shape[1], scene.ride.road.cutoff
+    count, cutoff = full_road.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto
     if cutoff is not None and less.ride.road.cutoff is None:
         onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
-    added = np.eye(len(full.F) - len(onto), len(rest.F) - len(back))
+    added = np.eye(len(full_road.F) - len(onto), len(reduced_road.F) - len(back))
     onto, back = block_diag(onto, added), block_diag(back, added.T)
-    axles = len(full.heights)
-    if len(rest.heights) == axles:
+    axles = len(full_road.heights)
+    if len(reduced_road.heights) == axles:
         return np.kron(np.eye(axles), onto), np.kron(np.eye(axles), back)
     return np.kron(np.ones((axles, 1)), onto), np.kron(np.eye(axles)[:1], back)

@@ -15,20 +15,20 @@ QUESTION_KEYS = ("quantities", "tolerance", "options")
 """Keys of a scene that belong to its question."""
 
 
-def write(rest: ReducedScene, folder: Path) -> Path:
+def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     """Write both into a folder; returns the scene's path."""
-    scene = own_table(rest.ride)
+    scene = own_table(reduced_scene.ride)
     whole = scene["vehicle"]["file"]
-    vehicle = reduced(parse(vehicle_path(whole, rest.ride.folder)), rest)
+    vehicle = reduced(parse(vehicle_path(whole, reduced_scene.ride.folder)), reduced_scene)
     notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
     with (folder / VEHICLE).open("x") as file:
         file.write(toml({**vehicle, "notes": notes}))
     table = {key: value for key, value in scene.items() if key not in QUESTION_KEYS and value != "auto"}
     road = dict(table.get("road", {}))
     if "file" in road:
-        road["file"] = str(rest.ride.path(road["file"], "road.file").resolve())
+        road["file"] = str(reduced_scene.ride.path(road["file"], "road.file").resolve())
     changes = {
-        "title": f"{rest.ride.title}, less what was left out",
+        "title": f"{reduced_scene.ride.title}, less what was left out",
         "system": "ride",
         "study": CLOSED,
         "vehicle": {**scene["vehicle"], "file": VEHICLE},
@@ -38,18 +38,18 @@ def write(rest: ReducedScene, folder: Path) -> Path:
     return folder / SCENE
 
 
-def reduced(table: dict[str, Any], rest: ReducedScene) -> dict[str, Any]:
+def reduced(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any]:
     """The tables of the whole vehicle less bars, damping of tyres and what the limits name."""
-    bars = {bar.name for bar in rest.vehicle.bars}
-    undamped = {tyre.name for tyre in rest.vehicle.tyres if not tyre.damping}
+    bars = {bar.name for bar in reduced_scene.vehicle.bars}
+    undamped = {tyre.name for tyre in reduced_scene.vehicle.tyres if not tyre.damping}
     changed = dict(table)
     if "anti_roll_bars" in table:
         changed["anti_roll_bars"] = [bar for bar in table["anti_roll_bars"] if bar["name"] in bars]
     changed["tyres"] = [{**tyre, "damping": 0.0} if tyre["name"] in undamped else tyre for tyre in table["tyres"]]
     limits = {
-        "massless": sorted(rest.massless),
-        "rigid": sorted(rest.rigid),
-        "locked": [list(pair) for pair in sorted(rest.locked)],
+        "massless": sorted(reduced_scene.massless),
+        "rigid": sorted(reduced_scene.rigid),
+        "locked": [list(pair) for pair in sorted(reduced_scene.locked)],
     }
     given = {key: names for key, names in limits.items() if names}
     return changed | ({"reduced": given} if given else {})

@@ -18,7 +18,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.advice.ride_choice.reduced import Reduced
 from models.core.errors import InputError
-from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
+from models.ride.covariance import FINITE, StationaryCovariance, lyapunov, noise_of, silence, stationary
 from models.ride.excited import DelayedSystem
 from models.ride.marginal import split_marginal
 
@@ -100,7 +100,7 @@ class Screen:
 
 
 def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bool:
-    """Whether motions of these rates (1/s) have one that does not die out, or not to speak of."""
+    """Whether one of the eigenvalues (1/s) has no damping, or next to none."""
     return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
 
 
@@ -129,7 +129,7 @@ def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
     return row_variances(stationary(reduced.system), rows)
 
 
-def row_variances(covariance: Covariance, rows: list[int]) -> np.ndarray:
+def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarray:
     """Variances (quantities,), inf where an output has none."""
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 

@@ -24,16 +24,16 @@ class Shifts:
     by_road: tuple[np.ndarray, ...]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, others: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
+    def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
         """Of other vehicles less this one, outputs of rows."""
-        before, *after = ([*_matrices(each, rows)] for each in (vehicle, *others))
+        before, *after = ([*_matrices(each, rows)] for each in (vehicle, *other_vehicles))
         moved = [np.array([each[i] for each in after]) - matrix for i, matrix in enumerate(before)]
         return cls(tuple(moved[:3]), tuple(moved[3:5]), tuple(moved[5:8]), tuple(moved[8:]))
 
-    def only(self, there: np.ndarray) -> "Shifts":
-        """With nothing but zeros for parameters that are not ``there`` (p,)."""
+    def only(self, present: np.ndarray) -> "Shifts":
+        """With nothing but zeros for parameters that are not ``present`` (p,)."""
         parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
-        return Shifts(*(tuple(each * there[:, None, None] for each in part) for part in parts))
+        return Shifts(*(tuple(each * present[:, None, None] for each in part) for part in parts))
 
 
 def _matrices(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:

@@ -19,14 +19,14 @@ PANEL_ANGLE, NARROW_PANELS = 8.0, 30
 roads that know nothing of one another, for sums over quick turns vanish."""
 
 
-def frequencies(rates: np.ndarray, delay: float, ends: tuple[float, float]) -> tuple[np.ndarray, ...]:
+def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
     """Angular frequencies (w,) in rad/s from 0 to the last end, weights (w,) of a sum that stands for the integral,
     and where axles count as ``apart`` (w,).
 
     rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; ends : of the panels that are equal
     on a logarithmic axis; the first one goes on to 0.
     """
-    low, high = ends
+    low, high = frequency_limits
     swinging = rates[rates.imag > 0]
     near = (swinging.imag[:, None] - swinging.real[:, None] * RESONANCE_EDGES).ravel()
     late = PANEL_ANGLE / delay * np.arange(1, NARROW_PANELS + 1) if delay > 0 else np.array([np.inf])
@@ -66,7 +66,7 @@ def at_axles(
 
 
 @dataclass(frozen=True)
-class Pair:
+class CornerPair:
     """Two corners (1/m) of an axle's filter."""
 
     corners: tuple[complex, complex]
@@ -88,7 +88,7 @@ class Filters:
         driven = np.linalg.solve(V, excitation.G + 0j)
         noise = driven @ driven.conj().T
         keys = dict.fromkeys((a, b) for i, a in enumerate(corners) for j, b in enumerate(corners) if noise[i, j])
-        self.pairs = [Pair((complex(a), complex(b))) for a, b in keys]
+        self.pairs = [CornerPair((complex(a), complex(b))) for a, b in keys]
         self.noises = {complex(c): V[:, corners == c] @ driven[corners == c] for c in corners}
 
     def by_noises(self, gains: Sequence[np.ndarray]) -> dict[complex, list[np.ndarray]]:
@@ -101,11 +101,11 @@ class Filters:
 
 
 def together(
-    gains: Mapping[complex, Sequence[np.ndarray]], pair: Pair, alone: bool
+    gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, alone: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
     """What a quantity makes of a pair's density: (w, q) of every axle for itself, and of every two axles, if not all
     are ``alone``, before the delay between them. gains: of ``Filters.by_noises``."""
-    first, second = (gains[corner] for corner in pair.corners)
+    first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
     own = sum(_product(first[i], second[i]) for i in axles)
     return np.asarray(own), {} if alone else {

@@ -195,10 +195,10 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
     raise RunFailed("braking", f"{most} cycles of the five phases do not close")
 
 
-def _cycle(at: list[WheelState], frozen: Frozen) -> Cycle:
+def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
     """The ``Cycle`` of the states at its six switches."""
-    last, slips = at[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in at]
-    durations = tuple(np.diff([state.time for state in at]).tolist())
+    last, slips = switch_states[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in switch_states]
+    durations = tuple(np.diff([state.time for state in switch_states]).tolist())
     return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
 
 

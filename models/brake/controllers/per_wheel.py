@@ -85,7 +85,7 @@ class PerWheel:
         self._speed, self._slowing = np.nan, 0.0
 
     def command(self, sample: Sample) -> Command:
-        """Commands for a sample; without the brake switch all is released."""
+        """Valve commands for a sample; all brakes are released while the brake switch is off."""
         wheels = sample.wheels.tolist()
         speed = speed_of(sample.speed, wheels, self._estimate)
         slowing = self._mean_slowing(speed)
@@ -163,6 +163,6 @@ class SpeedEstimate:
         self._rising, self._fastest = fastest > self._fastest, fastest
 
 
-def speed_of(given: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
+def speed_of(scene_speed: float, wheels: Sequence[float], estimate: SpeedEstimate) -> float:
     """The speed (m/s) that the scene gives, or the estimate if that is not a number."""
-    return estimate.after(wheels) if given != given else given
+    return estimate.after(wheels) if scene_speed != scene_speed else scene_speed

@@ -35,7 +35,7 @@ def _lagging_slip(angle: float, speed: float, across: float, length: float, time
 
 
 @dataclass(eq=False)
-class Lagging:
+class LaggingTyres:
     """Tyres that lag: lengths (W,) in m, slope (1/rad), angles (W,) as tan, the time (s) by which they are behind the
     motion, and what slip angles are taken by, the damper's part included."""
 

@@ -17,7 +17,7 @@ from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
 
 if TYPE_CHECKING:
-    from models.brake.plain.relaxation import Lagging
+    from models.brake.plain.relaxation import LaggingTyres
 
 SPINS, UPRIGHT, OVER = 6, 0.5, 6
 """Column of a wheel's report with its turning; roll and pitch that turn the vehicle over (rad), and the status of
@@ -46,7 +46,7 @@ class Moving:
     changes: np.ndarray
     report: np.ndarray
     accelerations: np.ndarray
-    lag: "Lagging | None" = None
+    lag: "LaggingTyres | None" = None
 
 
 class Steps:
@@ -56,7 +56,8 @@ class Steps:
         self.vehicle, self.course, self.step = vehicle, course, step
 
     def on(self, moving: Moving, torques: np.ndarray) -> tuple[int, float]:
-        """One step from torques (2, W) at its start to those at its end (N m): how it ended and the time (s)."""
+        """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step ended
+        and the time (s)."""
         half, (q, v) = 0.5 * self.step, moving.state
         under, middle = self._under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
         contacts = self._contacts(q, v)
@@ -95,9 +96,9 @@ class Steps:
             return OVER
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
 
-    def _of_units(self, whole: np.ndarray) -> np.ndarray:
+    def _of_units(self, all_values: np.ndarray) -> np.ndarray:
         """(2 + U,) of all coordinates' values: x and y, and headings, of what is towed with all yaws before it."""
-        return np.concatenate((whole[:2], np.cumsum([whole[2], *whole[self.vehicle.turns]])))
+        return np.concatenate((all_values[:2], np.cumsum([all_values[2], *all_values[self.vehicle.turns]])))
 
     def _under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels, which go straight on for a time (s)."""
@@ -116,7 +117,7 @@ class Steps:
         moving: Moving,
         contacts: list[TyreContact],
         starts: np.ndarray,
-        under: list[Surface],
+        surfaces: list[Surface],
         torques: np.ndarray,
         time: float,
     ) -> WheelForces:
@@ -128,7 +129,7 @@ class Steps:
                 motion = replace(motion, across=moving.lag.across(i, max(motion.forwards, course.regular)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
             braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
-            moving.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)
+            moving.report[i] = tyre(course.on.tables, surfaces[i], motion, contact.load, braked)
         spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
         return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
 

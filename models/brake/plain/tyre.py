@@ -107,13 +107,13 @@ class Braked:
     turning: float
 
 
-def tyre(tables: Tables, under: Surface, motion: WheelMotion, load: float, of: Braked) -> np.ndarray:
+def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
     """(7,) mean forces along and across (N), load (N), mean slip, slip angle (rad), time locked (s), turning (rad/s)
     at the end: the columns of ``plane_step``."""
-    friction, sense = Friction(tables, under, motion.angle, load), motion.sense
-    speeds = sense * motion.start, sense * (motion.start + of.step * motion.rate)
-    wheel = WheelStep(speeds, of.torques, of.step, of.radius, of.inertia)
-    turning, ahead, slip, locked = wheel_step(wheel, sense * of.turning, friction.ahead())
+    friction, sense = Friction(tables, surface, motion.angle, load), motion.sense
+    speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
+    wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
+    turning, ahead, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
     forces = _turned_to_sliding(np.array([ahead, friction.aside(slip)]), slip, motion)
     side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
     angle = math.copysign(motion.angle, motion.across)

@@ -71,7 +71,7 @@ class WheelStep:
 
 
 @dataclass
-class Progress:
+class WheelProgress:
     """Progress of a wheel within a time step: time (s), slip, impulse of the road on the vehicle (N s), integral of
     the slip (s), time locked (s), and whether it has just been freed."""
 
@@ -83,89 +83,110 @@ class Progress:
     freed: bool = False
 
 
-def wheel_step(of: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
+def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
     """Speed of turning (rad/s) at the end of a step, mean force (N), mean slip and time locked (s).
 
     turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
     """
-    slip = 1.0 - of.radius * turning / of.speed(0.0)
-    at = Progress(0.0, slip)
+    slip = 1.0 - step_data.radius * turning / step_data.speed(0.0)
+    at = WheelProgress(0.0, slip)
     if slip > LOCKED:
-        stopping = force.sliding * of.radius + of.mean_torque(0.0)
-        if stopping * of.step <= -of.inertia * turning:
-            return turning + stopping * of.step / of.inertia, force.sliding, slip, 0.0
-        _pass(at, -of.inertia * turning / stopping, force.sliding, LOCKED)
-    while at.time < of.step:
-        if _stays_locked(of, at, force):
-            _lock(of, at, force)
-        elif _spins(of, at, force):
-            turned = _spin(of, at, force)
-            if at.time >= of.step:
-                return turned, at.impulse / of.step, at.area / of.step, at.locked
+        stopping = force.sliding * step_data.radius + step_data.mean_torque(0.0)
+        if stopping * step_data.step <= -step_data.inertia * turning:
+            return turning + stopping * step_data.step / step_data.inertia, force.sliding, slip, 0.0
+        _pass(at, -step_data.inertia * turning / stopping, force.sliding, LOCKED)
+    while at.time < step_data.step:
+        if _stays_locked(step_data, at, force):
+            _lock(step_data, at, force)
+        elif _spins(step_data, at, force):
+            turned = _spin(step_data, at, force)
+            if at.time >= step_data.step:
+                return turned, at.impulse / step_data.step, at.area / step_data.step, at.locked
         else:
-            _roll(of, at, force)
-    return of.speed(of.step) * (1.0 - at.slip) / of.radius, at.impulse / of.step, at.area / of.step, at.locked
+            _roll(step_data, at, force)
+    return (
+        step_data.speed(step_data.step) * (1.0 - at.slip) / step_data.radius,
+        at.impulse / step_data.step,
+        at.area / step_data.step,
+        at.locked,
+    )
 
 
-def _pass(at: Progress, time: float, force: float, slip: float) -> None:
+def _pass(progress: WheelProgress, time: float, force: float, slip: float) -> None:
     """Let a time (s) pass at a constant force (N) and slip."""
-    at.time, at.slip = at.time + time, slip
-    at.impulse, at.area = at.impulse + force * time, at.area + slip * time
+    progress.time, progress.slip = progress.time + time, slip
+    progress.impulse, progress.area = progress.impulse + force * time, progress.area + slip * time
 
 
-def _stays_locked(of: WheelStep, at: Progress, force: Force) -> bool:
+def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
     """Whether the brake holds a wheel that stands, now or on the mean of what is left."""
-    holds = max(of.torque(at.time), of.mean_torque(at.time)) / of.radius >= force.sliding
-    return at.slip >= LOCKED and not at.freed and holds
+    holds = (
+        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius >= force.sliding
+    )
+    return progress.slip >= LOCKED and not progress.freed and holds
 
 
-def _lock(of: WheelStep, at: Progress, force: Force) -> None:
+def _lock(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """A wheel stands until the torque falls below what the road turns it with."""
-    needed, time = force.sliding * of.radius, of.step - at.time
-    if of.torques[1] < needed:
-        time = (needed - of.torque(at.time)) * of.step / (of.torques[1] - of.torques[0])
-    _pass(at, time, force.sliding, LOCKED)
-    at.locked, at.freed = at.locked + time, True
+    needed, time = force.sliding * step_data.radius, step_data.step - progress.time
+    if step_data.torques[1] < needed:
+        time = (
+            (needed - step_data.torque(progress.time)) * step_data.step / (step_data.torques[1] - step_data.torques[0])
+        )
+    _pass(progress, time, force.sliding, LOCKED)
+    progress.locked, progress.freed = progress.locked + time, True
 
 
-def _excess(of: WheelStep, at: Progress, force: Force) -> float:
+def _excess(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
     """Rate (m/s^2) at which the rim gains on twice the speed of the centre while the road slows it by sliding."""
-    return -of.radius * (of.radius * force.sliding + of.mean_torque(at.time)) / of.inertia - 2.0 * of.gain
+    return (
+        -step_data.radius
+        * (step_data.radius * force.sliding + step_data.mean_torque(progress.time))
+        / step_data.inertia
+        - 2.0 * step_data.gain
+    )
 
 
-def _spins(of: WheelStep, at: Progress, force: Force) -> bool:
+def _spins(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
     """Whether the rim is, and stays, more than twice as fast as the centre."""
-    return at.slip < -1.0 or (at.slip == -1.0 and _excess(of, at, force) > 0.0)
+    return progress.slip < -1.0 or (progress.slip == -1.0 and _excess(step_data, progress, force) > 0.0)
 
 
-def _spin(of: WheelStep, at: Progress, force: Force) -> float:
+def _spin(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
     """A wheel slides at a slip that counts as -1, to the step's end or until it has this slip; its turning then."""
-    turning, excess = of.speed(at.time) * (1.0 - at.slip) / of.radius, _excess(of, at, force)
-    ahead, time = of.radius * turning - 2.0 * of.speed(at.time), of.step - at.time
-    slowing = (of.radius * force.sliding + of.mean_torque(at.time)) / of.inertia
+    turning, excess = (
+        step_data.speed(progress.time) * (1.0 - progress.slip) / step_data.radius,
+        _excess(step_data, progress, force),
+    )
+    ahead, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
+    slowing = (step_data.radius * force.sliding + step_data.mean_torque(progress.time)) / step_data.inertia
     if excess < 0.0:
         time = min(time, -ahead / excess)
-    _pass(at, time, -force.sliding, -1.0)
-    at.freed = False
+    _pass(progress, time, -force.sliding, -1.0)
+    progress.freed = False
     return turning - slowing * time
 
 
-def _roll(of: WheelStep, at: Progress, force: Force) -> None:
+def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """A wheel turns at a slip between -1 and 1, to the step's end or until it has one of both; momentum gives the mean
     force."""
-    before, mean, slip = at.time, of.mean_torque(at.time), min(at.slip, LOCKED)
+    before, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED)
     nodes, forces = force.both_ways()
-    kappa = of.radius**2 / (of.inertia * of.mean_speed)
-    rates = kappa * (mean / of.radius - forces) + (1.0 - nodes) * of.gain / of.mean_speed
-    time, at.slip, area = along_nodes(slip, nodes, rates, of.step - before)
+    kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
+    rates = kappa * (mean / step_data.radius - forces) + (1.0 - nodes) * step_data.gain / step_data.mean_speed
+    time, progress.slip, area = along_nodes(slip, nodes, rates, step_data.step - before)
     if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
-        time = of.step - before
-    at.time, at.freed = before + time, False
-    if math.isclose(at.time, of.step, rel_tol=1e-15):
-        at.time = of.step
-    turning = [of.speed(t) * (1.0 - s) / of.radius for t, s in ((before, slip), (at.time, at.slip))]
-    at.impulse += of.inertia * (turning[1] - turning[0]) / of.radius + mean / of.radius * time
-    at.area += area
+        time = step_data.step - before
+    progress.time, progress.freed = before + time, False
+    if math.isclose(progress.time, step_data.step, rel_tol=1e-15):
+        progress.time = step_data.step
+    turning = [
+        step_data.speed(t) * (1.0 - s) / step_data.radius for t, s in ((before, slip), (progress.time, progress.slip))
+    ]
+    progress.impulse += (
+        step_data.inertia * (turning[1] - turning[0]) / step_data.radius + mean / step_data.radius * time
+    )
+    progress.area += area
 
 
 def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:

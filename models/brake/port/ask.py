@@ -48,7 +48,7 @@ class ControllerFailed(RunFailed):
 
 
 def ask(
-    controller: Controller, sample: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+    controller: Controller, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
     """A controller's answer, checked; most : largest pressure (bar).
 
@@ -60,7 +60,7 @@ def ask(
         raise
     except (Exception, SystemExit) as error:
         raise ControllerFailed(sample, "crash", raised(error)) from error
-    return checked_answer(command, sample, states, most)
+    return checked_answer(command, sample, states, maximum_pressure)
 
 
 def raised(error: BaseException) -> str:
@@ -87,7 +87,7 @@ class CheckedController:
 
 
 def checked_answer(
-    command: Command, sample: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+    command: Command, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
     """The controller's answer, returned if each wheel has one state of its valve or one pressure; raises
     ControllerFailed."""
@@ -103,9 +103,9 @@ def checked_answer(
             raise ControllerFailed(sample, "not a number", f"{value:g} for a wheel")
         if command.pressures is not None and value < 0.0:
             raise ControllerFailed(sample, "below zero", f"a pressure of {value:g} bar")
-        if command.pressures is not None and value > most * (1.0 + ROUNDING):
+        if command.pressures is not None and value > maximum_pressure * (1.0 + ROUNDING):
             raise ControllerFailed(
-                sample, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there are"
+                sample, "too high", f"a pressure of {value:g} bar, above the {maximum_pressure:g} bar that there are"
             )
         if command.valves is not None and value not in states:
             raise ControllerFailed(sample, "no state of a valve", f"{value:g} is none of {_listed(states)}")

@@ -19,7 +19,7 @@ class Fault(Strict):
 
     kind: Literal["lost", "delayed", "stuck", "tooth"]
     start: float = quantity("s", "when it begins", default=0.0, zero=True)
-    end: float | None = quantity("s", "when it is over; never if not said", default=None)
+    end: float | None = quantity("s", "end of the fault; without it the fault lasts to the end", default=None)
     wheels: list[int] | None = Field(default=None, min_length=1, description="numbers from 0; all if not said")
     samples: int | None = Field(default=None, ge=1, le=1000, description="of the delay")
     state: int | None = Field(default=None, ge=RELEASE, le=APPLY, description="of the stuck valve")

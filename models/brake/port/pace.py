@@ -8,7 +8,7 @@ from models.brake.controller import Command, Controller, Sample
 
 @dataclass
 class WallClock:
-    """A controller that is asked at the times of the samples, counted from the first one.
+    """A controller whose samples are paced by wall-clock time, counted from the first sample.
 
     An exchange overruns if its answer comes after the time (s) of the next sample. overruns : their number; worst : the
     longest time (s) by which one was late.

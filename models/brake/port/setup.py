@@ -74,7 +74,7 @@ class PortTable(Strict):
 
 
 @dataclass(frozen=True)
-class Run:
+class ControllerRun:
     """Facts of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
     is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
     slow: whether valves can apply slowly.
@@ -95,7 +95,9 @@ class Run:
 
 
 @contextmanager
-def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple[Controller, WallClock | None]]:
+def opened(
+    table: PortTable, run: ControllerRun, controller: Controller
+) -> Iterator[tuple[Controller, WallClock | None]]:
     """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
 
     controller : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
@@ -118,7 +120,7 @@ def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple
 
 
 @contextmanager
-def _possible_controllers(table: PortTable, run: Run, controller: Controller) -> Iterator[Controller]:
+def _possible_controllers(table: PortTable, run: ControllerRun, controller: Controller) -> Iterator[Controller]:
     """The controllers that can answer at the port for this table."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
@@ -142,7 +144,7 @@ def _possible_controllers(table: PortTable, run: Run, controller: Controller) ->
 
 
 @contextmanager
-def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
+def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
     """Turn errors of a named controller into errors of the scene's key; errors within a file name that file."""
     try:
         yield
@@ -152,7 +154,7 @@ def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
         raise InputError(run.file, f"port.{error.place}", getattr(table, error.place), error.allowed) from None
 
 
-def check_port(table: PortTable, run: Run) -> None:
+def check_port(table: PortTable, run: ControllerRun) -> None:
     """Refuse files that are not there or must stay as they are, and faults of wheels or teeth that are not."""
     for key in ("fmu", "replay"):
         name = getattr(table, key)

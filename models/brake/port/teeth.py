@@ -45,14 +45,14 @@ class Counted:
         self._before = now
         return np.array([wheel.shown for wheel in self._wheels])
 
-    def _go_on(self, i: int, wheel: "_Wheel", speed: float, now: float) -> None:
+    def _go_on(self, i: int, wheel: "_Wheel", speed: float, time: float) -> None:
         """One sample of wheel i, from the sample before to now."""
-        way, step = self._way[i], now - self._before
+        way, step = self._way[i], time - self._before
         turned = wheel.turned + 0.5 * (wheel.speed + speed) * step / way
         edges = [
             k
             for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
-            if self._missing is None or not self._missing(i, k % self._teeth.teeth, now)
+            if self._missing is None or not self._missing(i, k % self._teeth.teeth, time)
         ]
         if edges:
             at = self._before + _instant((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
@@ -61,7 +61,7 @@ class Counted:
                 wheel.shown = len(edges) * way / (at - wheel.edge)
             wheel.edge = at
         elif wheel.edge is not None:
-            wheel.shown = min(wheel.shown, way / (now - wheel.edge))
+            wheel.shown = min(wheel.shown, way / (time - wheel.edge))
         wheel.turned, wheel.speed = turned, speed
 
 
@@ -73,8 +73,8 @@ class _Wheel:
         self.edge: float | None = None
 
 
-def _instant(distance: float, before: float, after: float, step: float) -> float:
+def _instant(distance: float, speed_before: float, speed_after: float, step: float) -> float:
     """Time after which a way is covered by a speed that goes linearly from one to another over a step."""
-    slope = (after - before) / step
-    root = math.sqrt(max(before * before + 2.0 * slope * distance, 0.0))
-    return min(2.0 * distance / (before + root), step)
+    slope = (speed_after - speed_before) / step
+    root = math.sqrt(max(speed_before * speed_before + 2.0 * slope * distance, 0.0))
+    return min(2.0 * distance / (speed_before + root), step)

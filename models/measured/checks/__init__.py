@@ -68,11 +68,11 @@ def findings(evidence: Evidence) -> tuple[Finding, ...]:
     return tuple(sorted(said, key=lambda finding: ORDER.index(finding.weight)))
 
 
-def _already_named(finding: Finding, before: list[Finding]) -> bool:
+def _already_named(finding: Finding, earlier_findings: list[Finding]) -> bool:
     """Whether what is wrong with one of these channels is what an earlier finding of no less weight has said."""
     return finding.weight != "note" and any(
         ORDER.index(other.weight) <= ORDER.index(finding.weight)
         and FAMILIES[other.check] & FAMILIES[finding.check]
         and set(other.signals) & set(finding.signals)
-        for other in before
+        for other in earlier_findings
     )

@@ -137,7 +137,7 @@ class Agreement:
         return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
-        """All faults, the worst first, and what is left without them."""
+        """All faults, the worst first, and the disagreement that remains after their correction."""
         now, faults = self, list[MeasurementFault]()
         while len(faults) < FAULTS:
             worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
@@ -292,7 +292,7 @@ class Agreement:
                     yield replace(fault, size=self.rms, error=other.rms, fall=fall)
 
     def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Two channels that each have what the other one measured."""
+        """Pairs of channels whose signals may be exchanged."""
         for pair, other in self._exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
@@ -315,15 +315,15 @@ class Agreement:
                 if what == 1 and (at == 1 or axis == 1):
                     yield pair, self._crossed(pair)
 
-    def _certain_improvement(self, other: "Agreement", weights: np.ndarray) -> float:
+    def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
-        fall = float((weights * (self.left - other.left)).sum())
-        return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(other, weights) else 0.0
+        fall = float((weights * (self.left - corrected.left)).sum())
+        return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
-    def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
+    def _crossed(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
         """The agreement with two channels exchanged, both of the forces or both of the readings."""
         response = self.response.copy()
-        response[self._indices_of(pair)[1]] = self.response[self._indices_of(pair[::-1])[1]]
+        response[self._indices_of(channel_pair)[1]] = self.response[self._indices_of(channel_pair[::-1])[1]]
         return replace(self, response=response)
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
@@ -361,11 +361,12 @@ class Agreement:
         """Weighted power (k,) of every reading that neither forces nor noise explain."""
         return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)
 
-    def _is_worth_correcting(self, other: "Agreement", weights: np.ndarray) -> bool:
+    def _is_worth_correcting(self, corrected: "Agreement", weights: np.ndarray) -> bool:
         """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
         return bool(
             np.any(
-                ((self.left - other.left) * weights).sum(axis=0) > EXPLAINED_SHARE * self._unexplained_power(weights)
+                ((self.left - corrected.left) * weights).sum(axis=0)
+                > EXPLAINED_SHARE * self._unexplained_power(weights)
             )
         )
 
@@ -384,7 +385,7 @@ def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
 
 
-def _vertex(left: float, middle: float, right: float) -> float:
+def _vertex(left: float, middle_value: float, right: float) -> float:
     """Where the parabola through three values at -1, 0, 1 has its vertex."""
-    bend = left - 2 * middle + right
+    bend = left - 2 * middle_value + right
     return 0.5 * (left - right) / bend if bend < 0 else 0.0

@@ -54,18 +54,18 @@ def clipping_extremes(values: np.ndarray) -> list[float]:
     return [float(end) for end in (good.min(), good.max()) if _piled(values, good, end)]
 
 
-def _piled(values: np.ndarray, good: np.ndarray, end: float) -> bool:
-    at, others = int(np.count_nonzero(good == end)), good[good != end]
+def _piled(values: np.ndarray, valid: np.ndarray, end: float) -> bool:
+    at, others = int(np.count_nonzero(valid == end)), valid[valid != end]
     next_to = others[np.argmin(np.abs(others - end))]
-    if at < FEWEST_EXTREME_SAMPLES or at < PILE * np.count_nonzero(good == next_to):
+    if at < FEWEST_EXTREME_SAMPLES or at < PILE * np.count_nonzero(valid == next_to):
         return False
     runs_at_limit = true_runs(values == end)
     return bool(np.max(runs_at_limit[:, 1] - runs_at_limit[:, 0]) >= 2)
 
 
-def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding:
-    at, clipped_runs = int(np.count_nonzero(good == end)), true_runs(values == end)
-    share, first = 100 * at / len(good), float(period * clipped_runs[0, 0])
+def _clipped(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, period: float) -> Finding:
+    at, clipped_runs = int(np.count_nonzero(valid == end)), true_runs(values == end)
+    share, first = 100 * at / len(valid), float(period * clipped_runs[0, 0])
     text = (
         f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(clipped_runs)} runs, "
         f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "

@@ -1,4 +1,5 @@
-"""Single faults of channels, by what each accounts for in the motion of the vehicle: factors, shifts, levers.
+"""Single faults of channels (factors, time shifts, lever arms), found by the disagreement with the vehicle's motion
+that each explains.
 
 A factor is a sign, a unit or a calibration; a shift one in time; a lever moments about another point than the hub:
 about the contact patch, or a plane of the transducer.

@@ -50,14 +50,14 @@ class SensorResponse:
         rows = np.stack([self._row(laplace[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
         return np.asarray(rows @ q)
 
-    def _row(self, i_omega: np.ndarray, signal: Signal, place: TransducerPlace) -> np.ndarray:
+    def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
         """(f, n): reading by coordinates, at own = i omega (f, 1)."""
-        axis, turn = AXES[signal.component], self.motion.turn(place.body)
+        axis, turn = AXES[signal.component], self.motion.turn(transducer.body)
         if signal.quantity == "angle":
             return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
         if signal.quantity == "angular rate":
             return i_omega * turn[axis]
-        shift = self.motion.shift(place.body, place.position)[axis]
+        shift = self.motion.shift(transducer.body, transducer.position)[axis]
         weighs = signal.gravity and signal.frame in ("body", "sensor")  # a tilted sensor feels part of the weight
         tilt = GRAVITY * np.array([-turn[1], turn[0], 0 * turn[0]])[axis] if weighs else 0.0
         return i_omega**2 * shift + tilt

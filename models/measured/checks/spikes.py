@@ -20,7 +20,7 @@ def check(evidence: Evidence) -> list[Finding]:
     recording = evidence.recording
     findings = [_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
     return [finding for finding in findings if finding] or [
-        Finding(NAME, "note", "", "No sample of any channel stands out alone.")
+        Finding(NAME, "note", "", "No channel has a single-sample spike.")
     ]
 
 

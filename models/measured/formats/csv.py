@@ -50,9 +50,9 @@ class CsvFile(Opened):
     factor: float
     columns: tuple[int, ...]
 
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the rows of each span and part its columns."""
-        columns = [self.columns[i] for i in chosen]
+        columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in spans:
                 table, times = numbers(self.path, self.layout, self._lines(file, first, count), first)
@@ -150,10 +150,10 @@ def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, l
     return said
 
 
-def _factor(path: Path, head: Head, clock: int, unit: str) -> float:
+def _factor(path: Path, header: Head, clock: int, unit: str) -> float:
     """Factor of times to seconds."""
-    name, given = clock_heading(head.names[clock])
+    name, given = clock_heading(header.names[clock])
     if (given or unit).casefold() not in TIME_UNITS:
-        place = f"line {head.header.number} (header), column {name!r}, unit"
+        place = f"line {header.header.number} (header), column {name!r}, unit"
         raise InputError(path, place, given or unit, f"write {name} [s]", tuple(SECONDS))
     return TIME_UNITS[(given or unit).casefold()]

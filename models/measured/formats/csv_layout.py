@@ -108,27 +108,27 @@ class Remarks:
     samples: int | None = None
     of_channels: dict[str, list[str]] = field(default_factory=dict)
 
-    def add(self, path: Path, line: int, text: str) -> None:
+    def add(self, path: Path, line_number: int, text: str) -> None:
         """Take one comment line, without its ``#``."""
         key, _, value = text.partition(":")
         if key == "start":
             self.start = value.strip()
         elif key == "samples":
             if not value.strip().isdecimal():
-                raise InputError(path, f"line {line}, samples", value.strip(), "a number of rows is needed")
+                raise InputError(path, f"line {line_number}, samples", value.strip(), "a number of rows is needed")
             self.samples = int(value)
         elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
-            self.of_channels.setdefault(_text(path, line, remark[1]), []).append(remark[2])
+            self.of_channels.setdefault(_text(path, line_number, remark[1]), []).append(remark[2])
         else:
             self.comments.append(value.removeprefix(" ") if key == "comment" else text)
 
 
-def _text(path: Path, line: int, quoted: str) -> str:
+def _text(path: Path, line_number: int, quoted: str) -> str:
     """Return a name in quotes, as JSON writes it."""
     try:
         return str(json.loads(quoted))
     except ValueError:
-        raise InputError(path, f"line {line}", quoted, "a channel's name in quotes is needed") from None
+        raise InputError(path, f"line {line_number}", quoted, "a channel's name in quotes is needed") from None
 
 
 def read_first_lines(path: Path) -> Top:
@@ -268,30 +268,30 @@ def is_other_clock(text: str) -> bool:
     return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
-def first_rows(top: Top, head: Head) -> list[list[str]]:
+def first_rows(top: Top, header: Head) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; a row of another width is told when it is read."""
-    lines = [line for line in top.lines if line.number > head.line]
-    rows = [cells for line in lines if len(cells := split_cells(line.text, head.separator)) == head.width]
-    return [[row[i] for row in rows] for i in range(len(head.names))]
+    lines = [line for line in top.lines if line.number > header.line]
+    rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
+    return [[row[i] for row in rows] for i in range(len(header.names))]
 
 
-def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
+def find_layout(path: Path, top: Top, header: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
     """How the rows of a CSV file are written, from the first ones; InputError where two readings make sense."""
-    columns = first_rows(top, head)
+    columns = first_rows(top, header)
     first = next(iter(columns[clock]), "")
-    stamps = find_stamps(path, first, head.line + 1, head.names[clock]) if is_stamp(first) else None
-    nameless = tuple(i for i, name in enumerate(head.names) if not heading(name)[0])
+    stamps = find_stamps(path, first, header.line + 1, header.names[clock]) if is_stamp(first) else None
+    nameless = tuple(i for i, name in enumerate(header.names) if not heading(name)[0])
     texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
-    decimal = decimal_sign(path, head.line + 1, head.separator, list(numbers))
+    decimal = decimal_sign(path, header.line + 1, header.separator, list(numbers))
     layout = Layout(
-        head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps, top.unit
+        header.separator, decimal, header.begin, header.line, header.names, header.width, taken, clock, stamps, top.unit
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if units[i] or heading(head.names[i])[1] else "note"
-        said.append(notice(path, weight, f"left out, no numbers: {head.names[i]!r}"))
+        weight: Weight = "doubt" if units[i] or heading(header.names[i])[1] else "note"
+        said.append(notice(path, weight, f"left out, no numbers: {header.names[i]!r}"))
     for i in nameless:
         cells = columns[i]
         counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
@@ -328,20 +328,20 @@ def _is_text(cells: list[str]) -> bool:
     return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell) for cell in said)
 
 
-def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
+def find_units(path: Path, top: Top, header: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
     """Units of the columns from a row beneath the headings; empty where there is none."""
-    stamped = any(map(is_stamp, first_rows(top, head)[clock][:1]))
-    rows = [(line, [_bare(cell) for cell in head.cells(line)]) for line in head.between]
-    known = {*TIME_UNITS, "", "-"} if clock_heading(head.names[clock])[1] else set(TIME_UNITS)
+    stamped = any(map(is_stamp, first_rows(top, header)[clock][:1]))
+    rows = [(line, [_bare(cell) for cell in header.cells(line)]) for line in header.between]
+    known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
     unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if unit_row is None:
         said = [
             notice(path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}")
             for line, _ in rows
         ]
-        return ("",) * len(head.names), said
+        return ("",) * len(header.names), said
     line, units = unit_row
-    for i, (name, unit) in enumerate(zip(head.names, units, strict=True)):
+    for i, (name, unit) in enumerate(zip(header.names, units, strict=True)):
         if unit not in ("", "-") and heading(name)[1] not in ("", unit) and not (stamped and i == clock):
             raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
     return tuple(units), [notice(path, "note", f"line {line.number}, beneath the headings, is read as units")]

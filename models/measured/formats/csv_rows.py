@@ -126,19 +126,19 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
     return table[:, :used], times
 
 
-def _table(path: Path, layout: Layout, text: bytes, line: int) -> np.ndarray:
+def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndarray:
     """Numbers (rows, columns) of the columns of numbers and of those beyond the last heading, NaN for marks."""
     columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
     if text.translate(None, _PLAIN + layout.separator.encode()):
-        wrong = _culprit(path, layout, text, line)
+        wrong = _culprit(path, layout, text, line_number)
     if wrong is None:
         with suppress(ValueError, OverflowError):
             return _read_columns(layout, text, columns, np.float64)
         cells = np.unique(_read_columns(layout, text, columns, str).astype(str))
         with suppress(ValueError, OverflowError):
             return _read_columns(layout, text, columns, np.float64, [cell for cell in cells if MARKS.fullmatch(cell)])
-        wrong = _culprit(path, layout, text, line)
-    raise wrong or InputError(path, f"line {line} and after", None, "rows of numbers are needed")
+        wrong = _culprit(path, layout, text, line_number)
+    raise wrong or InputError(path, f"line {line_number} and after", None, "rows of numbers are needed")
 
 
 def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
@@ -161,7 +161,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
     ).to_numpy()
 
 
-def _unquoted(path: Path, layout: Layout, text: bytes, line: int) -> bytes:
+def _unquoted(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
     """Rows without quotes; a comma within them is a decimal sign where the numbers have it."""
     if b'"' not in text:
         return text
@@ -171,13 +171,13 @@ def _unquoted(path: Path, layout: Layout, text: bytes, line: int) -> bytes:
     ends = np.flatnonzero(codes == ord("\n"))
     if inside[ends].any():
         row = int(np.argmax(inside[ends]))
-        raise _error_at_byte(path, line, text, int(ends[row]), "a quote is opened and not closed in this line")
+        raise _error_at_byte(path, line_number, text, int(ends[row]), "a quote is opened and not closed in this line")
     decimal = layout.separator == layout.decimal == ","
     codes[inside & (codes == ord(layout.separator))] = ord("." if decimal else _WRONG)
     return codes[~quotes].tobytes()
 
 
-def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line: int) -> None:
+def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int) -> None:
     """Refuse a row that has more or fewer columns than the header."""
     data = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero(data == ord("\n"))
@@ -189,11 +189,11 @@ def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line: int) -> No
         doubled = width in (2 * layout.width, 2 * layout.width - 1) and layout.separator == ","
         hint = "; where commas are decimal signs, semicolons must part the columns" if doubled else ""
         raise _error_at_byte(
-            path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {width}{hint}"
+            path, line_number, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {width}{hint}"
         )
 
 
-def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError | None:
+def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
     """Error at the first cell that is not a number; None where there is none such."""
     comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
@@ -209,7 +209,7 @@ def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError |
             except ValueError:
                 mark = number = False
             if not mark and not number:
-                place = f"line {line + i}, column {layout.names[column]!r}"
+                place = f"line {line_number + i}, column {layout.names[column]!r}"
                 return InputError(path, place, cell.strip(), _remedy(layout, cell))
     return None
 
@@ -223,8 +223,8 @@ def _remedy(layout: Layout, cell: str) -> str:
     return "a number is needed; where nothing was measured, leave the cell empty"
 
 
-def _error_at_byte(path: Path, line: int, text: bytes, place: int, allowed: str) -> InputError:
+def _error_at_byte(path: Path, line_number: int, text: bytes, offset: int, allowed: str) -> InputError:
     """Error at one byte of some rows."""
-    begin, end = text.rfind(b"\n", 0, place) + 1, text.find(b"\n", place)
+    begin, end = text.rfind(b"\n", 0, offset) + 1, text.find(b"\n", offset)
     row = text[begin : len(text) if end < 0 else end].decode("utf-8", errors="backslashreplace")
-    return InputError(path, f"line {line + text[:place].count(10)}", row, allowed)
+    return InputError(path, f"line {line_number + text[:offset].count(10)}", row, allowed)

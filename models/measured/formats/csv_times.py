@@ -38,15 +38,15 @@ class Stamps:
         text = str(np.datetime64(self.zero, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
-    def seconds(self, path: Path, cells: list[str], line: int, name: str) -> np.ndarray:
-        """Seconds (n,) since the first stamp, of the cells of some rows, the first of which is ``line``.
+    def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
+        """Seconds (n,) since the first stamp, of the cells of some rows, the first of which is ``line_number``.
 
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
         try:
             stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
-            raise self._culprit(path, cells, line, name) from None
+            raise self._culprit(path, cells, line_number, name) from None
         passed = stamps - self.zero
         return np.asarray((passed % DAY if self.form == "hh:mm:ss.fff" else passed) / 1e9)
 
@@ -57,7 +57,7 @@ class Stamps:
             raise ValueError(cell)
         return _iso(matched)
 
-    def _culprit(self, path: Path, cells: list[str], line: int, name: str) -> InputError:
+    def _culprit(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
         """Error at the first cell that is no time in this notation."""
         for i, cell in enumerate(cells):
             try:
@@ -66,14 +66,14 @@ class Stamps:
                 where = f" with the zone {self.zone}" if self.zone else ""
                 return InputError(
                     path,
-                    f"line {line + i}, column {name!r}",
+                    f"line {line_number + i}, column {name!r}",
                     cell.strip(),
                     f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)",
                 )
-        return InputError(path, f"line {line} and after, column {name!r}", None, "times of the clock are needed")
+        return InputError(path, f"line {line_number} and after, column {name!r}", None, "times of the clock are needed")
 
 
-def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
+def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
     """Notation of a column of times, from its first cell; InputError, with what to write, where it has two meanings."""
     cell = cell.strip()
     for form, pattern in FORMS.items():
@@ -83,11 +83,11 @@ def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
             try:
                 zero = int(np.datetime64(_iso(matched), "ns").astype(np.int64))
             except ValueError:
-                raise plain._culprit(path, [cell], line, name) from None
+                raise plain._culprit(path, [cell], line_number, name) from None
             return Stamps(form, plain.zone, zero, cell)
     raise InputError(
         path,
-        f"line {line}, column {name!r}",
+        f"line {line_number}, column {name!r}",
         cell,
         "this notation of times has two meanings or none: "
         "write 2026-03-02T09:30:00.000, 09:30:00.000, or seconds in a column time [s]",

@@ -49,13 +49,13 @@ class MdfFile(Opened):
 
     places: tuple[tuple[int, int], ...]
 
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Load the records of each span once, and take every channel from them."""
         with opened(self.path) as mdf:
-            group = self.places[chosen[0]][0]
+            group = self.places[channel_indices[0]][0]
             for first, count in spans:
                 with unheard():
-                    block = _block(mdf, group, [self.places[i][1] for i in chosen], first, count)
+                    block = _block(mdf, group, [self.places[i][1] for i in channel_indices], first, count)
                 yield block
 
 
@@ -136,7 +136,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
         records = group.channel_group
         if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
             raise InputError(
-                path, f"group {g + 1}", records.cycles_nr, "the file is too short for what its records need"
+                path, f"group {g + 1}", records.cycles_nr, "the file is too short for the records that it announces"
             )
         why = _why_group_unusable(mdf, g, version)
         if why:

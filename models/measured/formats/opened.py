@@ -14,7 +14,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
-from models.measured.channel import BLOCK, Block, Channel
+from models.measured.channel import BLOCK, Channel, SampleBlock
 
 Span = tuple[int, int]
 """First sample and number of samples."""
@@ -34,7 +34,7 @@ class Opened(ABC):
     comment: str
     noticed: tuple[Finding, ...]
 
-    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[Block]:
+    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
@@ -42,7 +42,7 @@ class Opened(ABC):
         return self._checked(chosen, spans)
 
     @abstractmethod
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Times (n,) in s and values (n, chosen) of each span, by the format; fewer where the file ends."""
 
     def _chosen(self, names: Sequence[str]) -> list[int]:
@@ -56,22 +56,22 @@ class Opened(ABC):
             raise InputError(self.path, "channels", list(names), "one or more channels of one sampling rate are needed")
         return chosen
 
-    def _checked(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[Block]:
+    def _checked(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[SampleBlock]:
         """Blocks that are complete, with times and values that are numbers or NaN."""
-        names, (mine, theirs) = [self.channels[i].name for i in chosen], tee(spans)
+        names, (mine, theirs) = [self.channels[i].name for i in channel_indices], tee(spans)
         with readable(self.path):
-            for (first, count), (times, values) in zip(mine, self.pieces(chosen, theirs), strict=True):
+            for (first, count), (times, values) in zip(mine, self.pieces(channel_indices, theirs), strict=True):
                 if len(times) != count:
                     ends = f"the data end here, although {first + count} samples or more are announced"
                     raise InputError(self.path, f"sample {first + len(times)}", None, ends)
                 self._finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
                 self._finite(first, names, values, ~np.isinf(values))
-                yield Block(first, times, values)
+                yield SampleBlock(first, times, values)
 
-    def _finite(self, first: int, names: list[str], values: np.ndarray, good: np.ndarray) -> None:
+    def _finite(self, first: int, names: list[str], values: np.ndarray, valid: np.ndarray) -> None:
         """Refuse the first value that is not a measured one."""
-        if not good.all():
-            row, column = (int(i[0]) for i in np.nonzero(~good))
+        if not valid.all():
+            row, column = (int(i[0]) for i in np.nonzero(~valid))
             place = f"channel {names[column]!r}, sample {first + row}"
             needed = "a finite value is needed (NaN in a channel says that nothing was measured)"
             raise InputError(self.path, place, float(values[row, column]), needed)
@@ -98,7 +98,7 @@ def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
 
 @dataclass
 class LeftOut:
-    """Names of what a reader leaves out of a file, by reason: one sentence each, however many channels it concerns."""
+    """Names of channels that a reader skips, by reason; each reason is a single finding for all its channels."""
 
     names: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 

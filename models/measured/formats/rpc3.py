@@ -46,7 +46,7 @@ class RpcFile(Opened):
 
     layout: Layout
 
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the groups that hold each span."""
         layout = self.layout
         size = layout.points * layout.width * layout.dtype.itemsize
@@ -57,9 +57,9 @@ class RpcFile(Opened):
                 data = np.frombuffer(file.read((high - low) * size), layout.dtype).reshape(
                     -1, layout.width, layout.points
                 )
-                samples = data[:, chosen].transpose(0, 2, 1).reshape(-1, len(chosen))
+                samples = data[:, channel_indices].transpose(0, 2, 1).reshape(-1, len(channel_indices))
                 with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN all the same
-                    values = samples.astype(float) * layout.scales[chosen]
+                    values = samples.astype(float) * layout.scales[channel_indices]
                 skipped = first - low * layout.points
                 yield layout.period * np.arange(first, first + count), values[skipped : skipped + count]
 
@@ -113,9 +113,9 @@ def read_parameters(path: Path) -> dict[str, str]:
     return dict(_record(head, i) for i in range(count))
 
 
-def _record(head: bytes, i: int) -> tuple[str, str]:
+def _record(record_bytes: bytes, i: int) -> tuple[str, str]:
     """Name and value of one parameter, each ended by a zero byte."""
-    record = head[i * RECORD : (i + 1) * RECORD]
+    record = record_bytes[i * RECORD : (i + 1) * RECORD]
     key, value = (part.split(b"\0")[0] for part in (record[:KEY], record[KEY:]))
     try:
         return key.decode("utf-8").strip(), value.decode("utf-8")
@@ -123,11 +123,11 @@ def _record(head: bytes, i: int) -> tuple[str, str]:
         return key.decode("latin-1").strip(), value.decode("latin-1")
 
 
-def whole_number(path: Path, parameters: dict[str, str], name: str, most: int) -> int:
-    """A whole number from 1 to ``most``."""
+def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int) -> int:
+    """A whole number from 1 to ``maximum``."""
     text = parameters.get(name, "").strip()
-    if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= most:
-        raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {most} is needed")
+    if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= maximum:
+        raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {maximum} is needed")
     return int(text.split(".")[0])
 
 

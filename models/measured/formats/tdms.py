@@ -43,13 +43,13 @@ class ChannelLocation:
 
 @dataclass(frozen=True)
 class TdmsData(Opened):
-    """``places`` of every channel in the file."""
+    """Reader of a TDMS file that knows the place of every channel."""
 
     places: tuple[ChannelLocation, ...]
 
-    def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read each channel's own part of each span."""
-        places = [self.places[i] for i in chosen]
+        places = [self.places[i] for i in channel_indices]
         with Bounded(self.path) as file:
             data = opened(self.path, file)
             for first, count in spans:
@@ -63,7 +63,8 @@ class TdmsData(Opened):
 
 
 class Bounded(io.BufferedReader):
-    """A file that makes room for what it has, not for what it is asked for: a damaged length may be of gigabytes."""
+    """A file whose reads allocate no more memory than the file has bytes: a damaged length field may claim
+    gigabytes."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(io.FileIO(path))
@@ -116,9 +117,9 @@ def check_segments(path: Path) -> list[Finding]:
     return []
 
 
-def _cut(path: Path, place: int) -> Finding:
+def _cut(path: Path, offset: int) -> Finding:
     return notice(
-        path, "doubt", f"the segment at byte {place} is not complete: the file is cut off, and what is whole is read"
+        path, "doubt", f"the segment at byte {offset} is not complete: the file is cut off, and what is whole is read"
     )
 
 
@@ -162,21 +163,23 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in with_clock))
 
 
-def _numeric(channel: Any, left_out: LeftOut) -> bool:
+def _numeric(channel: Any, skipped_channels: LeftOut) -> bool:
     """Whether a channel holds real numbers, one or more."""
     if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
         return True
-    left_out.add("no numbers" if len(channel) else "no samples", repr(channel.name))
+    skipped_channels.add("no numbers" if len(channel) else "no samples", repr(channel.name))
     return False
 
 
-def _channel_location(group: Any, channel: Any, zero: datetime | None, left_out: LeftOut) -> ChannelLocation | None:
+def _channel_location(
+    group: Any, channel: Any, zero: datetime | None, skipped_channels: LeftOut
+) -> ChannelLocation | None:
     """Where a channel's samples and times are; None where it has no clock or is one."""
     properties, start = channel.properties, _start_in_utc(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
     if str(properties.get("wf_xunit_string", "s")).casefold() not in SECONDS:
-        left_out.add("its clock does not count seconds", repr(channel.name))
+        skipped_channels.add("its clock does not count seconds", repr(channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
         return ChannelLocation(
@@ -190,7 +193,9 @@ def _channel_location(group: Any, channel: Any, zero: datetime | None, left_out:
     if channel.name.casefold() in CLOCKS and clocks:
         return None
     if len(clocks) != 1:
-        left_out.add("no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name))
+        skipped_channels.add(
+            "no clock (wf_increment, or one channel 'time' in s of the same length)", repr(channel.name)
+        )
         return None
     return ChannelLocation(group.name, channel.name, clocks[0].name, late, 0.0)
 

@@ -84,16 +84,18 @@ def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) ->
         raise InputError(path, "start", str(start), "a start with its time zone is needed")
 
 
-def _only_group(path: Path, groups: Sequence[ChannelGroup], form: str) -> ChannelGroup:
+def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) -> ChannelGroup:
     """The only group of a format with one clock."""
     if len(groups) != 1:
-        raise InputError(path, "groups", len(groups), f"{form} has one sampling rate: write a file for each, or MDF 4")
+        raise InputError(
+            path, "groups", len(groups), f"{format_name} has one sampling rate: write a file for each, or MDF 4"
+        )
     return groups[0]
 
 
-def missing(path: Path, form: str, package: str) -> InputError:
+def missing(path: Path, format_name: str, package: str) -> InputError:
     """Error for a package that is not installed."""
-    return InputError(path, "", None, f"{form} files need {package}: pip install 'twinrig[measured]'")
+    return InputError(path, "", None, f"{format_name} files need {package}: pip install 'twinrig[measured]'")
 
 
 @contextmanager
@@ -258,7 +260,7 @@ def _frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
 
 
 def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
-    """Header blocks; of the same length whatever the limits are."""
+    """Header blocks of an RPC III file; their length does not depend on the channel limits."""
     parameters: dict[str, object] = {
         "FILE_TYPE": "TIME_HISTORY",
         "TIME_TYPE": "RESPONSE",

@@ -98,18 +98,18 @@ def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) ->
     return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
 
 
-def _march(of: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sums over all cells of tractions (complex) and of place times lateral traction, of many strips.
 
     slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
     """
-    traction, slides = _cut(-0.5 * (slip + turning * of.middle[0]), of.bound[0])
-    pulled, twisted, turn = traction.copy(), of.centre[0] * traction.imag, -2.0 * turning / len(of.centre)
-    for i in range(1, len(of.centre)):
-        w = slip + turning * of.middle[i]
-        traction, slides = _advance(traction, slides, w, turn, (of.bound[i], of.bound[i - 1], of.bound_between[i]))
+    traction, slides = _cut(-0.5 * (slip + turning * net.middle[0]), net.bound[0])
+    pulled, twisted, turn = traction.copy(), net.centre[0] * traction.imag, -2.0 * turning / len(net.centre)
+    for i in range(1, len(net.centre)):
+        w = slip + turning * net.middle[i]
+        traction, slides = _advance(traction, slides, w, turn, (net.bound[i], net.bound[i - 1], net.bound_between[i]))
         pulled += traction
-        twisted += of.centre[i] * traction.imag
+        twisted += net.centre[i] * traction.imag
     return pulled, twisted
 
 
@@ -121,11 +121,15 @@ def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _advance(
-    before: np.ndarray, slides: np.ndarray, w: np.ndarray, turn: np.ndarray, bounds: tuple[float, float, float]
+    tractions_before: np.ndarray,
+    slides: np.ndarray,
+    w: np.ndarray,
+    turn: np.ndarray,
+    bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tractions in the next cell, and which bristles slide there; bounds: there, before, and between."""
     bound, last, between = bounds
-    stuck = before - w
+    stuck = tractions_before - w
     after, beyond = _cut(stuck, bound)
     if not (slides & beyond).any():
         return after, beyond
@@ -136,7 +140,7 @@ def _advance(
     size = np.where(turns, size, 1.0)
     h = np.minimum(size / (8.0 * between), LARGEST_EXPONENT)
     grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
-    angle = before * np.conj(-w)
+    angle = tractions_before * np.conj(-w)
     half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag
     turned = bound * (-w / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
     return np.where(turns, turned, after), beyond

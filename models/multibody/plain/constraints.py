@@ -22,7 +22,7 @@ SQUARE = ((2, 1), (2, 0), (0, 1))
 """Axes of the first and of the second body that are square to each other where both turn alike."""
 
 
-class Asked(NamedTuple):
+class ConstraintTerms(NamedTuple):
     """What constraints ask at a state: J (c, n), J' q' (c,)."""
 
     rows: np.ndarray
@@ -45,12 +45,12 @@ class PlainConstraints:
         turns = [(ends, axes) for ends, axes in joints if axes is not None]
         self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
 
-    def asked(self, q: np.ndarray, v: np.ndarray) -> Asked:
+    def asked(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
         """At coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
         terms = np.hstack((self._apart(motion), *(_products(*each).T for each in self._turned(motion))))
         rest = np.concatenate((np.zeros(len(self._rows)), terms[REST]))
-        return Asked(np.vstack((self._rows, terms[FIRST:].T)), rest)
+        return ConstraintTerms(np.vstack((self._rows, terms[FIRST:].T)), rest)
 
     def gap(self, q: np.ndarray) -> Gap:
         """At coordinates (n,); of axes the rotation vector between them, which is 0 where they lie alike alone."""

@@ -55,9 +55,9 @@ def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
 class PlainTree:
     """The bodies and joint elements of a vehicle; gravity (3,) in m/s^2."""
 
-    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, acting: Acting = NOTHING_ACTS) -> None:
+    def __init__(self, vehicle: SpatialVehicle, gravity: np.ndarray, elements: Acting = NOTHING_ACTS) -> None:
         self.bodies, self.gravity = Bodies(vehicle), gravity
-        loads, lines, frictions, turns, followers = acting
+        loads, lines, frictions, turns, followers = elements
         self.size = self.bodies.size
         self._loads = np.array([force for _, _, force in loads]).reshape(-1, 3)
         self._points = self.bodies.points([(body, point) for body, point, _ in loads])

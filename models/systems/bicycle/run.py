@@ -82,7 +82,8 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
 
 
 def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
-    """The run on tyres in an engine by steps (s); rows lie ROWS_APART or less apart, the work is that of all steps."""
+    """Run the bicycle on tyres in an engine with a step (s); rows are at most ROWS_APART steps apart, the work counts
+    all steps."""
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*straight(rolling.bicycle, run.speed, run.lean_rate))

@@ -162,7 +162,7 @@ def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, na
 
 @dataclass(frozen=True)
 class Split:
-    """Braking rate z on split friction and what is asked of it: at least the larger of 0.75 (4 k_L + k_H)/5 and k_L."""
+    """Braking rate z on split friction and the required one: at least the larger of 0.75 (4 k_L + k_H)/5 and k_L."""
 
     z: float
     k_low: float
@@ -170,7 +170,7 @@ class Split:
 
     @property
     def asked(self) -> float:
-        """Least z."""
+        """Smallest braking rate z that the regulation requires."""
         return split_rate(self.k_low, self.k_high)
 
 

@@ -141,7 +141,7 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
         yield Assumption(
             "hitch",
             "the vehicle and what it tows do not touch",
-            "brake the vehicle less than what it tows, or steer less",
+            "brake the towing vehicle less than the trailer, or steer less",
             _hitches,
             "rad",
             -BENT,

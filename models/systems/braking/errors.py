@@ -104,9 +104,9 @@ def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
     return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
-def same_commands(path: BrakingPath, other: BrakingPath) -> bool:
+def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
     """Whether the controller has acted alike in two runs."""
-    pressures = _columns_at(path.times, other, other.pressures)
+    pressures = _columns_at(path.times, other_path, other_path.pressures)
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
@@ -180,11 +180,11 @@ def observed(fine: float, coarse: float, counts: list[int]) -> float:
     return float(orders[np.argmin(np.abs(ratios - math.log(coarse / fine)))])
 
 
-def _by_twice(path: BrakingPath, other: BrakingPath, step: float) -> dict[str, Estimate]:
+def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[str, Estimate]:
     """Error estimates by a run in twice as many steps over the first part, whose share of error is taken for that of
     the whole."""
-    part = path.times <= other.times[-1]
-    fine, finer, told = channels(path, path.times), channels(other, path.times[part]), {}
+    part = path.times <= other_path.times[-1]
+    fine, finer, told = channels(path, path.times), channels(other_path, path.times[part]), {}
     for name, values in fine.items():
         size, seen = _size(name, values), _size(name, values[part], FINE_WINDOW)
         error = _rms(values[part] - finer[name]) * 2.0**CAREFUL / (2.0**CAREFUL - 1.0)

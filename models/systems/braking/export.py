@@ -1,7 +1,7 @@
 """The vehicle of a braking scene as a file of its engine: bodies and joints of one on its suspension."""
 
 from models.core.errors import InputError
-from models.engines.export import Exported, Subject
+from models.engines.export import Exported, ExportSubject
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import BrakingScene
 from models.systems.handling.export import AXES, of_handling
@@ -13,4 +13,4 @@ def exported(scene: BrakingScene, engine: str) -> Exported:
         allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
     more = ["spin of the wheels, brakes and controller"]
-    return of_handling(engine, sprung_of(scene).handling, Subject(scene.title, scene.file, AXES), more)
+    return of_handling(engine, sprung_of(scene).handling, ExportSubject(scene.title, scene.file, AXES), more)

@@ -58,7 +58,8 @@ class Braked:
     """A vehicle on a road with brakes, ready to run.
 
     kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
-    in the middle of each sample; engine : ``models.engines.braking.Carried`` if an engine is to carry the chassis.
+    in the middle of each sample; engine : ``models.engines.braking.CarriedChassis`` if an engine is to carry the
+    chassis.
     sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
     """
 
@@ -141,10 +142,10 @@ class Braked:
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
-        self, commands: Commands, record: Record, now: Row, motion: PlaneMotion
+        self, commands: Commands, record: Record, row: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``now`` and in ``motion``, moved on sample by sample; see ``samples``."""
-        air = resting_chambers(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
+        """The vehicle as it is ``row`` and in ``motion``, moved on sample by sample; see ``samples``."""
+        air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
         go, given = by_steps, [commands, record, self.sample, braking, motion, self.on_road]
@@ -153,7 +154,7 @@ class Braked:
 
             # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady
             # one
-            angle = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
+            angle = np.full(self.plane.wheels, np.nan if row.state[1, 1:].any() else 0.0)
             go, given = by_lagging_steps, [*given, Lag(self.relaxation, angle)]
         moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(*given)
         return moving
@@ -187,8 +188,8 @@ def _take(rows: list[np.ndarray], record: Record) -> None:
     record.left[0] = 0
 
 
-def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
-    all_of = parts(rows, now)
+def _path(rows: list[np.ndarray], row: Row, stands: bool, names: tuple[str, ...]) -> BrakingPath:
+    all_of = parts(rows, row)
     return BrakingPath(
         all_of.time[:, 0],
         all_of.state,

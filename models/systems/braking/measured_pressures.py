@@ -84,16 +84,16 @@ def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, 
 
 
 def _within(
-    path: str | Path, table: dict[str, np.ndarray], head: str, names: tuple[str, ...], largest: float, unit: str
+    path: str | Path, table: dict[str, np.ndarray], heading: str, names: tuple[str, ...], largest: float, unit: str
 ) -> np.ndarray:
     """Columns (n, W) of one quantity, from 0 to the largest value that it can have."""
     for name in names:
-        column = table[f"{head}_{name}"]
+        column = table[f"{heading}_{name}"]
         wrong = np.flatnonzero((column < 0.0) | (column > largest))
         if wrong.size:
-            place = f"{head}_{name} at {table['time'][wrong[0]]:g} s"
+            place = f"{heading}_{name} at {table['time'][wrong[0]]:g} s"
             raise InputError(path, place, float(column[wrong[0]]), f"must be from 0 to {largest:g} {unit}")
-    return np.column_stack([table[f"{head}_{name}"] for name in names])
+    return np.column_stack([table[f"{heading}_{name}"] for name in names])
 
 
 def _header(path: str | Path) -> str:

@@ -113,7 +113,8 @@ def on_springs(engine: str, vehicle: Any) -> Any:
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:
-    """Parameters of the scene's vehicle with what the scene overrides; of one on its suspension, those in the plane."""
+    """Parameters of the scene's vehicle with what the scene overrides; for a vehicle with suspension, those of its
+    plane model."""
     if scene.vehicle.file is not None:
         plane: Truck = sprung_of(scene).plane
         return plane

@@ -167,5 +167,5 @@ def controller_text(scene: BrakingScene) -> str:
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
+def _line(label: str, text: str) -> str:
+    return f"  {label:<10} {text}"

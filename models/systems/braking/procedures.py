@@ -11,7 +11,7 @@ from models.brake.controller import Pressures, Sample
 from models.brake.plane_records import motion_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
-from models.brake.port.setup import Run, opened
+from models.brake.port.setup import ControllerRun, opened
 from models.brake.steering import Steering, YawResponse, response
 from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError
@@ -108,11 +108,11 @@ def answers(
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
-def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run:
+def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> ControllerRun:
     """Facts of a run for the port; a log is that of a vehicle and its drive, whatever answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
-    return Run(
+    return ControllerRun(
         vehicle.plane.radius,
         scene.run.sample,
         text,

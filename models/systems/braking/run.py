@@ -50,9 +50,9 @@ def marched_by(vehicle: Braked, engine: str) -> Braked:
         return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
     if engine == "reference":
         return vehicle
-    from models.engines.braking import Carried
+    from models.engines.braking import CarriedChassis
 
-    return replace(vehicle, engine=Carried(engine, vehicle.plane))
+    return replace(vehicle, engine=CarriedChassis(engine, vehicle.plane))
 
 
 def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str) -> OtherRuns:

@@ -81,11 +81,13 @@ class BrakeTable(Strict):
     release: float | None = quantity(
         "bar", "pressure at which a falling torque ends; push_out if not said", default=None, zero=True
     )
-    falling: float | None = quantity("N m/bar", "gradient while pressure falls; as rising if not said", default=None)
+    falling: float | None = quantity(
+        "N m/bar", "gradient while the pressure falls; without it, that of rising pressure", default=None
+    )
 
 
 class BrakesTable(Strict):
-    """[brakes]: of each axle, of all wheels of what is towed, and the pressure that the pedal lets through."""
+    """[brakes]: brakes of each axle and of the towed vehicle's wheels, and the supply pressure."""
 
     front: BrakeTable = BrakeTable(gradient=1500.0)
     rear: BrakeTable = BrakeTable(gradient=1200.0)
@@ -100,11 +102,13 @@ class PressureTable(Strict):
     empty: float = quantity("s", "time constant of emptying", default=0.1)
     slow: float | None = quantity(
         "s",
-        "time constant of filling by valves that can apply slowly, at least fill; not said, no valve can",
+        "time constant of filling by valves that can apply slowly, at least that of fill; without it no valve can",
         default=None,
     )
     delay: float = quantity("s", "of the valves", default=0.0, zero=True)
-    reservoir: float | None = quantity("l", "of the supply; not said, its pressure stays", default=None)
+    reservoir: float | None = quantity(
+        "l", "volume of the supply reservoir; without it the supply pressure is constant", default=None
+    )
     volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
 
 

@@ -30,8 +30,8 @@ COURSE = {"aside": 1.0, "yaw": 5.0}
 
 @dataclass(frozen=True)
 class Stops:
-    """Job of an ensemble: path i brakes from speed (1 + spread e_i), e_i standard normal and the same for every job of
-    one seed. ``table`` is the scene's."""
+    """Ensemble of stops: path i brakes from speed (1 + spread e_i), where e_i is standard normal and depends on the
+    seed and i alone. ``table`` is the scene's."""
 
     table: Mapping[str, Any]
     file: str
@@ -80,7 +80,7 @@ class Scatter:
 
     @property
     def error(self) -> float:
-        """Standard error of the mean."""
+        """Standard error of the mean over all stops."""
         return self.deviation / sqrt(self.count)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.contact.accuracy import SLENDER
 from models.contact.limits import CONSTANT_FRICTION, HALF_SPACE, NO_SLIP, SMALL_CREEPAGE, YIELDS, yields
-from models.contact.theories import Contact, Fastsim, Linear, OnEllipse, OnPatches
+from models.contact.theories import Fastsim, LinearTheory, OnEllipse, OnPatches, RollingContact
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.core.tables import METRES, blocks
@@ -19,19 +19,19 @@ ALIKE = 0.02
 """Of mu N: what it may cost to leave out that two bodies differ."""
 
 
-def assumptions(scene: ContactScene, body: Contact) -> list[Assumption]:
+def assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
     """Assumptions that the scene's theory makes of its contact."""
     listed = [*of_pressing(scene, body), *_creepages(body)]
-    if isinstance(body, Linear):
+    if isinstance(body, LinearTheory):
         listed.append(_no_slip(lambda run: {"contact": _utilised_friction(run, body)}))
-    if isinstance(body, Linear | Fastsim):
+    if isinstance(body, LinearTheory | Fastsim):
         listed.append(_slender(lambda run: {"contact": np.array([body.a / body.b])}))
     if body.pair.mismatch != 0.0 and body.friction > 0.0:
         listed.append(_bodies_alike(body))
     return listed
 
 
-def of_pressing(scene: ContactScene, body: Contact) -> list[Assumption]:
+def of_pressing(scene: ContactScene, body: RollingContact) -> list[Assumption]:
     """Assumptions about bodies that are pressed together, whether they roll or not."""
     listed = [_half_space(_by_radii(scene, body))]
     if yields(scene.bodies.wheel, scene.bodies.rail):
@@ -63,7 +63,7 @@ def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _by_radii(scene: ContactScene, body: Contact) -> Callable[[Result], Watched]:
+def _by_radii(scene: ContactScene, body: RollingContact) -> Callable[[Result], Watched]:
     """Return the watch function of the semi-axes divided by the known radii of curvature.
 
     The radii are those of both bodies, or else of the distance between the undeformed surfaces.
@@ -96,14 +96,14 @@ def _elastic(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _creepages(body: Contact) -> list[Assumption]:
+def _creepages(body: RollingContact) -> list[Assumption]:
     """Assumptions that creepages are small and, where friction is constant, that slip is slow."""
     longer = body.lever
 
     def creepages(run: Result) -> Mapping[str, np.ndarray]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
-    if isinstance(body, Linear) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
+    if isinstance(body, LinearTheory) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
         return [_small_creepage(creepages)]
     return [
         _small_creepage(creepages),
@@ -136,7 +136,7 @@ def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) ->
 def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "no slip",
-        "the linear theory's force is far below what friction carries",
+        "the force of the linear theory is far below mu N",
         'name the effect saturation: method.name = "fastsim"',
         watched,
         "mu N",
@@ -144,7 +144,7 @@ def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _utilised_friction(run: Result, body: Contact) -> np.ndarray:
+def _utilised_friction(run: Result, body: RollingContact) -> np.ndarray:
     """Tangential forces divided by mu N; without friction any force is too large."""
     force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
@@ -161,7 +161,7 @@ def _slender(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _bodies_alike(body: Contact) -> Assumption:
+def _bodies_alike(body: RollingContact) -> Assumption:
     cost = np.array([body.pair.quasi_identity_error(body.friction)])
     return Assumption(
         "bodies alike",
@@ -174,7 +174,7 @@ def _bodies_alike(body: Contact) -> Assumption:
 
 
 def _on_profiles(body: OnPatches) -> list[Assumption]:
-    """Assumptions that patches lie within the given profiles, and beside one another."""
+    """Assumptions that contact patches lie within the given profiles and do not overlap."""
     parts = sorted(body.pressed.patches, key=lambda part: part.patch.contour_position)
     inside = {}
     for k, part in enumerate(parts, 1):

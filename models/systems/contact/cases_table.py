@@ -28,7 +28,7 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.core.errors import InputError
-from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, Block, blocks
+from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, blocks
 from models.core.whole_files import whole_file
 from models.ensemble.runner import in_order
 from models.ensemble.store import Arrays, Store
@@ -66,8 +66,8 @@ Build = Callable[[Array, Array], Any]
 
 def answer_table(
     path: Path,
-    out: Path,
-    built: Build,
+    output_path: Path,
+    build: Build,
     method: Method,
     progress: Callable[[int], None] = lambda rows: None,
     *,
@@ -75,20 +75,20 @@ def answer_table(
     executor: Executor | None = None,
     store: Store | None = None,
 ) -> dict[str, int]:
-    """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
+    """Answer the table at ``path`` into ``output_path``; returns how many rows there are and how many were wrong.
 
     errors : whether the answer has columns of errors, which take the forces again on half the cells. executor :
     computes the blocks of rows; store : keeps those that are finished (see ``models.ensemble.runner``). Raises
     InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
-    built(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
+    build(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading, solve = (
         blocks(path, (BY_AXES, BY_CURVATURES)),
-        partial(solved_rows, built=built, method=method, errors=errors),
+        partial(solved_rows, build=build, method=method, errors=errors),
     )
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
-    with whole_file(out) as part, part.open("w") as file:
+    with whole_file(output_path) as part, part.open("w") as file:
         heads = HEADER if errors else tuple(head for head in HEADER if head not in HEADER[ERRORS])
         file.write(",".join(heads) + "\n")
         for block, answers in in_order(solve, chain(first, reading), executor, store, AHEAD):
@@ -101,20 +101,20 @@ def answer_table(
     return counts
 
 
-def compile_first(built: Build, method: Method) -> None:
-    """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
+def compile_first(build: Build, method: Method) -> None:
+    """Compile or load the kernels, so that the measured time is that of the rows alone."""
     unit = np.ones(1)
-    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, built, method)
+    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, build, method)
 
 
-def solved_rows(block: Block, built: Build, method: Method, errors: bool) -> Arrays:
+def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
     """``forces`` (rows, columns) of a block, the rows (m,) that are ``wrong``, and ``why`` (m,)."""
     columns = len(HEADER) - 2 - (0 if errors else ERRORS.stop - ERRORS.start)
-    forces, wrong = _answered(block, partial(_forces, built=built, method=method, errors=errors), columns)
+    forces, wrong = _answered(block, partial(_forces, build=build, method=method, errors=errors), columns)
     return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
-def _answered(block: Block, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:
+def _answered(block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:
     """Answers (rows, columns), NaN where a row is wrong, and what is wrong there."""
     answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.wrong)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
@@ -142,10 +142,10 @@ def _sound(
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
 
 
-def _forces(values: dict[str, Any], built: Build, method: Method, errors: bool = True) -> Array:
+def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
     """Answers (rows, columns); raises InputError if a row is out of what the theory takes."""
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
-    touching = built(friction, load)
+    touching = build(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
     if touching.falling is not None:
         raise InputError("", "effects", None, "make friction fall, and a table of cases has constant friction")
@@ -181,13 +181,13 @@ def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Arr
     return [limit * left, theory, most * left, moment]
 
 
-def _line(line: int, row: list[float], wrong: str | None) -> str:
+def _line(line_number: int, row: list[float], wrong: str | None) -> str:
     """A row of the answer's file; text that says what is wrong stands within quotation marks."""
     if wrong is None:
         numbers, errors, status = SOUND
-        return (numbers + (errors if len(row) > ERRORS.start else "") + status).format(line, *row)
+        return (numbers + (errors if len(row) > ERRORS.start else "") + status).format(line_number, *row)
     text = wrong.replace('"', "'")
-    return f'{line}{"," * (len(row) + 1)}"{text}"\n'
+    return f'{line_number}{"," * (len(row) + 1)}"{text}"\n'
 
 
 def sizes(path: Path) -> dict[str, dict[str, Any]]:
@@ -217,6 +217,6 @@ def kept_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
     return named | {"status": ("", status.astype(str))}
 
 
-def _name_and_unit(head: str) -> tuple[str, str]:
-    name, _, unit = head.rstrip("]").partition(" [")
+def _name_and_unit(heading: str) -> tuple[str, str]:
+    name, _, unit = heading.rstrip("]").partition(" [")
     return name, unit

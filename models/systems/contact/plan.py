@@ -18,7 +18,7 @@ THEORIES = {
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, what reading alone does not find: materials that are too unlike."""
+    """Refuse, before any file is written, materials that differ too much for the half-space theories."""
     _ = scene.pair.G
 
 
@@ -79,13 +79,13 @@ def _assumed(scene: ContactScene) -> list[Assumption]:
     return []
 
 
-def _values(table: object, left_out: frozenset[str] | set[str] = frozenset()) -> str:
+def _values(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
     """Keys, values and units of a table, without what is not given."""
     model = type(table)
     parts = []
     for name, value in table:  # type: ignore[attr-defined]
         extra = model.model_fields[name].json_schema_extra  # type: ignore[attr-defined]
         unit = f" {extra['unit']}".rstrip() if isinstance(extra, dict) else ""
-        if value is not None and name not in left_out:
+        if value is not None and name not in omitted_keys:
             parts.append(f"{name} = {value:g}{unit}" if isinstance(value, float) else f"{name} = {value}")
     return ", ".join(parts)

@@ -13,24 +13,24 @@ import numpy as np
 
 from models.contact.accuracy import Error, rolled
 from models.contact.hertz import Hertz, by_approach, by_axes, by_load
-from models.contact.material import Falling, Pair
+from models.contact.material import Falling, MaterialPair
 from models.contact.profile_files import read_profile
-from models.contact.profiles import Profile
+from models.contact.profiles import ContactProfile
 from models.contact.simplified_theory import PLAIN, NormalContact, SimplifiedOptions, press
 from models.contact.standard_profiles import RAILS, WHEELS, built_in
 from models.contact.theories import (
-    Contact,
     Exact,
     ExactOnEllipse,
     Fastsim,
-    Linear,
+    LinearTheory,
     Motion,
     Rolled,
+    RollingContact,
     Simplified,
     beyond_friction,
 )
 from models.contact.undeformed_distance import quadratic
-from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
+from models.contact.wheel_on_rail import TouchingPlace, Track, Wheelset, wheel_on_rail
 from models.core.assumptions import with_assumptions
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
@@ -74,19 +74,20 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Built:
-    """The contact before it is pressed, as effects extend it: bodies, friction, load or approach.
+    """Data of a contact that effects may extend before its normal problem is solved: bodies, friction, load or
+    approach.
 
     pair : elastic constants; friction : its coefficient; load (N) or approach (m): the other one is None.
     falling : friction that falls with the speed of slip, of FASTSIM alone; profiles : cross-sections of "wheel" and
     "rail", none where an ellipse is given. In a table of cases friction and load are (n,), those of its rows.
     """
 
-    pair: Pair
+    pair: MaterialPair
     friction: Any
     load: Any = None
     approach: float | None = None
     falling: Falling | None = None
-    profiles: Mapping[str, Profile] = field(default_factory=dict)
+    profiles: Mapping[str, ContactProfile] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Rolls:
     pressing : seconds that it took to press the bodies; rolling : (n,) to roll them at each motion, errors included.
     """
 
-    contact: Contact
+    contact: RollingContact
     motions: list[Motion]
     rolled: Sequence[Rolled]
     errors: Sequence[Error]
@@ -150,7 +151,7 @@ def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
     rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
     doubt = ""
-    if isinstance(body, Linear):
+    if isinstance(body, LinearTheory):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
             used = np.array([np.linalg.norm(force.force) for force in rolls.rolled])
             doubt = beyond_friction(used / (body.friction * body.pressing.load))
@@ -228,13 +229,13 @@ def scene_contact(scene: ContactScene) -> Built:
     table = scene.contact
     assert table is not None
     kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
-    profiles: dict[str, Profile] = {kind: _profile(scene, kind) for kind in kinds}
+    profiles: dict[str, ContactProfile] = {kind: _profile(scene, kind) for kind in kinds}
     return extended(
         Built(scene.pair, table.friction, table.load, table.approach, scene.falling_friction, profiles), scene
     )
 
 
-def contact(scene: ContactScene) -> Contact:
+def contact(scene: ContactScene) -> RollingContact:
     """The contact of a scene, pressed, by the theory that the scene names."""
     method, built = scene.method, scene_contact(scene)
     friction, pair = built.friction, built.pair
@@ -255,7 +256,7 @@ def contact(scene: ContactScene) -> Contact:
     if method.name == "fastsim":
         choices = method.model_dump(include={"march", "bound", "flexibilities"})
         return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
-    return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
+    return (LinearTheory if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
 
 
 def creepages(scene: ContactScene) -> list[Motion]:
@@ -265,14 +266,14 @@ def creepages(scene: ContactScene) -> list[Motion]:
     return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
 
 
-def interpenetrating(hertz: Hertz, pair: Pair, options: SimplifiedOptions = PLAIN) -> NormalContact:
+def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN) -> NormalContact:
     """An ellipse as the theory of 1983 finds it, with room for more than its area."""
     A, B = float(hertz.A), float(hertz.B)
     x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
-    return press(quadratic(A, B, x, y), pair, load=float(hertz.load), options=options)
+    return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), options=options)
 
 
-def touches(scene: ContactScene, built: Built) -> list[Touch]:
+def touches(scene: ContactScene, built: Built) -> list[TouchingPlace]:
     """Where the profiles of a scene touch."""
     p = scene.profiles
     assert p is not None
@@ -286,7 +287,7 @@ def touches(scene: ContactScene, built: Built) -> list[Touch]:
     )
 
 
-def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
+def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProfile:
     """A built-in profile by its name, or the user's file."""
     assert scene.profiles is not None
     name = getattr(scene.profiles, kind)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
-from models.contact.material import STEEL, Falling, Material, Pair
+from models.contact.material import STEEL, Falling, Material, MaterialPair
 from models.core.errors import InputError
 from models.core.scene_effects import check, with_own
 from models.core.scene_file import SceneFile, checked
@@ -174,9 +174,9 @@ class ContactScene(SceneFile):
         return self.path(self.cases.file, "cases.file")
 
     @property
-    def pair(self) -> Pair:
+    def pair(self) -> MaterialPair:
         """The materials of both bodies."""
-        return Pair(self.bodies.wheel, self.bodies.rail)
+        return MaterialPair(self.bodies.wheel, self.bodies.rail)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:

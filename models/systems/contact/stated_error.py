@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.contact.accuracy import Error
-from models.contact.theories import Contact, Linear
+from models.contact.theories import LinearTheory, RollingContact
 from models.core.discretisation import Estimate, by_cells, not_estimated, of_theory, stated
 from models.core.result import Result
 from models.systems.contact.scene import ContactScene
@@ -15,7 +15,7 @@ HALF = "half the cells along each axis"
 BANDS = "which 95 % of such contacts keep to"
 
 
-def with_error(run: Result, scene: ContactScene, body: Contact, errors: Sequence[Error]) -> Result:
+def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
     """The result with the root mean squares over its motions of the errors of force and moment.
 
     Shares are of the root mean square of the force, for the moment times the contact's lever: a moment may vanish.
@@ -26,7 +26,7 @@ def with_error(run: Result, scene: ContactScene, body: Contact, errors: Sequence
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
     cells, order = scene.method.cells, min(body.order, 1.5)
     told = {name: by_cells(rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely}
-    if isinstance(body, Linear):
+    if isinstance(body, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
         stated(run, told, HALF)

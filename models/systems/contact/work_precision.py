@@ -17,8 +17,8 @@ from models.contact.fastsim import Ellipse
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
-from models.contact.material import Pair
-from models.contact.theories import ExactOnEllipse, Linear, Motion, OnEllipse, Simplified
+from models.contact.material import MaterialPair
+from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_cells, stated
 from models.core.errors import RunFailed
@@ -60,7 +60,7 @@ class ContactCase:
     b: float
     load: float
     friction: float
-    pair: Pair
+    pair: MaterialPair
     kind: str
     parts: Parts
     level: float
@@ -159,7 +159,7 @@ def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase
 FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
 """Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
 WAYS = (
-    TheorySettings("linear theory", (1,), _rolled_by_theory(Linear)),
+    TheorySettings("linear theory", (1,), _rolled_by_theory(LinearTheory)),
     TheorySettings("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
     TheorySettings("FASTSIM, plain march", FINE, _fastsim(march="plain")),
     TheorySettings("FASTSIM", FAST, _fastsim()),
@@ -236,13 +236,13 @@ def ellipse_cases(
     b: float,
     load: float,
     friction: float,
-    pair: Pair,
+    material_pair: MaterialPair,
     levels: tuple[float, ...],
     kinds: dict[str, Parts] = KINDS,
 ) -> list[ContactCase]:
     """All kinds and levels on one ellipse, without their forces."""
     return [
-        ContactCase(a, b, load, friction, pair, kind, parts, level)
+        ContactCase(a, b, load, friction, material_pair, kind, parts, level)
         for (kind, parts), level in product(kinds.items(), levels)
     ]
 

@@ -92,7 +92,7 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
     return [
         Assumption(
             f"stops {body} {freedom}",
-            f"{body!r} stays between the stops of its freedom {freedom}, which are not built",
+            f"{body!r} stays between the stops of its degree of freedom {freedom}, which are not built",
             "drive more slowly or steer less, or stiffen the spring",
             partial(_coordinate, places.index((body, freedom)), f"{body} {freedom}"),
             "rad" if freedom.startswith("r") else "m",

@@ -1,6 +1,6 @@
 """The vehicle of a scene of handling as a file of its engine: bodies and joints."""
 
-from models.engines.export import Exported, Subject, export_free_vehicle, parts_left_out
+from models.engines.export import Exported, ExportSubject, export_free_vehicle, parts_left_out
 from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_by
 from models.systems.handling.scene import HandlingScene
@@ -11,10 +11,14 @@ AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll 
 def exported(scene: HandlingScene, engine: str) -> Exported:
     """The vehicle of the first manoeuvre in "mujoco" or "exudyn" without springs, tyres and driver."""
     handling = scene.car(next(iter(scene.manoeuvres)))
-    return of_handling(engine, handling, Subject(scene.title, scene.file, AXES), ["the driver's steer and torques"])
+    return of_handling(
+        engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]
+    )
 
 
-def of_handling(engine: str, handling: Handling, subject: Subject, more: list[str]) -> Exported:
-    """A vehicle on a carrier; ``more`` says what else it leaves out."""
-    left_out = [*parts_left_out(handling.vehicle), *more]
-    return export_free_vehicle(engine, driven_by(handling), subject, left_out)
+def of_handling(
+    engine: str, handling: Handling, export_subject: ExportSubject, further_omissions: list[str]
+) -> Exported:
+    """A vehicle on a carrier; ``further_omissions`` says what else it leaves out."""
+    left_out = [*parts_left_out(handling.vehicle), *further_omissions]
+    return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)

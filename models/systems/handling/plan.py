@@ -77,5 +77,5 @@ def _manoeuvre(scene: HandlingScene, name: str) -> str:
     return f"{manoeuvre.speed:g} m/s, {manoeuvre.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<18} {text}"
+def _line(label: str, text: str) -> str:
+    return f"  {label:<18} {text}"

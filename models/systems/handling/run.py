@@ -258,17 +258,17 @@ class ManoeuvreRerun:
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal(drive: Drive, since: float = 0.0) -> Series:
+def principal(drive: Drive, start_time: float = 0.0) -> Series:
     """Channels whose error is told, of a drive that begins at a time (s)."""
     motion = dict(zip(UNITS, drive.velocity().T, strict=False))
-    return Series(since + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
+    return Series(start_time + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
 
 
-def _later(handling: Handling, since: float) -> Handling:
+def _later(handling: Handling, start_time: float) -> Handling:
     """A copy of the manoeuvre that starts at a time (s)."""
 
     def moved(control: Control) -> Control:
-        return tuple((time - since, value) for time, value in control)
+        return tuple((time - start_time, value) for time, value in control)
 
     controls_then = handling.controls
     controls = replace(
@@ -325,8 +325,8 @@ def driven_adaptively(engine: str, handling: Handling, speed: float, settings: S
 
 @contextmanager
 def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
-    """A march that fails because its car turns over says so: on its roof it is soon no state that an engine can
-    march."""
+    """Report that a failed march failed because its car turned over: engines cannot integrate the motion that
+    follows."""
     try:
         yield
     except RunFailed as error:
@@ -336,7 +336,7 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
 
 
 def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """``reported``, of a run in fixed steps; RunFailed where they cannot follow."""
+    """``reported`` for a run with fixed steps; RunFailed where the steps are too long for the motion."""
     drive = reported(handling, run, engine, seconds)
     check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.engines.export import Exported, Subject, export_free_vehicle
+from models.engines.export import Exported, ExportSubject, export_free_vehicle
 from models.engines.free_vehicle import Driven
 from models.engines.native_parts import divide
 from models.systems.hub_forces.scene import HubScene
@@ -15,17 +15,17 @@ def exported(scene: HubScene, engine: str) -> Exported:
     """The cut vehicle in "mujoco" or "exudyn" without hub forces and stabiliser."""
     vehicle = scene.cut_vehicle()
     held = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
-    return of_cut(engine, vehicle, Subject(scene.title, scene.file, AXES), held)
+    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), held)
 
 
-def of_cut(engine: str, vehicle: CutVehicle, subject: Subject, more: list[str]) -> Exported:
-    """A cut vehicle; ``more`` says what else it leaves out."""
+def of_cut(engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]) -> Exported:
+    """A cut vehicle; ``further_omissions`` says what else it leaves out."""
     division = divide(vehicle.tree, vehicle.elements, engine)
     weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
     driven = Driven(vehicle.tree, weight, np.zeros(1), None, None, division.native)
     left_out = [
         *(f"{name!r}, in part or as a whole: {why}" for name, why in division.reasons.items()),
         *(f"force and moment at the hub {hub!r}" for hub in vehicle.hubs),
-        *more,
+        *further_omissions,
     ]
-    return export_free_vehicle(engine, driven, subject, left_out)
+    return export_free_vehicle(engine, driven, export_subject, left_out)

@@ -9,7 +9,7 @@ from models.core.signals import Interpolation, sampled
 from models.engines.cut_vehicle import HubModel, HubRun, build, reported
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs, table
-from models.road.profile import Profile
+from models.road.profile import RoadProfile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
 
@@ -49,7 +49,9 @@ class Angles:
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
 
-def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> HubInputs:
+def two_tracks(
+    vehicle: CutVehicle, left: RoadProfile, right: RoadProfile, speed: float, step: float, steps: int
+) -> HubInputs:
     """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
@@ -76,11 +78,11 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 
-def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
-    """Hub forces and angles of a run, sampled without noise at every ``every``-th step."""
-    n, period = run.states.shape[1] // 2, float(run.times[1]) * every
-    angles = run.states[::every, [ROLL, PITCH, n + ROLL, n + PITCH]]
-    wrenches = run.wrenches[::every]
+def recorded(run: HubRun, frame: str, stride: int) -> tuple[HubForces, Angles]:
+    """Hub forces and angles of a run, sampled without noise at every ``stride``-th step."""
+    n, period = run.states.shape[1] // 2, float(run.times[1]) * stride
+    angles = run.states[::stride, [ROLL, PITCH, n + ROLL, n + PITCH]]
+    wrenches = run.wrenches[::stride]
     return HubForces(wrenches.reshape(len(wrenches), -1), period, frame), Angles(angles, period)
 
 

@@ -134,8 +134,8 @@ def _noise(scene: HubScene) -> str:
     return ", ".join(said) or "none"
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
+def _line(label: str, text: str) -> str:
+    return f"  {label:<10} {text}"
 
 
 def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
@@ -170,9 +170,9 @@ def _recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 
-    def signal(at: str, what: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
-        name = f"{at} {what} {axis}"
-        return Signal(name, str(file), name, what, at, axis, frame, 1, UNITS[what], 1.0)
+    def signal(location: str, quantity: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
+        name = f"{location} {quantity} {axis}"
+        return Signal(name, str(file), name, quantity, location, axis, frame, 1, UNITS[quantity], 1.0)
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (

@@ -147,7 +147,7 @@ def errors_of_steps(
     period: float = 0.0,
     forces: Route = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
-    """Errors of what ``principal`` lists of a run in an engine, by name, and how they were told.
+    """Estimated errors of the channels that ``principal`` lists, by name, and the method of the estimate.
 
     hub_inputs : inputs for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
     divide it, or they would take the samples' noise for motion; forces : whose those of springs are.
@@ -177,10 +177,10 @@ def errors_of_steps(
     return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
 
 
-def principal(vehicle: CutVehicle, run: HubRun, since: float = 0.0) -> Series:
+def principal(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
     """Channels whose error is told, of a run that begins at a time (s): forces of all elements, roll and pitch."""
     channels = {element.name: run.elements[:, i] for i, element in enumerate(vehicle.elements)}
-    return Series(since + run.times, channels | {"roll": run.states[:, ROLL], "pitch": run.states[:, PITCH]})
+    return Series(start_time + run.times, channels | {"roll": run.states[:, ROLL], "pitch": run.states[:, PITCH]})
 
 
 def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:

@@ -92,7 +92,11 @@ class Stabilise(Strict):
 
     method: Method = Field(default="none", description="what holds roll and pitch")
     bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
-    model: float = quantity("rad/s^2", "deviation of what springs add to a rigid vehicle, to the filter", default=10.0)
+    model: float = quantity(
+        "rad/s^2",
+        "standard deviation, in the filter, of the acceleration that the suspension adds to a rigid vehicle",
+        default=10.0,
+    )
     smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
 
 

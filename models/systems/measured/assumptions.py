@@ -19,22 +19,24 @@ PULL = 0.2
 
 
 def assumptions(
-    scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None
+    scene: MeasuredScene, vehicle: CutVehicle | None, examination: "Examination | None" = None
 ) -> list[Assumption]:
     """Assumptions of the run whose forces are handed on; exam : of it, None to list only.
 
     Of the pitch plane (vehicle None) its own system says the rest.
     """
-    return [_in_range(exam), *([] if vehicle is None else _in_space(scene, vehicle, exam))]
+    return [_in_range(examination), *([] if vehicle is None else _in_space(scene, vehicle, examination))]
 
 
-def _in_range(exam: "Examination | None") -> Assumption:
+def _in_range(examination: "Examination | None") -> Assumption:
     """Assumption that transducers stay within their ranges."""
 
     def clipped() -> Watched:
         """Share of samples at an extreme where they pile up, of every channel that is put in."""
-        assert exam is not None
-        values = {s.name: exam.recording.samples(s) for s in exam.recording.signals if exam.put_in(s)}
+        assert examination is not None
+        values = {
+            s.name: examination.recording.samples(s) for s in examination.recording.signals if examination.put_in(s)
+        }
         return {name: np.array([np.isin(each, clipping_extremes(each)).mean()]) for name, each in values.items()}
 
     return Assumption(
@@ -47,12 +49,12 @@ def _in_range(exam: "Examination | None") -> Assumption:
     )
 
 
-def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
+def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
     """Assumptions on a cut vehicle, by the answers of its run."""
 
     def read(name: str) -> np.ndarray:
-        assert exam is not None and exam.outcome is not None
-        return exam.outcome.samples(name)
+        assert examination is not None and examination.outcome is not None
+        return examination.outcome.samples(name)
 
     def tilt() -> Watched:
         return {name: read(f"{vehicle.chassis} {name}") for name in ("roll", "pitch")}
@@ -61,9 +63,11 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | No
         return {hub: read(f"{hub} hub Fz") for hub in vehicle.hubs}
 
     def balance() -> Watched:
-        assert exam is not None
+        assert examination is not None
         return {
-            "all hubs": carried_weight_share(sum(vertical().values(), np.zeros(1)), vehicle, exam.recording.duration)
+            "all hubs": carried_weight_share(
+                sum(vertical().values(), np.zeros(1)), vehicle, examination.recording.duration
+            )
         }
 
     filtered = scene.stabilise.method == "kalman"
@@ -101,25 +105,25 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | No
             "leave these times out by [clock]: no stop is in the cut vehicle's linear springs",
         ),
     ]
-    return [*listed, *_same_attitude(scene, vehicle, exam)]
+    return [*listed, *_same_attitude(scene, vehicle, examination)]
 
 
-def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
+def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
     """Assumptions on a free run on forces that keep their directions, where roll or pitch were measured."""
-    if scene.stabilise.method != "none" or exam is None:
+    if scene.stabilise.method != "none" or examination is None:
         return []
-    frames = {s.frame for s in exam.recording.signals if s.at in vehicle.hubs and exam.put_in(s)}
-    angles = [s for s in exam.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
+    frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.put_in(s)}
+    angles = [s for s in examination.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
     if frames != {"inertial"} or not angles:
         return []
 
     def beside() -> Watched:
-        assert exam.outcome is not None
-        skip = round(exam.outcome.period / exam.recording.period)
-        done = exam.outcome.done
+        assert examination.outcome is not None
+        skip = round(examination.outcome.period / examination.recording.period)
+        done = examination.outcome.done
         return {
-            s.component: exam.outcome.samples(f"{vehicle.chassis} {s.component}")
-            - exam.recording.samples(s)[::skip][:done]
+            s.component: examination.outcome.samples(f"{vehicle.chassis} {s.component}")
+            - examination.recording.samples(s)[::skip][:done]
             for s in angles
         }
 

@@ -265,12 +265,12 @@ def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) 
     """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
     names, done, absurd = tuple(signal.name for signal in group.signals), 0, list[Finding]()
 
-    def put(last: int, at: np.ndarray, si: np.ndarray) -> None:
-        """Samples up to ``last``, those at these places as they are."""
-        for first in range(done, last, BLOCK):
-            here = (at >= first) & (at < min(first + BLOCK, last))
-            values = np.full((min(BLOCK, last - first), len(names)), np.nan)
-            values[at[here] - first] = si[here]
+    def put(last_index: int, indices: np.ndarray, si: np.ndarray) -> None:
+        """Samples up to ``last_index``, those at these places as they are."""
+        for first in range(done, last_index, BLOCK):
+            here = (indices >= first) & (indices < min(first + BLOCK, last_index))
+            values = np.full((min(BLOCK, last_index - first), len(names)), np.nan)
+            values[indices[here] - first] = si[here]
             columns.put(names, first, values)
 
     for block in group.source.blocks(group.names):

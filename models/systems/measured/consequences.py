@@ -23,8 +23,8 @@ from models.measured.columns import Columns
 from models.measured.gaps import BRIDGED, filled
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import Outcome
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import SectionOutcome
+from models.systems.measured.sections import SectionChannel
 
 LONGEST = 30.0
 """s of a recording that are run for a finding."""
@@ -37,7 +37,7 @@ SMALL = 0.02
 SETTLING = 1.0
 """s at the beginning that are not compared: there the run settles."""
 Samples = dict[Signal, np.ndarray]
-Run = Callable[[Recording, Path], Outcome]
+Run = Callable[[Recording, Path], SectionOutcome]
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ class Consequence:
 
 
 def consequences(
-    findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[Answer], folder: Path
+    findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[SectionChannel], folder: Path
 ) -> tuple[Consequence, ...]:
     """One for every doubt; run : makes a run of a recording in a folder; answers : the section forces that count."""
     shutil.rmtree(folder, ignore_errors=True)
-    known = dict[int, Outcome]()
+    known = dict[int, SectionOutcome]()
 
     def consequence(number: int, finding: Finding) -> Consequence:
         signals = [s for s in recording.signals if s.name in finding.signals]
@@ -144,7 +144,9 @@ def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -
     return Recording(recording.signals, columns, recording.period)
 
 
-def _most_changed_force(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
+def _most_changed_force(
+    finding: Finding, recorded: SectionOutcome, right: SectionOutcome, answers: Sequence[SectionChannel]
+) -> Consequence:
     """The section force that differs most, of those that carry anything."""
     first = min(round(SETTLING / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
@@ -159,20 +161,20 @@ def _most_changed_force(finding: Finding, recorded: Outcome, right: Outcome, ans
 
 
 def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Read later by the delay, or by what a clock has drifted since the start."""
+    """Channels read later by a delay, or by the drift of a clock since the start."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
     return {s: _read_at(samples[s], later) for s in signals}
 
 
-def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
+def _read_at(values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
     """Values (n,) read so many samples (n,) later, by a cubic spline; NaN where one beside it is not known."""
     from scipy.interpolate import make_interp_spline
 
     known, places = np.isfinite(values), np.arange(len(values))
     if np.count_nonzero(known) < 4:
         return values
-    at = np.clip(places + later, 0, len(values) - 1)
+    at = np.clip(places + samples_later, 0, len(values) - 1)
     spline = make_interp_spline(places[known], values[known], k=3)
     lost = np.interp(at, places, (~known).astype(float)) > 0
     return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))

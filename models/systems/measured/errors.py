@@ -13,7 +13,7 @@ import numpy as np
 from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed_error
 from models.systems.hub_forces.run import LEAST, ORDER
 from models.systems.measured.consequences import samples_as_recording
-from models.systems.measured.section_run import Outcome, SectionRun
+from models.systems.measured.section_run import SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 
 SHARE, LONGEST = 0.2, 30.0
@@ -21,7 +21,7 @@ SHARE, LONGEST = 0.2, 30.0
 
 
 def errors_of_steps(
-    job: SectionRun, outcome: Outcome, before: dict[str, Estimate], folder: Path
+    job: SectionRun, outcome: SectionOutcome, before: dict[str, Estimate], folder: Path
 ) -> dict[str, Estimate]:
     """Errors by the answer's name of what springs, mounts and bars carry, and of roll and pitch.
 
@@ -49,7 +49,7 @@ def errors_of_steps(
     return told
 
 
-def _principal(job: SectionRun, outcome: Outcome, virtual: bool) -> dict[str, str]:
+def _principal(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
     """Answers whose error is told, and the elements that they are of, none of angles; not of what hardly moves.
 
     After a virtual measurement angles are not told: moments that are measured wrong add up in them.

@@ -1,7 +1,7 @@
 """The vehicle of a recording as a file of its engine."""
 
 from models.core.errors import InputError
-from models.engines.export import Exported, Subject
+from models.engines.export import Exported, ExportSubject
 from models.systems.hub_forces.export import AXES, of_cut
 from models.systems.measured.scene import MeasuredScene
 
@@ -12,4 +12,4 @@ def exported(scene: MeasuredScene, engine: str) -> Exported:
     if vehicle is None:
         allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    return of_cut(engine, vehicle, Subject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"])
+    return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"])

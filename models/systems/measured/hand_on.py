@@ -15,8 +15,8 @@ from models.fatigue.counting import Counted
 from models.measured.channel import BLOCK
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
-from models.systems.measured.section_run import Outcome
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import SectionOutcome
+from models.systems.measured.sections import SectionChannel
 
 FILES = "section_forces"
 """Name of the files that are handed on, before their extensions."""
@@ -24,10 +24,10 @@ FIGURES = ("least", "greatest", "mean")
 
 
 def hand_on(
-    outcome: Outcome,
+    outcome: SectionOutcome,
     folder: Path,
     formats: Iterable[str],
-    answers: Sequence[Answer] | None = None,
+    answers: Sequence[SectionChannel] | None = None,
     start: datetime | None = None,
     comment: str = "",
 ) -> list[Path]:
@@ -54,13 +54,13 @@ def hand_on(
     ]
 
 
-def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
+def forces(answers: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
     """The answers that are section forces and moments."""
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 
 def labelled(
-    scene: Any, outcome: Outcome | None, counted: Mapping[Answer, Counted], folder: Path, **more: Any
+    scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, Counted], folder: Path, **more: Any
 ) -> Result:
     """The result of a run, whose columns lie in ``folder``; where there is none, what is said of it alone.
 

@@ -1,4 +1,5 @@
-"""How the runs of a recording are held: free, and by the stabiliser of its scene, which weighs noise as it is."""
+"""How roll and pitch are held in the runs of a recording: free, and by the stabiliser of its scene, tuned to the stated
+noise."""
 
 import numpy as np
 
@@ -6,7 +7,7 @@ from models.measured.checks.spectra import noise
 from models.measured.recording import Recording
 from models.measured.signal import Quantity
 from models.systems.measured.scene import Deviations, MeasuredScene
-from models.systems.measured.section_run import Hold
+from models.systems.measured.section_run import AttitudeHold
 
 FREE = "free"
 """Name of the run without a stabiliser."""
@@ -14,15 +15,15 @@ NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "an
 """Keys of the scene's table ``noise``, and the quantities that they are of."""
 
 
-def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
+def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
     """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
     stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
     held = {
-        stabilised.method: Hold(
+        stabilised.method: AttitudeHold(
             stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
         )
     }
-    return {FREE: Hold("none", **deviations)} | ({} if stabilised.method == "none" else held)
+    return {FREE: AttitudeHold("none", **deviations)} | ({} if stabilised.method == "none" else held)
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
@@ -31,6 +32,6 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     for key, quantity in NOISE.items():
         sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
-        least = float(getattr(Hold, key))
+        least = float(getattr(AttitudeHold, key))
         deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
     return deviations

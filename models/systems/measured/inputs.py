@@ -78,7 +78,7 @@ class StepGrid:
         return np.asarray(sum(weight[:, None] * samples[at + i] for i, weight in enumerate(weights)))
 
     def _samples_before(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Sample before each half step, and the part of the period since then."""
+        """Index of the last sample before each half step, and the fraction of the sampling period since then."""
         numerator, denominator = self.part.numerator, self.part.denominator
         place = np.arange(count) * numerator
         return place // denominator, (place % denominator) / denominator

@@ -69,7 +69,7 @@ TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"
 
 
 @dataclass(frozen=True)
-class Guess:
+class ChannelGuess:
     """Guess at the meaning of a channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is
     not sure.
 
@@ -85,7 +85,7 @@ class Guess:
     left_out: str = ""
 
 
-def guess(channel: Channel) -> Guess | None:
+def guess(channel: Channel) -> ChannelGuess | None:
     """A guess at the meaning of a channel; None where there is no clue; what is missing in a guess is empty."""
     words, family = _words_of_name(channel.name), _words_of_name(channel.family)
     kinds = quantities(channel.unit) or tuple(WORDS)
@@ -102,7 +102,7 @@ def guess(channel: Channel) -> Guess | None:
         left_out = (
             f"left out: of a part of the suspension ({part}), not of a hub; at a connector it can be compared with"
         )
-        return Guess(channel.name, what, "", "", unit, " ".join(doubts), left_out)
+        return ChannelGuess(channel.name, what, "", "", unit, " ".join(doubts), left_out)
     if what == "force" and corner and not component:
         component, strange = "z", _unexpected_word(words)
         doubts.append("vertical?")
@@ -111,7 +111,7 @@ def guess(channel: Channel) -> Guess | None:
         doubts.append("where? name the place under [sensors]")
     places = {"force": corner, "moment": corner, "travel": SPRINGS.get(corner, ""), "strain": channel.name}
     at = places.get(what, "" if what == "acceleration" else "body")
-    return Guess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
+    return ChannelGuess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
 
 
 def _words_of_name(name: str) -> str:
@@ -126,7 +126,7 @@ def _suspension_words(*texts: str) -> str:
 
 
 def _unexpected_word(words: str) -> str:
-    """First word of a force's name that is neither a corner, a force, a wheel nor one that says nothing."""
+    """First word of a force channel's name that is not known as a corner, a force, a wheel or a filler word."""
     for known in (*CORNERS.values(), WORDS["force"], WHEEL, PLAIN):
         words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
     return next((word for word in words.split() if len(word) > 1), "")
@@ -187,7 +187,7 @@ def scene_text(source: Source) -> str:
     return "\n".join([SCENE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
 
 
-def _row(name: str, guess: Guess | None) -> str:
+def _row(name: str, guess: ChannelGuess | None) -> str:
     """An entry of the map, as a comment where anything is missing."""
     if guess is None:
         return f"  # {{ channel = {_quoted(name)} }},  # not known"

@@ -25,8 +25,8 @@ from models.measured.columns import Columns
 from models.measured.gaps import bridged
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.systems.measured.section_run import Hold, Outcome
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome
+from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, build
@@ -50,7 +50,7 @@ class PlaneJob:
     recording: Recording
     parameters: str
     engine: str = "mujoco"
-    hold: Hold = field(default_factory=Hold)
+    hold: AttitudeHold = field(default_factory=AttitudeHold)
     step: float | None = None
     file: str = ""
 
@@ -67,7 +67,7 @@ class PlaneRun:
     result: Result
     trust: Trust | None
     verdict: Verdict
-    outcome: Outcome
+    outcome: SectionOutcome
 
 
 def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool = False) -> PlaneRun:
@@ -166,9 +166,9 @@ def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
     return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
 
 
-def _samples_without_gaps(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
+def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
     values, _, findings = bridged(job.recording, signal)
-    said += findings
+    all_findings += findings
     return values
 
 
@@ -193,23 +193,25 @@ def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> d
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> Outcome:
+def _outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> SectionOutcome:
     """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
-    channels = dict[Answer, np.ndarray]()
+    channels = dict[SectionChannel, np.ndarray]()
     for name, spring in SPRINGS.items():
         for axis, way in (("x", "forward"), ("z", "upward")):
             text = f"on the {CHASSIS} in its axes, {way} positive"
-            channels[Answer(f"{spring} F{axis}", "N", text, spring, "force", spring, axis)] = forces[f"{name}{axis}"]
+            channels[SectionChannel(f"{spring} F{axis}", "N", text, spring, "force", spring, axis)] = forces[
+                f"{name}{axis}"
+            ]
     pitch: tuple[tuple[str, Quantity, str, str], ...] = (
         ("", "angle", "rad", "pitch"),
         (" rate", "angular rate", "rad/s", "pitch_rate"),
     )
     for suffix, quantity, unit, name in pitch:
-        answer = Answer(f"{CHASSIS} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS, "pitch")
+        answer = SectionChannel(f"{CHASSIS} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS, "pitch")
         channels[answer] = -result[name]
     columns = Columns(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
     columns.write(0, np.column_stack(list(channels.values())))
     surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
     period, count = float(result.times[1]), len(result.times)
-    return Outcome(columns, tuple(channels), period, count, float(surprise), findings, counts=result.counts())
+    return SectionOutcome(columns, tuple(channels), period, count, float(surprise), findings, counts=result.counts())

@@ -123,5 +123,5 @@ def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
     return lines
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
+def _line(label: str, text: str) -> str:
+    return f"  {label:<10} {text}"

@@ -41,10 +41,10 @@ from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import mapped, opened
 from models.systems.measured.scene import MeasuredScene, Rig
-from models.systems.measured.section_run import Hold, Outcome, SectionRun
+from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
-from models.systems.measured.sections import Answer, Sections, points
+from models.systems.measured.sections import SectionChannel, Sections, points
 from models.systems.measured.trust import Drift, Level, drift
 from models.systems.measured.verdict import Compared, checks, compare, filter_doubts, judge
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
@@ -69,16 +69,16 @@ class Examination:
     engine: str
     recording: Recording
     virtual: VirtualMeasurement | None
-    holds: dict[str, Hold]
+    holds: dict[str, AttitudeHold]
     findings: tuple[Finding, ...] = ()
     drift: Drift | None = None
     trust: tuple[tuple[str, Trust], ...] = ()
-    runs: dict[str, Outcome] = field(default_factory=dict)
+    runs: dict[str, SectionOutcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
     compared: tuple[Compared, ...] = ()
     plane: Result | None = None
-    counted: dict[Answer, Counted] = field(default_factory=dict)
+    counted: dict[SectionChannel, Counted] = field(default_factory=dict)
     handed: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -102,7 +102,7 @@ class Examination:
         return [*self.holds][-1]
 
     @property
-    def outcome(self) -> Outcome | None:
+    def outcome(self) -> SectionOutcome | None:
         """The outcome of the run that is handed on; None where no run was made."""
         return self.runs.get(self.chosen)
 
@@ -111,7 +111,7 @@ class Examination:
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
 
-    def forces(self, outcome: Outcome) -> list[Answer]:
+    def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
         """Section forces and moments of a run at the sections that the scene names, all if none."""
         wanted = self.scene.hand_on.sections
         return [answer for answer in forces(outcome.answers) if wanted is None or answer.section in wanted]
@@ -128,7 +128,7 @@ class Examination:
 
     def march(
         self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
-    ) -> Outcome:
+    ) -> SectionOutcome:
         """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
         job = self.job(name)
         if isinstance(job, SectionRun):
@@ -140,8 +140,8 @@ class Examination:
             self.trust = (("pitch", run.trust),)
         return run.outcome
 
-    def rerun(self, name: str, recording: Recording, folder: Path) -> Outcome:
-        """A run of another recording, held as the one of this name."""
+    def rerun(self, name: str, recording: Recording, folder: Path) -> SectionOutcome:
+        """Run another recording, with roll and pitch held as in the run of this name."""
         job = self.job(name, recording)
         return march(job, folder / "run") if isinstance(job, SectionRun) else run_plane(job, folder / "run").outcome
 
@@ -183,26 +183,26 @@ def run(
         return labelled
 
 
-def _judged_by_assumptions(run: Result, exam: Examination) -> Result:
+def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
     """The result with what it assumes and what of that it broke; of the pitch plane beside what its own run says."""
-    if exam.outcome is None:
+    if examination.outcome is None:
         return run
-    with_assumptions(run, assumptions(exam.scene, exam.rig.vehicle, exam))
-    if exam.plane is not None:
-        run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
+    with_assumptions(run, assumptions(examination.scene, examination.rig.vehicle, examination))
+    if examination.plane is not None:
+        run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, examination.plane))
         run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *run_said[key]] for key in run_said})
-        run.data.attrs["error"] = exam.plane.data.attrs["error"]
+        run.data.attrs["error"] = examination.plane.data.attrs["error"]
     return run
 
 
-def _with_error(run: Result, exam: Examination, work: Path) -> Result:
+def _with_error(run: Result, examination: Examination, work: Path) -> Result:
     """The result with the error of the steps of the run that is handed on."""
-    job, outcome = exam.job(exam.chosen), exam.outcome
+    job, outcome = examination.job(examination.chosen), examination.outcome
     if outcome is None or not isinstance(job, SectionRun):
         return run
-    if exam.chosen in exam.failed:
-        return not_estimated(run, f"the run did not end: {exam.failed[exam.chosen]}")
-    before = exam.virtual.errors if exam.virtual is not None else {}
+    if examination.chosen in examination.failed:
+        return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen]}")
+    before = examination.virtual.errors if examination.virtual is not None else {}
     try:
         told = errors_of_steps(job, outcome, before, work)
     except (InputError, RunFailed) as failure:
@@ -233,54 +233,56 @@ def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progr
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
 
 
-def _lap(exam: Examination, stage: str, begun: float) -> None:
+def _lap(examination: Examination, stage: str, begun: float) -> None:
     """Seconds of a stage that has ended, since ``begun`` and without the stages before it."""
-    exam.seconds[stage] = time.perf_counter() - begun - sum(exam.seconds.values())
+    examination.seconds[stage] = time.perf_counter() - begun - sum(examination.seconds.values())
 
 
-def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) -> None:
+def _examined(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
     """Check, predict, run, judge, and hand on, as far as the recording can be used."""
-    lap = partial(_lap, exam, begun=time.perf_counter() - sum(exam.seconds.values()))
+    lap = partial(_lap, examination, begun=time.perf_counter() - sum(examination.seconds.values()))
     progress("checks", 0.2)
-    exam.findings = findings(exam.evidence)
+    examination.findings = findings(examination.evidence)
     lap("checks")
-    if exam.stopped:
+    if examination.stopped:
         return
-    if exam.rig.vehicle is not None:
-        _predicted(exam, exam.rig.vehicle)
-    _run(exam, folder / WORK, progress, error)
-    if exam.rig.vehicle is not None:
-        _with_verdicts(exam)
+    if examination.rig.vehicle is not None:
+        _predicted(examination, examination.rig.vehicle)
+    _run(examination, folder / WORK, progress, error)
+    if examination.rig.vehicle is not None:
+        _with_verdicts(examination)
     lap("runs")
-    if exam.outcome is not None:
-        named = {(finding.check, finding.signals, finding.place) for finding in exam.findings}
-        exam.findings += tuple(f for f in exam.outcome.findings if (f.check, f.signals, f.place) not in named)
-        exam.findings += filter_doubts(exam.outcome)
+    if examination.outcome is not None:
+        named = {(finding.check, finding.signals, finding.place) for finding in examination.findings}
+        examination.findings += tuple(
+            f for f in examination.outcome.findings if (f.check, f.signals, f.place) not in named
+        )
+        examination.findings += filter_doubts(examination.outcome)
     progress("what the findings do", 0.9)
-    _with_consequences(exam, folder / WORK)
+    _with_consequences(examination, folder / WORK)
     lap("what the findings do")
-    if exam.outcome is not None:
+    if examination.outcome is not None:
         progress("files", 0.95)
-        _save_section_forces(exam, exam.outcome, folder)
+        _save_section_forces(examination, examination.outcome, folder)
         lap("files")
 
 
-def _predicted(exam: Examination, vehicle: CutVehicle) -> None:
+def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
     """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
-    recording, free = exam.recording, exam.holds[FREE]
+    recording, free = examination.recording, examination.holds[FREE]
     tilt, rate = (
         [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
         for what in ("angle", "angular rate")
     )
-    couple = moments(exam.evidence)  # that the motion does not bear out, at the first hub
+    couple = moments(examination.evidence)  # that the motion does not bear out, at the first hub
     bias = np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(vehicle.hubs) - 5)]) if couple.any() else None
     frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
     level = Level(free.force, free.moment, bias, tilt, rate)
-    exam.drift = drift(vehicle, level, recording.period, recording.duration, frame)
-    lacking = exam.evidence.lacking
+    examination.drift = drift(vehicle, level, recording.period, recording.duration, frame)
+    lacking = examination.evidence.lacking
     rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
-    exam.trust = tuple(
-        (what, replace(exam.drift.trust(angle), unchecked=rest))
+    examination.trust = tuple(
+        (what, replace(examination.drift.trust(angle), unchecked=rest))
         for what, angle in (("section forces", None), ("motion", ANGLE))
     )
 
@@ -293,24 +295,27 @@ def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str)
     return 0.0
 
 
-def _run(exam: Examination, work: Path, progress: Progress, error: bool) -> None:
-    """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
-    for name in exam.holds:
-        if isinstance(job := exam.job(name), SectionRun):
+def _run(examination: Examination, work: Path, progress: Progress, error: bool) -> None:
+    """Run the vehicle free, and with the stabiliser of the scene; a run that fails keeps its samples up to the
+    failure."""
+    for name in examination.holds:
+        if isinstance(job := examination.job(name), SectionRun):
             check_run(job)
-    for i, name in enumerate(exam.holds):
-        progress(f"{name} run", 0.2 + 0.7 * i / len(exam.holds))
-        told = _with_time_left(f"{name} run", progress, 0.2 + 0.7 * i / len(exam.holds), 0.7 / len(exam.holds))
+    for i, name in enumerate(examination.holds):
+        progress(f"{name} run", 0.2 + 0.7 * i / len(examination.holds))
+        told = _with_time_left(
+            f"{name} run", progress, 0.2 + 0.7 * i / len(examination.holds), 0.7 / len(examination.holds)
+        )
         try:
-            exam.runs[name] = exam.march(name, work / name, told, error)
+            examination.runs[name] = examination.march(name, work / name, told, error)
         except RunFailed as error:
-            exam.failed[name] = str(error)
-            if isinstance(error.partial, Outcome):
-                exam.runs[name] = error.partial
+            examination.failed[name] = str(error)
+            if isinstance(error.partial, SectionOutcome):
+                examination.runs[name] = error.partial
         except InputError as error:  # what the filter refuses, the findings may explain
-            if exam.rig.vehicle is None or all(finding.weight == "note" for finding in exam.findings):
+            if examination.rig.vehicle is None or all(finding.weight == "note" for finding in examination.findings):
                 raise
-            exam.failed[name] = str(error)
+            examination.failed[name] = str(error)
 
 
 def _with_time_left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
@@ -326,65 +331,72 @@ def _with_time_left(name: str, progress: Progress, begin: float, share: float) -
     return told
 
 
-def _with_verdicts(exam: Examination) -> None:
+def _with_verdicts(examination: Examination) -> None:
     """Check channels beside the run that is handed on, and the verdict on every run."""
-    assert exam.drift is not None
-    recording, slopes = exam.recording, tuple(exam.scene.hand_on.slopes)
-    for name, outcome in exam.runs.items():
-        job = exam.job(name)
+    assert examination.drift is not None
+    recording, slopes = examination.recording, tuple(examination.scene.hand_on.slopes)
+    for name, outcome in examination.runs.items():
+        job = examination.job(name)
         assert isinstance(job, SectionRun)
         beside = tuple(compare(recording, outcome, *pair, slopes) for pair in checks(job))
-        exam.verdicts[name] = judge(
+        examination.verdicts[name] = judge(
             job,
             outcome,
-            exam.scene.limits,
-            exam.drift.passes(exam.drift.angle) or recording.duration,
+            examination.scene.limits,
+            examination.drift.passes(examination.drift.angle) or recording.duration,
             [compared for compared in beside if compared.signal.check],
             {s.name: noise(recording, s) for s in recording.signals if s.check},
         )
-        if name == exam.chosen:
-            exam.compared = beside
+        if name == examination.chosen:
+            examination.compared = beside
 
 
-def _with_consequences(exam: Examination, work: Path) -> None:
+def _with_consequences(examination: Examination, work: Path) -> None:
     """Compute the changes of the section forces by each finding, and the verdicts that follow: by the run
     with the stabiliser, or by the free one where that failed."""
-    name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
-    if name in exam.runs:
-        rerun, answers = partial(exam.rerun, name), exam.forces(exam.runs[name])
-        exam.consequences = consequences(exam.findings, exam.recording, rerun, answers, work / "findings")
-        exam.verdicts = {
-            name: judged_by_consequences(verdict, exam.consequences) for name, verdict in exam.verdicts.items()
+    name = (
+        examination.chosen
+        if examination.chosen in examination.runs and examination.chosen not in examination.failed
+        else FREE
+    )
+    if name in examination.runs:
+        rerun, answers = partial(examination.rerun, name), examination.forces(examination.runs[name])
+        examination.consequences = consequences(
+            examination.findings, examination.recording, rerun, answers, work / "findings"
+        )
+        examination.verdicts = {
+            name: judged_by_consequences(verdict, examination.consequences)
+            for name, verdict in examination.verdicts.items()
         }
 
 
-def _save_section_forces(exam: Examination, outcome: Outcome, folder: Path) -> None:
+def _save_section_forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> None:
     """Section forces counted, and into files in every format that the scene names; those of a killed run are left."""
-    answers, wanted = exam.forces(outcome), exam.scene.hand_on
-    exam.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
-    exam.handed = tuple(folder / f"{FILES}.{form}" for form in wanted.formats)
-    formats = [path.suffix[1:] for path in exam.handed if not path.exists()]
-    comment = f"{exam.scene.title}; computed from wheel forces, {exam.chosen} run, {exam.engine}"
-    hand_on(outcome, folder, formats, answers, exam.recording.start, comment)
+    answers, wanted = examination.forces(outcome), examination.scene.hand_on
+    examination.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
+    examination.handed = tuple(folder / f"{FILES}.{form}" for form in wanted.formats)
+    formats = [path.suffix[1:] for path in examination.handed if not path.exists()]
+    comment = f"{examination.scene.title}; computed from wheel forces, {examination.chosen} run, {examination.engine}"
+    hand_on(outcome, folder, formats, answers, examination.recording.start, comment)
 
 
-def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
+def _labelled(scene: MeasuredScene, examination: Examination, folder: Path) -> Result:
     """The result of a scene, whose detail is its examination."""
     return labelled(
         scene,
-        exam.outcome,
-        exam.counted,
+        examination.outcome,
+        examination.counted,
         folder,
-        engine=exam.engine,
-        seconds=exam.seconds.get("march", 0.0),
-        doubts=[finding.text for finding in exam.findings if finding.weight != "note"],
-        detail=exam,
-        run=exam.chosen,
-        **_endings(exam),
+        engine=examination.engine,
+        seconds=examination.seconds.get("march", 0.0),
+        doubts=[finding.text for finding in examination.findings if finding.weight != "note"],
+        detail=examination,
+        run=examination.chosen,
+        **_endings(examination),
     )
 
 
-def _endings(exam: Examination) -> dict[str, str]:
+def _endings(examination: Examination) -> dict[str, str]:
     """How the runs ended, as attributes."""
-    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
-    return {"verdicts": json.dumps(verdicts), "failed": json.dumps(exam.failed)}
+    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in examination.verdicts.items()}
+    return {"verdicts": json.dumps(verdicts), "failed": json.dumps(examination.failed)}

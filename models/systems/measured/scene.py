@@ -94,7 +94,7 @@ class Clock(Strict):
 
     rate: float | None = quantity("Hz", "samples per second of the recording", default=None)
     start: float = quantity("s", "left out at the beginning", default=0.0, zero=True)
-    duration: float | None = quantity("s", "taken of what follows; else all", default=None)
+    duration: float | None = quantity("s", "length of the recording that is used; without it, all of it", default=None)
 
 
 class Deviations(Strict):

@@ -26,7 +26,7 @@ from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, table
 from models.systems.measured.inputs import Inputs, Prescribed, StepGrid
-from models.systems.measured.sections import Answer, Sections
+from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
-class Hold:
+class AttitudeHold:
     """How roll and pitch are held; Hz, rad/s^2, Hz as in the scene's table ``stabilise``.
 
     Standard deviations of the noise of samples: force (N), moment (N m), angle (rad), rate (rad/s).
@@ -66,7 +66,7 @@ class SectionRun:
     recording: Recording
     sections: Sections
     engine: str = "mujoco"
-    hold: Hold = field(default_factory=Hold)
+    hold: AttitudeHold = field(default_factory=AttitudeHold)
     step: float | None = None
     file: str = ""
 
@@ -82,12 +82,12 @@ class SectionRun:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SectionOutcome:
     """Answers of a run, ``period`` (s) apart, of which ``done`` are there; ``surprise`` of the filter, NaN without,
     and what it says against its measurements; counts of steps, force calls and states."""
 
     columns: Columns
-    answers: tuple[Answer, ...]
+    answers: tuple[SectionChannel, ...]
     period: float
     done: int
     surprise: float
@@ -95,7 +95,7 @@ class Outcome:
     doubts: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
 
-    def samples(self, answer: Answer | str) -> np.ndarray:
+    def samples(self, answer: SectionChannel | str) -> np.ndarray:
         """Samples (done,) of one answer, or of that of a name."""
         return self.columns.read(answer if isinstance(answer, str) else answer.name, 0, self.done)
 
@@ -159,8 +159,9 @@ def check(job: SectionRun) -> None:
         raise InputError(job.file, "stabilise.method", hold.method, needed)
 
 
-def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = BLOCK) -> Outcome:
-    """Run all of a recording, or what is missing of it in ``folder``; ``progress`` is told seconds done and in all.
+def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = BLOCK) -> SectionOutcome:
+    """Run a recording, or the part of it that ``folder`` lacks; ``progress`` is called with the simulated and the total
+    seconds.
 
     ``block`` : s between checkpoints, which changes no bit of the answers. Raises InputError where the folder holds a
     run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle topples.
@@ -196,10 +197,10 @@ class _March:
             self.filter.state = replace(known, **{name: saved[name] for name in vars(known)})
         self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> SectionOutcome:
         """The outcome of the march up to now."""
         steps = (self.done - 1) * self.grid.every
-        return Outcome(
+        return SectionOutcome(
             self.columns,
             self.job.sections.answers,
             self.grid.period * self.grid.skip,

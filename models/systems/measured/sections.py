@@ -34,7 +34,7 @@ MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
 
 
 @dataclass(frozen=True)
-class Answer:
+class SectionChannel:
     """One channel of a run.
 
     section : the element, guide or hub that it belongs to, empty of motion and of what stabilises; quantity, at and
@@ -76,7 +76,7 @@ class Sections:
     frame: str = "body"
     points: tuple[AccelerometerPoint, ...] = ()
     wanted: tuple[str, ...] | None = None
-    answers: tuple[Answer, ...] = field(init=False)
+    answers: tuple[SectionChannel, ...] = field(init=False)
     columns: np.ndarray = field(init=False)
     _places: FeltPlaces = field(init=False, repr=False, compare=False)
 
@@ -85,7 +85,7 @@ class Sections:
             known = names(self.vehicle)
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
-        sliding, kept = _sliding(self.vehicle, self.frame), list[tuple[int, Answer]]()
+        sliding, kept = _sliding(self.vehicle, self.frame), list[tuple[int, SectionChannel]]()
         for column, answer in enumerate(_kernel_columns(self.vehicle, self.frame, self.points)):
             asked = self.wanted is None or answer.section in ("", *self.wanted)
             if asked and answer.name not in sliding:
@@ -100,12 +100,12 @@ class Sections:
         points = np.array(rows, float).reshape(len(rows), 5)
         object.__setattr__(self, "_places", FeltPlaces(*_guides(self.vehicle, joined), points))
 
-    def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
-        """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
+    def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
+        """Answers (n, answers) of states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in ``HubModel``."""
         wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
-        section_answers(numbers, float(every), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
+        section_answers(numbers, float(stride), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
         return out[:, self.columns]
 
 
@@ -120,40 +120,44 @@ def guided(vehicle: CutVehicle) -> tuple[str, ...]:
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 
-def _kernel_columns(vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]) -> Iterator[Answer]:
+def _kernel_columns(
+    vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]
+) -> Iterator[SectionChannel]:
     """Every column of the kernel's row."""
     chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:
         if e.unit == "N":
             text = "along its own axis, compression positive"
-            yield Answer(f"{e.name} F", e.unit, text, e.name, "force", e.name)
+            yield SectionChannel(f"{e.name} F", e.unit, text, e.name, "force", e.name)
         else:
             text = "moment, left end pushed up positive"
-            yield Answer(f"{e.name} M", e.unit, text, e.name, "moment", e.name)
+            yield SectionChannel(f"{e.name} M", e.unit, text, e.name, "moment", e.name)
     for e in vehicle.elements:
         unit = "m" if e.unit == "N" else "rad"
         text = "from the design position, compression positive"
-        yield Answer(f"{e.name} travel", unit, text, e.name, "travel", e.name)
+        yield SectionChannel(f"{e.name} travel", unit, text, e.name, "travel", e.name)
     for name, quantity, axis, unit in MOTION:
         text = "of the chassis, x forward, y left, z up"
-        yield Answer(f"{chassis} {name}", unit, text, "", quantity, chassis if quantity else "", axis)
+        yield SectionChannel(f"{chassis} {name}", unit, text, "", quantity, chassis if quantity else "", axis)
     for name in ("roll", "pitch"):
-        yield Answer(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
+        yield SectionChannel(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
     for name in guided(vehicle):
         for axis, _, _, unit in HUB:
             text = f"on {name} from what carries it, axes of {about or name}"
-            yield Answer(f"{name} guide {axis}", unit, text, f"{name} guide")
+            yield SectionChannel(f"{name} guide {axis}", unit, text, f"{name} guide")
     for hub, tyre in zip(vehicle.hubs, vehicle.uncut.tyres, strict=True):
         for axis, quantity, component, unit in HUB:
             text = f"on the hub from outside, axes of {about or tyre.body}"
-            yield Answer(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
+            yield SectionChannel(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
     for p in points:
         text = f"{'with' if p.gravity else 'without'} gravity, axes of {p.body}"
-        yield from (Answer(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz")
+        yield from (
+            SectionChannel(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz"
+        )
 
 
 def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
-    """Components of guides along which a body slides freely, so that they are nought."""
+    """Force components along the free direction of sliding guides, which are zero."""
     sliding = set[str]()
     for name in guided(vehicle):
         body = vehicle.uncut.body(name)

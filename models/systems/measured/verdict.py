@@ -21,8 +21,8 @@ from models.drift.score import SURPRISED, Errors, Limits, RunFigures, Verdict, l
 from models.fatigue.damage import SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import DAMPING, Hold, Outcome, SectionRun
-from models.systems.measured.sections import Answer
+from models.systems.measured.section_run import DAMPING, AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid
 
@@ -72,7 +72,7 @@ class Compared:
     """
 
     signal: Signal
-    answer: Answer
+    answer: SectionChannel
     offset: float
     bands: tuple[Band, ...]
     explained: float
@@ -80,7 +80,7 @@ class Compared:
     trusted: float
 
 
-def checks(job: SectionRun) -> tuple[tuple[Signal, Answer], ...]:
+def checks(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
     """Every channel that is not put in and that the run answers, with its answer: named as checks, and accelerations.
 
     Strains and sensors of unknown place have none.
@@ -97,7 +97,7 @@ def _same_axes(job: SectionRun, signal: Signal) -> bool:
 
 
 def overlay(
-    recording: Recording, run: Outcome, signal: Signal, answer: Answer
+    recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,) in s, measured and computed values (n,) of all answers of a run."""
     computed, skip = run.samples(answer), round(run.period / recording.period)
@@ -106,7 +106,11 @@ def overlay(
 
 
 def compare(
-    recording: Recording, run: Outcome, signal: Signal, answer: Answer, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)
+    recording: Recording,
+    run: SectionOutcome,
+    signal: Signal,
+    answer: SectionChannel,
+    slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> Compared:
     """Compare a channel with its answer over all that was run."""
     _, measured, computed = overlay(recording, run, signal, answer)
@@ -161,7 +165,7 @@ def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
 
 def judge(
     job: SectionRun,
-    run: Outcome,
+    run: SectionOutcome,
     limits: Limits = LIMITS,
     trusted: float | None = None,
     compared: Sequence[Compared] = (),
@@ -190,7 +194,7 @@ def judge(
     return _in_space(verdict)
 
 
-def filter_doubts(run: Outcome) -> tuple[Finding, ...]:
+def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
     """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
     if not run.surprise > SURPRISED:
         return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
@@ -203,7 +207,7 @@ def filter_doubts(run: Outcome) -> tuple[Finding, ...]:
 
 
 def judge_beside_truth(
-    run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS, slope: float = SLOPE
+    run: SectionOutcome, true: VirtualMeasurement, hold: AttitudeHold, limits: Limits = LIMITS, slope: float = SLOPE
 ) -> Verdict:
     """The verdict on a run of a virtual measurement, beside the true one."""
     figures = figures_of_run(run, true.vehicle), errors(run, true, slope)
@@ -218,7 +222,7 @@ def _in_space(verdict: Verdict) -> Verdict:
     return Verdict(verdict.word, reason)
 
 
-def figures_of_run(run: Outcome, vehicle: CutVehicle) -> RunFigures:
+def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
     """Figures of a run by itself, of roll or pitch, whichever is worse; cost is not among them (0)."""
     inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
     tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
@@ -235,7 +239,7 @@ def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
     return rms(values) / rms(total) if rms(total) > 0 else float(rms(values) > 0)
 
 
-def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
+def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float:
     """Twice the standard deviation (rad) of the angle, roll or pitch, of a run that is held; 0 of a free one.
 
     A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) lets white noise of the angle through with
@@ -257,7 +261,7 @@ def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
     return 2.0 * math.sqrt(period * each)
 
 
-def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
+def errors(run: SectionOutcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
     """Errors of a run against the true run, at the answers' times: section forces of springs, mounts and bars,
     angles."""
     every, chassis = round(run.period / true.step), true.vehicle.chassis

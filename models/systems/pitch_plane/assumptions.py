@@ -130,7 +130,7 @@ def _artificial(assembly: Assembly) -> Assumption:
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
     return Assumption(
         "little artificial",
-        "what holds the chassis does little beside its own inertia",
+        "the forces that hold pitch or heave are small compared with the chassis' own inertia",
         moved if assembly.guided else soft,
         partial(_artificial_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",

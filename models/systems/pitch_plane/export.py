@@ -1,7 +1,7 @@
 """The pitch-plane vehicle as a file of its engine: bodies, struts, tyres and pitch springs, without what drives it."""
 
 from models.engines.assembly import Assembly, Settings
-from models.engines.export import Exported, Subject, of_exudyn, of_mujoco
+from models.engines.export import Exported, ExportSubject, of_exudyn, of_mujoco
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 
 AXES = {
@@ -21,7 +21,7 @@ INPUTS = {
 
 def exported(scene: Scene, engine: str) -> Exported:
     """The vehicle in "mujoco" or "exudyn"."""
-    assembly, subject = assemble(scene), Subject(scene.title, scene.file, AXES[engine])
+    assembly, subject = assemble(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":
         return _in_exudyn(assembly, subject, left_out)
@@ -39,19 +39,19 @@ def _left_out(assembly: Assembly) -> list[str]:
     ]
 
 
-def _in_mujoco(assembly: Assembly, settings: Settings, subject: Subject, left_out: list[str]) -> Exported:
+def _in_mujoco(assembly: Assembly, settings: Settings, export_subject: ExportSubject, omissions: list[str]) -> Exported:
     from models.engines.mujoco import specification
     from models.engines.mujoco_export import add_shapes
 
     spec = specification(assembly.vehicle, settings)
     add_shapes(spec, {body.name: body.mass for body in assembly.vehicle.bodies})
-    return of_mujoco(spec, spec.compile(), {}, subject, left_out)
+    return of_mujoco(spec, spec.compile(), {}, export_subject, omissions)
 
 
-def _in_exudyn(assembly: Assembly, subject: Subject, left_out: list[str]) -> Exported:
+def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
     from models.engines.exudyn import columns, native
 
     built, vehicle = native(assembly), assembly.vehicle
     built.mbs.Assemble()
     names = [" ".join(place) for place in vehicle.coordinates()]
-    return of_exudyn(built.mbs, dict(zip(names, columns(built, vehicle), strict=True)), subject, left_out)
+    return of_exudyn(built.mbs, dict(zip(names, columns(built, vehicle), strict=True)), export_subject, omissions)

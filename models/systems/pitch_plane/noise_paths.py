@@ -222,17 +222,17 @@ def mujoco_threads(
     return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
 
 
-def gap(reference: Arrays, other: Arrays, times: np.ndarray) -> float:
+def gap(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
     """Largest difference of any state before both paths' drift-off, by the reference's largest state there.
 
-    reference, other : arrays of ``NoisePaths`` of which the second may hold fewer paths; times (rows,) in s. After
+    reference, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
     drift-off a rounding error is as large as the run, and no comparison says anything; nan where all paths have
     drifted off before the first row past the start.
     """
-    count = len(other["states"])
-    until = np.minimum(reference["drift_off"][:count], other["drift_off"])
+    count = len(other_paths["states"])
+    until = np.minimum(reference["drift_off"][:count], other_paths["drift_off"])
     if not (times[times > 0.0] < until[:, None]).any():
         return math.nan
     first = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
-    two = np.where((times < until[:, None])[:, :, None], other["states"], 0.0)
+    two = np.where((times < until[:, None])[:, :, None], other_paths["states"], 0.0)
     return float(np.abs(first - two).max() / np.abs(first).max())

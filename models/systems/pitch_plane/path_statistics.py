@@ -7,7 +7,7 @@ import numpy as np
 
 from models.ensemble.statistics import FAN
 from models.ensemble.store import Arrays
-from models.ensemble.streamed import Covariance, Moments, Spread, Tally
+from models.ensemble.streamed import Moments, Spread, StreamedCovariance, Tally
 
 PITCH = 3
 """Place of the pitch among the states."""
@@ -21,9 +21,9 @@ class PathStatistics:
     (rad) of the others; first : arrays of the first ``saved`` paths.
     """
 
-    def __init__(self, true: np.ndarray, saved: int) -> None:
-        self._true, self._saved, self._blocks = true, saved, list[Arrays]()
-        self.moments, self.covariance, self._spread, self.drift_off = Moments(), Covariance(), Spread(), Tally()
+    def __init__(self, true: np.ndarray, saved_paths: int) -> None:
+        self._true, self._saved, self._blocks = true, saved_paths, list[Arrays]()
+        self.moments, self.covariance, self._spread, self.drift_off = Moments(), StreamedCovariance(), Spread(), Tally()
         self.lost, self.steepest = 0, np.full(len(true), np.nan)
 
     def add(self, block: Arrays) -> None:

@@ -172,15 +172,15 @@ class PitchFilter(ExtendedKalmanFilter):
     """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
 
     def __init__(
-        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measured: Measurement
+        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measurement: Measurement
     ) -> None:
         """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
         super().__init__(dim_x=STATES, dim_z=1)
-        self.step, self.intensity, self.measured = step, intensity, measured
+        self.step, self.intensity, self.measured = step, intensity, measurement
         self.x, self.P = start.copy(), covariance.copy()
         self.late = np.zeros((STATES, 2))
-        self._there = np.isfinite(measured.values) @ (1 << np.arange(len(measured.columns)))
-        self._seen = [self._model_of_columns(there) for there in range(1 << len(measured.columns))]
+        self._there = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
+        self._seen = [self._model_of_columns(there) for there in range(1 << len(measurement.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
         """State and Jacobians over step number ``u``.
@@ -194,7 +194,8 @@ class PitchFilter(ExtendedKalmanFilter):
         self.Q, self.late = self.intensity * push.dot(push.T), late
 
     def measure(self, number: int) -> np.ndarray:
-        """Take in what is a number in a row of the measurement: the whitened innovations (columns,), NaN where none."""
+        """Update the filter with the finite values in a row of the measurement; returns whitened innovations
+        (columns,), NaN for missing values."""
         white, there = np.full(len(self.measured.columns), math.nan), self._there[number]
         if not there:
             return white
@@ -205,9 +206,9 @@ class PitchFilter(ExtendedKalmanFilter):
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
 
-    def _model_of_columns(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _model_of_columns(self, column_bits: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
-        chosen = np.array([i for i in range(len(self.measured.columns)) if there >> i & 1], dtype=int)
+        chosen = np.array([i for i in range(len(self.measured.columns)) if column_bits >> i & 1], dtype=int)
         return (
             chosen,
             self._I[[self.measured.columns[i] for i in chosen]],
@@ -217,7 +218,7 @@ class PitchFilter(ExtendedKalmanFilter):
 
 def estimate(
     assembly: Assembly,
-    measured: Measurement,
+    measurement: Measurement,
     deviation: float,
     *,
     start_deviation: float = 0.0,
@@ -236,10 +237,10 @@ def estimate(
     if anything that is not a number reaches the estimate.
     """
     assert assembly.input is not None and assembly.input.period is not None
-    period = min(assembly.input.period, measured.period)
+    period = min(assembly.input.period, measurement.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
     start = _start(assembly, start_deviation, inertia_deviation)
-    estimated, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
+    estimated, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measurement))
     return _smoothed(estimated, steps) if smoother else estimated
 
 

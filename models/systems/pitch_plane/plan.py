@@ -26,7 +26,7 @@ MODES = {
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Everything that can be refused before a run is refused here, before any file is written."""
+    """Refuse a scene that cannot be run, before any file is written."""
     assembly = assemble(scene)
     for engine in engines:
         try:
@@ -53,8 +53,8 @@ def describe(scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
+def _line(label: str, text: str) -> str:
+    return f"  {label:<10} {text}"
 
 
 def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:

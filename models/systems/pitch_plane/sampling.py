@@ -1,4 +1,5 @@
-"""Readings of a sensor: a channel of a run at the sensor's own instants, held in between, and as a file."""
+"""Readings of a sensor: a channel of a run, sampled at the sensor's instants and constant in between, and written as a
+file."""
 
 from collections.abc import Mapping
 from pathlib import Path

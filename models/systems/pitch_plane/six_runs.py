@@ -69,18 +69,18 @@ def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, f
     return measured, deviation, scenes
 
 
-def error(measured: Result, run: Result, channel: str) -> np.ndarray:
+def error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
     """Difference to the measurement at the run's own times."""
-    return run[channel] - np.interp(run.times, measured.times, measured[channel])
+    return run[channel] - np.interp(run.times, measured_run.times, measured_run[channel])
 
 
-def row(engine: str, name: str, measured: Result, run: Result) -> dict[str, Any]:
+def row(engine: str, name: str, measured_run: Result, run: Result) -> dict[str, Any]:
     """Drift-off time (s, None if never), heave error, and for a guided run the enforced moment and the inertia term."""
     figures: dict[str, Any] = {
         "engine": engine,
         "run": name,
-        "drift-off": GrowthCurve(run.times, np.abs(error(measured, run, "pitch"))).passes(DRIFT),
-        "heave error": float(np.abs(error(measured, run, "z3")).max()),
+        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passes(DRIFT),
+        "heave error": float(np.abs(error(measured_run, run, "z3")).max()),
     }
     if "enforced_moment" in run.data:
         moment = run["enforced_moment"]

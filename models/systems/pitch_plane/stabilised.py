@@ -153,9 +153,9 @@ class Bench:
         self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
         self.holding = holding_stiffness(self.parameters, predicted.rate)
 
-    def _write_sensors(self, every: int, period: float) -> None:
+    def _write_sensors(self, stride: int, period: float) -> None:
         """Noisy pitch, and exact heave and pitch, as files."""
-        heave, pitch = self.truth["z3"][::every], self.truth["pitch"][::every]
+        heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
         noise = normal(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
         write_time_series(self.folder / "measured_pitch.csv", noisy, period)
@@ -196,7 +196,9 @@ class Bench:
             "Kalman smoother": {"kalman_filter": {**filtered, "smoother": True}},
         }
 
-    def score(self, engine: str, others: tuple[str, ...], failed: dict[str, str], progress: Progress) -> list[Row]:
+    def score(
+        self, engine: str, other_engines: tuple[str, ...], failed: dict[str, str], progress: Progress
+    ) -> list[Row]:
         """A row per method in one engine, and in the others if it is accepted; ``failed`` takes runs that fail."""
         rows: list[Row] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
@@ -205,7 +207,7 @@ class Bench:
             of_method = self._scored(engine, name, effects, failed)
             rows += of_method
             if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
-                rows += [row for other in others for row in self._scored(other, name, effects, failed)]
+                rows += [row for other in other_engines for row in self._scored(other, name, effects, failed)]
         return rows
 
     def _scored(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:

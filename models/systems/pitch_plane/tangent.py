@@ -243,7 +243,7 @@ def swing(path: TangentPath) -> float:
 
 
 @dataclass(frozen=True)
-class Covariance:
+class CovarianceOverTime:
     """Covariance of the state over time. times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the
     state, products of two."""
 
@@ -256,7 +256,7 @@ class Covariance:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> Covariance:
+def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> CovarianceOverTime:
     """Covariance along a free force-excited run, of noise with a standard deviation (N) of each sample.
 
     longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
@@ -265,7 +265,7 @@ def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> C
     path = path_of(assembly, longest)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
-    return Covariance(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))
+    return CovarianceOverTime(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))
 
 
 def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:

@@ -90,10 +90,10 @@ def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, period
     write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
 
 
-def write_measurement(measured: Result, folder: Path, period: float) -> float:
+def write_measurement(measured_run: Result, folder: Path, period: float) -> float:
     """``wheel_forces.csv`` and ``pitch.csv`` every ``period`` (s); returns the largest force (N)."""
-    every = round(period / float(measured.times[1] - measured.times[0]))
-    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
+    every = round(period / float(measured_run.times[1] - measured_run.times[0]))
+    front, rear, pitch = (measured_run[name][::every] for name in ("f1", "f2", "pitch"))
     write_wheel_forces(folder, front, rear, period)
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
     return float(max(np.abs(front).max(), np.abs(rear).max()))

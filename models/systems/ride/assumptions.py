@@ -226,7 +226,7 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
 
 NEARLY_GAUSSIAN = Assumption(
     "nearly Gaussian",
-    "what gains leave out of bent springs is a small share of an output's variance",
+    "the part of nonlinear spring forces that equivalent gains neglect is a small share of an output's variance",
     "take the deviations of the copies (options.beside), or engines in time",
     lambda run: {
         f"{name} at {speed:g} m/s": np.array([share])

@@ -68,7 +68,7 @@ def with_error_of_copies(
     run: Result,
     vehicle: SpatialVehicle,
     road: Excitation,
-    replaced: Mapping[float, StatisticallyLinear],
+    equivalents: Mapping[float, StatisticallyLinear],
     copies: Mapping[float, Copies],
     seed: int,
 ) -> Result:
@@ -87,8 +87,8 @@ def with_error_of_copies(
         if size[i] > 0.0:
             error, order = max(((row[i], orders[i]) for row, orders in steps), key=lambda pair: pair[0])
             told[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
-    if replaced:
-        told |= _of_gains(replaced, copies, units)
+    if equivalents:
+        told |= _of_gains(equivalents, copies, units)
     stated(run, told, "the copies in longer steps, and gains beside copies")
     scatter = {
         f"{name}, copies": by_chance(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
@@ -117,10 +117,10 @@ def _of_steps(
 
 
 def _of_gains(
-    replaced: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
+    equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
 ) -> dict[str, Estimate]:
     """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
-    beside = [(replaced[speed], each) for speed, each in copies.items()]
+    beside = [(equivalents[speed], each) for speed, each in copies.items()]
     gains = np.array([each.covariance.deviation for each, _ in beside])
     true = np.array([each.deviation for _, each in beside])
     scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.engines.export import (
     Exported,
-    Subject,
+    ExportSubject,
     coordinate_names,
     masses_of_shown_bodies,
     names_of,
@@ -32,11 +32,11 @@ def exported(scene: RideScene, engine: str) -> Exported:
         *(f"drag of {drag.body!r}" for drag in vehicle.drags),
     ]
     still = replace(vehicle, side_forces=(), drags=(), outputs=())
-    subject = Subject(scene.title, scene.file, AXES)
+    subject = ExportSubject(scene.title, scene.file, AXES)
     return (_in_exudyn if engine == "exudyn" else _in_mujoco)(still, subject, by_speed)
 
 
-def _in_exudyn(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
+def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
     from models.engines.exudyn_export import functions
     from models.engines.spatial_exudyn_build import RoadRows, assemble
 
@@ -46,10 +46,10 @@ def _in_exudyn(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -
     places = [built.places[place] for place in vehicle.coordinates()]
     columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
     names = dict(zip(coordinate_names(vehicle), columns, strict=True))
-    return of_exudyn(mbs, names, subject, [*functions(mbs), *by_speed])
+    return of_exudyn(mbs, names, export_subject, [*functions(mbs), *by_speed])
 
 
-def _in_mujoco(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
+def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, by_speed: list[str]) -> Exported:
     from models.engines.mujoco_export import add_shapes
     from models.engines.mujoco_inertia import realisable
     from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
@@ -60,4 +60,4 @@ def _in_mujoco(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     model = spec.compile()
     set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)
-    return of_mujoco(spec, model, names_of(vehicle), subject, [*left_out, *lowered])
+    return of_mujoco(spec, model, names_of(vehicle), export_subject, [*left_out, *lowered])

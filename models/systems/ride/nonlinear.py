@@ -20,7 +20,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.runner import Progress as Done
+from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.store import Arrays
 from models.ensemble.workers import Crew
 from models.ride.covariance import stationary
@@ -33,7 +33,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import InTime, Spectral, few_speeds, watching
+from models.systems.ride.watched import MotionInRun, Spectral, few_speeds, watching
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
@@ -63,7 +63,7 @@ class Sampling(Strict):
 @dataclass(frozen=True)
 class Nonlinear:
     """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
-    Monte Carlo where it was asked for.
+    Monte Carlo copies if the scene requests them.
 
     shown : the replaced vehicle at the speed of the engines' runs; lifts : whether tyres may, in Monte Carlo alone.
     """
@@ -176,22 +176,22 @@ def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[fl
 
 
 def _replaced_at(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, replaced: list[StatisticallyLinear]
+    vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> StatisticallyLinear:
     """The replaced vehicle at a speed (m/s), which may be among those that are known."""
     at = np.flatnonzero(np.isclose(speeds, speed))
-    return replaced[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
+    return equivalents[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
 
 
 def _motions_of_parts(
-    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, replaced: list[StatisticallyLinear]
+    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> Spectral:
     """Motions of the parts of statistically linearised vehicles, springs about their own means."""
-    known = dict(zip(speeds.tolist(), replaced, strict=True))
+    known = dict(zip(speeds.tolist(), equivalents, strict=True))
     chosen = few_speeds(speeds)
     means = {
         f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
-        for name in replaced[0].springs
+        for name in equivalents[0].springs
     }
     return Spectral(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
 
@@ -232,7 +232,7 @@ def in_engine(
         step=path.step,
     )
     at, seen = ride.rows, watching(linearise(vehicle, speed), vehicle, speed)
-    motion = InTime(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
+    motion = MotionInRun(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
     with_assumptions(labelled, assumptions(scene, vehicle, motion))
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
@@ -319,14 +319,14 @@ def ridden(
     *,
     seed: int = 0,
     skipped: float = 0.0,
-    every: int = 1,
+    stride: int = 1,
 ) -> Ride:
-    """Drive over a road from rest for about ``duration`` (s); outputs ``every`` so many steps after ``skipped`` (s).
+    """Drive over a road from rest for about ``duration`` (s); outputs ``stride`` so many steps after ``skipped`` (s).
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     table = road.table(int(np.ceil(duration / road.step)), seed)
-    return ride_over(engine, vehicle, road, table, skipped=skipped, every=every)
+    return ride_over(engine, vehicle, road, table, skipped=skipped, every=stride)
 
 
 def ride_over(
@@ -347,21 +347,28 @@ def _model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarr
 
 
 def read_outputs(
-    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, at: np.ndarray
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
 ) -> Ride:
     """Outputs of a run at other steps (m,)."""
-    return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, at)
+    return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
 
 
 def _read(
-    model: SpatialModel, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, at: np.ndarray
+    model: SpatialModel,
+    vehicle: SpatialVehicle,
+    road: RoadPath,
+    table: np.ndarray,
+    run: Trajectory,
+    step_numbers: np.ndarray,
 ) -> Ride:
     """Outputs of a run at steps (m,)."""
     linear = linearise(vehicle, road.speed)
     accelerations = np.array(
-        [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in at]
+        [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in step_numbers]
     )
-    rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
+    rows = np.column_stack(
+        [accelerations, run.rates[step_numbers], run.positions[step_numbers], table[2 * step_numbers]]
+    )
     outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.bent}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
@@ -376,7 +383,7 @@ def _read(
             )
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
-    return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs, at)
+    return Ride(linear.names, run, step_numbers * road.step - step_numbers[0] * road.step, outputs, step_numbers)
 
 
 def row_of(output: Output) -> np.ndarray:

@@ -14,7 +14,7 @@ from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
 from models.systems.ride.scene import RideScene
-from models.vehicles.linear_vehicle import LinearVehicle, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 
@@ -108,7 +108,7 @@ def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear
     return lambda speed: only
 
 
-def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
+def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad:
     """The scene's road; its level holds at half the front track where the scene does not say where."""
     road = scene.road
     if road.file is not None:
@@ -136,14 +136,16 @@ def fitted_road(scene: RideScene) -> "FittedRoad":
     return fit_road(read_tracks(path, road.track_width, first=road.first, last=road.last))
 
 
-def half_track_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
+def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
     """Where (m) the road's tracks lie."""
     if scene.road.file is not None:
         return scene.road.track_width / 2.0
     return scene.road.half_track or half_track(wheels) or BESIDE
 
 
-def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, str] | None = None) -> Excitation:
+def excitation_of(
+    scene: RideScene, wheels: tuple[WheelPosition, ...], case: tuple[str, str] | None = None
+) -> Excitation:
     """The road under the wheels with the scene's effects, in its case of correlation or another one."""
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
@@ -172,7 +174,7 @@ def scene_errors(scene: RideScene) -> Iterator[None]:
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, what) from None
 
 
-def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
     """Where the wheels meet the road: at their own y, or all in the tracks of the first axle's wheels.
 
     A vehicle without a width runs on one of the tracks where the road is given by their level.
@@ -186,7 +188,7 @@ def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, .
     return in_tracks(wheels)
 
 
-def in_tracks(wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+def in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
     """The wheels of every axle in the tracks of the first one, side by side: its outermost wheel leads."""
     first = [wheel.y for wheel in wheels if wheel.axle == 0]
     tracks = {1.0: max(first), -1.0: min(first)}

@@ -10,7 +10,7 @@ from models.core.scene_effects import lines as effect_lines
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.vehicles.linear_vehicle import Wheel
+from models.vehicles.linear_vehicle import WheelPosition
 from models.vehicles.plausible import plausible
 from models.vehicles.spatial import NO_LIMITS, SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
@@ -70,7 +70,7 @@ FRONT_REAR = {
 }
 
 
-def noise_sharing_text(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
+def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[str, str]:
     """How the wheels of an axle, and the axles, share the road's noise, in words."""
     road, placed = scene.road, placed_wheels(scene, wheels)
     place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"

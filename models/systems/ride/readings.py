@@ -70,9 +70,10 @@ def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str])
     return errors
 
 
-def quasi_stationary_gaps(drive: VaryingSpeed, alone: np.ndarray) -> np.ndarray:
-    """Error (N, p) of each speed taken by itself, by the largest deviation of the drive; 0 where there is none."""
-    both = np.isfinite(alone) & np.isfinite(drive.deviation)
+def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> np.ndarray:
+    """Error (N, p) of the quasi-stationary deviations, relative to the largest deviation of the drive; 0 where that is
+    0."""
+    both = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
     known = np.where(both, drive.deviation, 0.0)
     largest = known.max(axis=0)
-    return (np.where(both, alone, 0.0) - known) / np.where(largest > 0, largest, 1.0)
+    return (np.where(both, quasi_stationary, 0.0) - known) / np.where(largest > 0, largest, 1.0)

@@ -30,7 +30,7 @@ class ReducedScene:
 
     @property
     def limits(self) -> Limits:
-        """The limits that the reduced vehicle is of: massless, rigid and locked parts."""
+        """Limits that the reduced vehicle takes: massless, rigid and locked parts."""
         return Limits(self.massless, self.rigid, self.locked)
 
     def less(self, **names: Iterable[object]) -> "ReducedScene":
@@ -74,11 +74,11 @@ class Effect:
     has_table: bool = False
 
 
-def illegal(chosen: Iterable[Effect]) -> str:
+def illegal(omitted_effects: Iterable[Effect]) -> str:
     """Why these may not be left out together, with the remedy; empty where they may."""
-    chosen = tuple(chosen)
-    names = {effect.name for effect in chosen}
-    for effect in chosen:
+    omitted_effects = tuple(omitted_effects)
+    names = {effect.name for effect in omitted_effects}
+    for effect in omitted_effects:
         missing = [name for name in effect.needs if name not in names]
         if missing:
             return f"{effect.name} cannot be left out alone: leave out {' and '.join(missing)}, too, {effect.why}"
@@ -88,11 +88,11 @@ def illegal(chosen: Iterable[Effect]) -> str:
     return ""
 
 
-def without(scene: ReducedScene, chosen: Iterable[Effect]) -> ReducedScene:
+def without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
     """The scene without these effects; its tables [effects.NAME] go first and together."""
-    chosen = tuple(chosen)
-    if tables := [effect.name for effect in chosen if effect.has_table]:
+    omitted_effects = tuple(omitted_effects)
+    if tables := [effect.name for effect in omitted_effects if effect.has_table]:
         scene = scene.without_tables(*tables)
-    for effect in chosen:
+    for effect in omitted_effects:
         scene = scene if effect.has_table else effect.without(scene)
     return scene

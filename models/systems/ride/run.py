@@ -17,7 +17,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import FEW, Along, Spectral, few_speeds, own_deviations
+from models.systems.ride.watched import FEW, MotionAlongDrive, Spectral, few_speeds, own_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -122,8 +122,8 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
     each = quasi_stationary(linear, road, speeds, weightings=weightings)
 
-    def alone(every: int) -> np.ndarray:
-        kept = np.unique([*range(0, len(speeds), every), len(speeds) - 1])
+    def alone(stride: int) -> np.ndarray:
+        kept = np.unique([*range(0, len(speeds), stride), len(speeds) - 1])
         return np.column_stack([np.interp(drive.speed, speeds[kept], column) for column in each[kept].T])
 
     labelled = result(
@@ -145,5 +145,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         detail=drive,
     )
     apart = Spectral(vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), FEW + 1)[1:]), {})
-    with_assumptions(labelled, assumptions(scene, vehicle, Along(own_deviations(vehicle, drive.deviation), apart)))
+    with_assumptions(
+        labelled, assumptions(scene, vehicle, MotionAlongDrive(own_deviations(vehicle, drive.deviation), apart))
+    )
     return with_error_of_drive(labelled, scene, linear, road, alone) if error else labelled

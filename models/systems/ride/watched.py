@@ -107,7 +107,7 @@ class Spectral:
 
 
 @dataclass(frozen=True)
-class Along:
+class MotionAlongDrive:
     """Motion along a drive: deviations (time, ...) of the run's own outputs, and others as if each speed had always
     been driven."""
 
@@ -130,7 +130,7 @@ def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, 
 
 
 @dataclass(frozen=True)
-class InTime:
+class MotionInRun:
     """Motion in a run: positions and rates (rows, n), heights of the road and their rates (rows, 2 w)."""
 
     seen: LinearVehicle

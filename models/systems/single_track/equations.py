@@ -91,17 +91,17 @@ def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive:
 
 
 @compiled
-def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
+def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
     """(n, 2): lateral velocity (m/s) and yaw rate (rad/s) at every sample, by Heun's method from sample to sample.
 
     given (n, 3) : steer angle, speed, its rate at samples ``step`` (s) apart; first : motion at the first of them.
     """
-    motion = np.empty((len(given), 2))
+    motion = np.empty((len(inputs), 2))
     w, r = first
     motion[0] = w, r
-    for i in range(len(given) - 1):
-        here = given[i, 0], given[i, 1], given[i, 2]
-        there = given[i + 1, 0], given[i + 1, 1], given[i + 1, 2]
+    for i in range(len(inputs) - 1):
+        here = inputs[i, 0], inputs[i, 1], inputs[i, 2]
+        there = inputs[i + 1, 0], inputs[i + 1, 1], inputs[i + 1, 2]
         w1, r1 = rates(car, front, rear, (w, r), here)
         w2, r2 = rates(car, front, rear, (w + step * w1, r + step * r1), there)
         w += 0.5 * step * (w1 + w2)
@@ -111,11 +111,11 @@ def march(car: Car, front: Axle, rear: Axle, given: np.ndarray, step: float, fir
 
 
 @compiled
-def reports(car: Car, front: Axle, rear: Axle, given: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """(n, 7): lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad), front first."""
-    table = np.empty((len(given), 7))
-    for i in range(len(given)):
-        answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (given[i, 0], given[i, 1], given[i, 2]))
+    table = np.empty((len(inputs), 7))
+    for i in range(len(inputs)):
+        answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))
         table[i, 0] = answer[0] / car.mass
         table[i, 1:] = answer[2:]
     return table

@@ -64,31 +64,31 @@ def inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
     return np.ascontiguousarray(np.column_stack([steer, speed, np.gradient(speed, period)]))
 
 
-def motion_of(scene: SingleTrackScene, given: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+def motion_of(scene: SingleTrackScene, inputs: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
     """Lateral velocity and yaw rate (n, 2), and reports (n, 7), from the steady turn of the first sample on."""
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
-    settling = np.repeat(given[:1], max(2, round(SETTLING / period)), axis=0)
+    settling = np.repeat(inputs[:1], max(2, round(SETTLING / period)), axis=0)
     first = march(*parts, settling, period, (0.0, 0.0))[-1]
-    motion = march(*parts, given, period, (float(first[0]), float(first[1])))
+    motion = march(*parts, inputs, period, (float(first[0]), float(first[1])))
     bad = ~(np.abs(motion[:, 1]) < LARGEST)
     if bad.any():
         row = int(bad.argmax())
         why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
         raise RunFailed("reference", why, period * row, motion[max(row - 1, 0)])
-    return motion, reports(*parts, given, motion)
+    return motion, reports(*parts, inputs, motion)
 
 
 def sensor_channels(
-    sensors: SensorTable, given: np.ndarray, motion: np.ndarray, lateral: np.ndarray
+    sensors: SensorTable, inputs: np.ndarray, motion: np.ndarray, lateral: np.ndarray
 ) -> dict[str, Channel]:
     """What sensors show of the motion, by the names of channels that a measurement has."""
-    slip = np.arctan2(motion[:, 0], given[:, 1]) + sensors.side_slip_offset
+    slip = np.arctan2(motion[:, 0], inputs[:, 1]) + sensors.side_slip_offset
     acceleration = sensors.acceleration_ratio * lateral + sensors.acceleration_offset
     return {
         "yaw rate": Channel("time", motion[:, 1] + sensors.yaw_rate_offset, "rad/s", "left positive"),
         "lateral acceleration": Channel("time", acceleration, "m/s^2", "of the centre of mass, left positive"),
         "side slip": Channel("time", slip, "rad", "of the centre of mass, left positive"),
         "lateral velocity": Channel("time", motion[:, 0], "m/s", "of the centre of mass, left positive"),
-        "wheels steer": Channel("time", given[:, 0], "rad", "angle of the front wheels"),
-        "forward acceleration": Channel("time", given[:, 2], "m/s^2", "rate of the measured speed"),
+        "wheels steer": Channel("time", inputs[:, 0], "rad", "angle of the front wheels"),
+        "forward acceleration": Channel("time", inputs[:, 2], "m/s^2", "rate of the measured speed"),
     }

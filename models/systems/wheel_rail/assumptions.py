@@ -38,8 +38,8 @@ def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = T
 
 
 def _half_space() -> Assumption:
-    def share(place: PatchReport) -> float:
-        return max(0.5 * place.length * place.curvature_x, 0.5 * place.width * place.curvature_y)
+    def share(patch: PatchReport) -> float:
+        return max(0.5 * patch.length * patch.curvature_x, 0.5 * patch.width * patch.curvature_y)
 
     return Assumption(
         "half-space",
@@ -55,9 +55,9 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
     """The way (mm) from a patch to the nearer end of the rail or to the wheel's outer face."""
     side = scene.profiles.side(scene.wheelset.radius)
 
-    def free(place: PatchReport) -> float:
-        ends = place.y - side.rail.y[0], side.rail.y[-1] - place.y, side.wheel.y[-1] - place.wheel_centre
-        return float(1e3 * (min(ends) - 0.5 * place.width))
+    def free(patch: PatchReport) -> float:
+        ends = patch.y - side.rail.y[0], side.rail.y[-1] - patch.y, side.wheel.y[-1] - patch.wheel_centre
+        return float(1e3 * (min(ends) - 0.5 * patch.width))
 
     return Assumption(
         "within the profiles",
@@ -81,8 +81,8 @@ def _elastic() -> Assumption:
 
 
 def _small_creepage() -> Assumption:
-    def largest(place: PatchReport) -> float:
-        return max(abs(place.xi_x), abs(place.xi_y), 0.5 * max(place.length, place.width) * abs(place.spin))
+    def largest(patch: PatchReport) -> float:
+        return max(abs(patch.xi_x), abs(patch.xi_y), 0.5 * max(patch.length, patch.width) * abs(patch.spin))
 
     return Assumption(
         "small creepage",

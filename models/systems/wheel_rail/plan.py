@@ -12,7 +12,7 @@ def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
 
 
 def describe(scene: WheelRailScene) -> str:
-    """The scene's plan as text: profiles, track, wheelset, positions, cases."""
+    """Text that describes the scene before a run: profiles, track, wheelset, positions, cases."""
     p, w, at = scene.profiles, scene.wheelset, scene.positions
     lines = {
         "scene": f"{scene.file}, study {scene.study}",

@@ -1,4 +1,4 @@
-"""Where a held wheelset touches its rails, and with which forces: one case of a scene at every position."""
+"""Contact points and forces of a wheelset at given positions on its rails: one case of a scene at every position."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import by_cells, not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
-from models.rail.contact_table import Contact, PatchReport, Placed, rolling_radius_difference
+from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlacement, rolling_radius_difference
 from models.systems.wheel_rail.assumptions import WHEELS, assumptions
 from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
 
@@ -58,7 +58,7 @@ PATCH: dict[str, tuple[str, float, str]] = {
 class Contacts:
     """Contact at every position that has one, why others (mm) have none, seconds of the processor that each took."""
 
-    placed: list[Placed] = field(default_factory=list)
+    placed: list[WheelsetPlacement] = field(default_factory=list)
     failed: dict[float, str] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
 
@@ -98,12 +98,12 @@ def run(
     return _with_error(labelled, scene, held) if error and contacts.placed else labelled
 
 
-def _with_error(run: Result, scene: WheelRailScene, contact: Contact) -> Result:
+def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) -> Result:
     """The result with what the cells leave, as the root mean square over both wheels and every other position.
 
     Half the cells are of first order: what they change is what the cells leave. Shares are of the root mean square.
     """
-    fine, coarse = list[Placed](), list[Placed]()
+    fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
     for placed in run.detail.placed[::EVERY]:
         with suppress(InputError, RunFailed):
             coarse.append(replace(contact, coarser=2.0 * contact.coarser).at(placed.shift, placed.yaw))
@@ -119,7 +119,7 @@ def _with_error(run: Result, scene: WheelRailScene, contact: Contact) -> Result:
     return stated(run, told, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
 
 
-def sums(placed: Placed) -> np.ndarray:
+def sums(placed: WheelsetPlacement) -> np.ndarray:
     """``SUMS`` (2, 5) of the right and the left wheel over their patches, and the largest pressure."""
     return np.array(
         [
@@ -152,12 +152,12 @@ def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
     return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
 
 
-def patches(placed: Placed, wheel: str) -> tuple[PatchReport, ...]:
+def patches(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
     """The patches of one wheel, the one that carries most first."""
     return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
 
 
-def position_quantities(placed: Placed) -> dict[str, Any]:
+def position_quantities(placed: WheelsetPlacement) -> dict[str, Any]:
     """Every quantity of a position, and of every patch of both wheels."""
     return {
         "shift": 1e3 * placed.shift,

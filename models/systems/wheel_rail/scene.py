@@ -7,11 +7,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.contact.material import Pair
+from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
-from models.rail.contact_table import CELLS, Contact
+from models.rail.contact_table import CELLS, WheelsetContact
 from models.rail.laid_profiles import Profiles
 from models.systems.contact.scene import Bodies
 
@@ -40,7 +40,7 @@ class Positions(Strict):
 
 
 class Case(Strict):
-    """[cases.NAME]: how the wheelset stands and whether it rolls."""
+    """[cases.NAME]: position of the wheelset, and whether it rolls."""
 
     yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
     friction: float = quantity(
@@ -68,15 +68,15 @@ class WheelRailScene(SceneFile):
     method: Method = Method()
     cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
-    def contact(self, case: Case) -> Contact:
+    def contact(self, case: Case) -> WheelsetContact:
         """Profiles, track and wheelset in touch; raises InputError for files that are no profiles."""
         side = self.profiles.side(self.wheelset.radius)
-        return Contact(
+        return WheelsetContact(
             side,
             self.wheelset.load,
             self.wheelset.speed,
             case.friction,
-            Pair(self.bodies.wheel, self.bodies.rail),
+            MaterialPair(self.bodies.wheel, self.bodies.rail),
             CELLS / self.method.cells,
         )
 

@@ -172,7 +172,7 @@ def _no_slip(wheelset: Wheelset) -> Assumption:
 
     return Assumption(
         "no slip",
-        "the linear law's creep forces are far below what friction carries",
+        "the creep forces of the linear law are far below mu N",
         'name the effect fastsim: contact.law = "fastsim"',
         _of_path(watched),
         "mu N",

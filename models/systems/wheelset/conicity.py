@@ -45,22 +45,22 @@ class Conicities:
 
 
 def told_conicity(scene: WheelsetScene) -> bool:
-    """Whether the conicity is told of a scene that does not ask for it alone: where it asks, and on profiles."""
+    """Whether a run reports the conicity: where the scene has [conicity], or a wheelset with profiles."""
     return scene.conicity is not None or wheelset_of(scene).profiles is not None
 
 
-def run(scene: WheelsetScene, told: Callable[[float], Any] = lambda share: None) -> Result:
+def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda share: None) -> Result:
     """Both conicities at the scene's amplitudes; the detail are ``Conicities``.
 
-    told : called with the share of the rolling radii that is done. InputError for a file that is no table and for
-    wheels that do not stand on their rails; an amplitude without a wave is a doubt.
+    report_progress : called with the share of the rolling radii that is done. InputError for a file that is no table
+    and for wheels that do not stand on their rails; an amplitude without a wave is a doubt.
     """
     asked, wheelset = scene.conicity or ConicityTable(), wheelset_of(scene)
-    table, source = _table(scene, asked, wheelset, told)
+    table, source = _table(scene, asked, wheelset, report_progress)
     rows, why = list[ConicityRow](), dict[float, str]()
     for amplitude in asked.amplitudes:
         try:
-            rows.append(conicity_row(table, amplitude, near=asked.near))
+            rows.append(conicity_row(table, amplitude, guess=asked.near))
         except InputError as error:
             rows.append(ConicityRow(amplitude, *[math.nan] * 5))
             why[amplitude] = error.allowed
@@ -85,31 +85,35 @@ def check(scene: WheelsetScene) -> None:
         _left_profiles(scene, asked, profiles)
 
 
-def _left_profiles(scene: WheelsetScene, asked: ConicityTable, profiles: Profiles) -> Profiles:
+def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: Profiles) -> Profiles:
     """Cross-sections of the left side."""
-    named = {key: value for key, value in (("wheel", asked.left_wheel), ("rail", asked.left_rail)) if value is not None}
+    named = {
+        key: value
+        for key, value in (("wheel", conicity_table.left_wheel), ("rail", conicity_table.left_rail))
+        if value is not None
+    }
     return profiles.model_copy(update=named).located(scene) if named else profiles
 
 
 def _table(
-    scene: WheelsetScene, asked: ConicityTable, wheelset: Wheelset, told: Callable[[float], Any]
+    scene: WheelsetScene, conicity_table: ConicityTable, wheelset: Wheelset, report_progress: Callable[[float], Any]
 ) -> tuple[RollingRadiusTable, str]:
-    if asked.table is not None:
-        return read_rolling_radii(scene.path(asked.table, "conicity.table")), asked.table
-    right, left = asked.right_radius or wheelset.radius, asked.left_radius or wheelset.radius
+    if conicity_table.table is not None:
+        return read_rolling_radii(scene.path(conicity_table.table, "conicity.table")), conicity_table.table
+    right, left = conicity_table.right_radius or wheelset.radius, conicity_table.left_radius or wheelset.radius
     radii = f"radius {right:g} m" if right == left else f"radii {right:g} m right, {left:g} m left"
     if wheelset.profiles is None:
-        half = max(asked.amplitudes) + abs(right - left) / wheelset.equivalent_conicity
+        half = max(conicity_table.amplitudes) + abs(right - left) / wheelset.equivalent_conicity
         y = np.array([-half, 0.0, half])
         cones = f"cones of conicity {wheelset.conicity:g}, {radii}"
         return RollingRadiusTable(y, 2.0 * wheelset.equivalent_conicity * y + right - left), cones
     profiles = wheelset.profiles
-    of_left = _left_profiles(scene, asked, profiles)
-    count = round(asked.reach / asked.spacing)
-    displacements = asked.reach * np.arange(-count, count + 1) / count
+    of_left = _left_profiles(scene, conicity_table, profiles)
+    count = round(conicity_table.reach / conicity_table.spacing)
+    displacements = conicity_table.reach * np.arange(-count, count + 1) / count
     sides = f"{profiles.wheel} on {profiles.rail}"
     sides += f", left {of_left.wheel} on {of_left.rail}" if of_left != profiles else ""
-    table = rolling_radii_of(profiles.side(right), of_left.side(left), displacements, told)
+    table = rolling_radii_of(profiles.side(right), of_left.side(left), displacements, report_progress)
     return replace(table, source=sides), f"{sides}, {radii}"
 
 

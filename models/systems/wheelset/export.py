@@ -1,6 +1,6 @@
 """The wheelset of a scene as a file of its engine: body, joints, and the suspension."""
 
-from models.engines.export import Exported, Subject, export_free_vehicle
+from models.engines.export import Exported, ExportSubject, export_free_vehicle
 from models.engines.wheelset import driven_by
 from models.systems.wheelset.of_scene import equations_of, path_speeds
 from models.systems.wheelset.scene import WheelsetScene
@@ -12,4 +12,4 @@ LEFT_OUT = ("normal and creep forces of the right rail", "normal and creep force
 def exported(scene: WheelsetScene, engine: str) -> Exported:
     """The wheelset in "mujoco" or "exudyn" without the rails."""
     equations = equations_of(scene, engine, path_speeds(scene)[0])
-    return export_free_vehicle(engine, driven_by(equations), Subject(scene.title, scene.file, AXES), LEFT_OUT)
+    return export_free_vehicle(engine, driven_by(equations), ExportSubject(scene.title, scene.file, AXES), LEFT_OUT)

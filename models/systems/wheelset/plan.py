@@ -70,9 +70,9 @@ def _wheels(wheelset: Wheelset) -> str:
     return f"{p.wheel} of radius {w.radius:g} m on {rails}; closed forms for {cones}"
 
 
-def _conicity(asked: ConicityTable) -> str:
-    amplitudes = ", ".join(f"{1e3 * amplitude:g}" for amplitude in asked.amplitudes)
-    of = f"of {asked.table}" if asked.table else "of these wheels"
+def _conicity(conicity_table: ConicityTable) -> str:
+    amplitudes = ", ".join(f"{1e3 * amplitude:g}" for amplitude in conicity_table.amplitudes)
+    of = f"of {conicity_table.table}" if conicity_table.table else "of these wheels"
     return f"{of}, at amplitudes of {amplitudes} mm, by EN 15302 and by the first harmonic"
 
 

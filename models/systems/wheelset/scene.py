@@ -57,7 +57,7 @@ class RunTable(Strict):
 
 
 class ConicityTable(Strict):
-    """[conicity]: amplitudes at which the equivalent conicity is told, and the wheels that have it.
+    """[conicity]: amplitudes at which the equivalent conicity is computed, and the profiles of the wheels.
 
     A table of rolling radius differences takes the place of the scene's cones or profiles. Beside these, the right
     wheel has the scene's shape and radius, and the left one too unless another is named here.

@@ -71,7 +71,8 @@ def series(path: WheelsetPath) -> Series:
 
 
 def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
-    """The scene in steps so many times as long, over a share of its path, in whole steps, on other cells."""
+    """The scene with a step longer by a factor, over a share of its path (whole steps), and with another number of
+    contact cells."""
     step = times * scene.run.step
     duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
     contact = scene.contact if cells is None else scene.contact.model_copy(update={"cells": cells})
@@ -102,9 +103,9 @@ def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) 
     return told
 
 
-def _gap(fine: Series, other: Series, name: str, end: float = math.inf) -> float:
+def _gap(fine: Series, other_series: Series, name: str, end: float = math.inf) -> float:
     """Root mean square of the difference of a channel until a time (s), at the rows that have the longer steps."""
-    long, short = sorted((fine, other), key=lambda series: -series.times[min(1, len(series.times) - 1)])
+    long, short = sorted((fine, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
     times = long.times[long.times <= min(end, short.times[-1]) * (1.0 + 1e-9)]
     gap = long.channels[name][: len(times)] - short.channels[name][rows_at(short.times, times)]
     return float(np.sqrt(np.mean(gap**2)))

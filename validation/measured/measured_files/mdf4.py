@@ -19,7 +19,7 @@ from validation.measured.measured_files.odd import (
     TWO_RATES,
     Files,
     Make,
-    Odd,
+    OddFile,
     Truth,
     altered,
     called,
@@ -84,9 +84,9 @@ def inside(data: bytes, kind: bytes, offset: int, new: bytes) -> bytes:
     return patched(data, place + DATA + 8 * struct.unpack_from("<Q", data, place + 16)[0] + offset, new)
 
 
-def changed(kind: bytes, offset: int, new: bytes, make: Make = MDF4) -> Make:
+def changed(kind: bytes, offset: int, new: bytes, make_file: Make = MDF4) -> Make:
     """Make a file with other bytes in a block's data."""
-    return altered(make, lambda data: inside(data, kind, offset, new))
+    return altered(make_file, lambda data: inside(data, kind, offset, new))
 
 
 def linked(kind: bytes, offset: int, number: int) -> Make:
@@ -109,9 +109,9 @@ def clocked(offset: int, new: bytes) -> Make:
     return altered(MDF4, change)
 
 
-def headed(place: int, new: bytes, length: int | None = None) -> Make:
+def headed(byte_offset: int, new: bytes, length: int | None = None) -> Make:
     """Make the usual file, or its first bytes, with others at its beginning."""
-    return altered(MDF4, lambda data: patched(data, place, new)[:length])
+    return altered(MDF4, lambda data: patched(data, byte_offset, new)[:length])
 
 
 def only(name: str, values: np.ndarray, times: np.ndarray = TIMES) -> Truth:
@@ -249,7 +249,7 @@ GREEDY = (
 FILES = (
     *every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY),
     *(
-        Odd(
+        OddFile(
             f"MDF {version[0]} whose groups are wheels",
             "every wheel has an Fz",
             signals({"Fz": FZ}, {"Fz": FX}, version=version, families=("WFT VL", "WFT HR")),

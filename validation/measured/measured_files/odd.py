@@ -47,7 +47,7 @@ def usual(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 @dataclass(frozen=True)
-class Odd:
+class OddFile:
     """One file.
 
     make : writes it into a folder and returns its path. wanted, says : what must become of it, and a phrase of the
@@ -97,18 +97,18 @@ class Odd:
 
 def every(
     refused: Files | None = None, named: Files | None = None, right: Files | None = None, greedy: Sequence[str] = ()
-) -> tuple[Odd, ...]:
+) -> tuple[OddFile, ...]:
     """All files of these tables; greedy : names of those that claim a size that must not be taken."""
     tables: tuple[tuple[Wanted, Files], ...] = (
         ("refused", refused or {}),
         ("named", named or {}),
         ("right", right or {}),
     )
-    odds = list[Odd]()
+    odds = list[OddFile]()
     for wanted, files in tables:
         for name, (hard, make, *rest) in files.items():
             says, *truth = rest if wanted != "right" else ("", *rest)
-            odds.append(Odd(name, hard, make, wanted, says, truth[0] if truth else usual(), name in greedy))
+            odds.append(OddFile(name, hard, make, wanted, says, truth[0] if truth else usual(), name in greedy))
     return tuple(odds)
 
 
@@ -178,20 +178,20 @@ def wide(extension: str) -> Make:
     return lambda folder: written(folder / f"odd{extension}", tuple(MANY_CHANNELS), table)
 
 
-def altered(make: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
+def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
     """Make a file with other bytes, or under another name, too."""
 
     def altered_file(folder: Path) -> Path:
-        path = make(folder)
+        path = make_file(folder)
         path.write_bytes(change(path.read_bytes()))
         return path.rename(folder / name) if name else path
 
     return altered_file
 
 
-def patched(data: bytes, place: int, new: bytes) -> bytes:
+def patched(data: bytes, byte_offset: int, new: bytes) -> bytes:
     """Bytes of a file, some of them replaced."""
-    return data[:place] + new + data[place + len(new) :]
+    return data[:byte_offset] + new + data[byte_offset + len(new) :]
 
 
 def two_rates(extension: str) -> Make:

@@ -27,7 +27,7 @@ KEY, RECORD, BLOCK, POINTS = 32, 128, 512, 2048
 RPC = plain(".rsp")
 
 
-def with_parameters(make: Make = RPC, **changed: str | None) -> Make:
+def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
     """Make a file with other values of some parameters (``_`` for ``.``); None takes one away."""
 
     def change(data: bytes) -> bytes:
@@ -40,7 +40,7 @@ def with_parameters(make: Make = RPC, **changed: str | None) -> Make:
         latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in kept.items()]
         return b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0") + data[size:]
 
-    return altered(make, change)
+    return altered(make_file, change)
 
 
 def _values(data: bytes) -> dict[str, Any]:

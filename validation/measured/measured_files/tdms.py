@@ -74,7 +74,7 @@ def claims(new: int) -> Make:
 
 
 def beside_old_index(folder: Path) -> Path:
-    """Make the usual file beside an index of another one."""
+    """Write the usual TDMS file next to the index file of another one."""
     other = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
     data = other.read_bytes()
     other.unlink()

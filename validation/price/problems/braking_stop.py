@@ -25,7 +25,7 @@ from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
-from validation.braking.quarter_stops import FRONT, Change, Curve, marched_quarter
+from validation.braking.quarter_stops import FRONT, FrictionChange, FrictionCurve, marched_quarter
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
@@ -176,7 +176,9 @@ class BrakingStop:
     def _stop_by_method(self, method: str, substeps: int) -> StopResult:
         number = (EULER, RK4, LITERAL).index(method)
         torques, step = self._torques(substeps), SAMPLE / substeps
-        friction = Change(Curve(self.slips, self.mu[0]), Curve(self.slips, self.mu[1]), self.change)
+        friction = FrictionChange(
+            FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
+        )
         way, steps, _ = marched_quarter(number, FRONT, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)

@@ -58,9 +58,9 @@ REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's
 """Solvers with their relative tolerances and what they solve: a Runge-Kutta method and a multistep one."""
 
 
-def heights(place: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
+def heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
     """Height (m) and slope of a track, 0 the left one and 1 the right one, at places (...) in m along the road."""
-    x, k = np.asarray(place, dtype=float), np.arange(1, SINES + 1)
+    x, k = np.asarray(positions, dtype=float), np.arange(1, SINES + 1)
     angle = 2 * np.pi * (x[..., None] * k / LONGEST_SINE + GOLDEN * k * (k + SINES * track))
     shape = (HEIGHT / k * np.sin(angle)).sum(axis=-1)
     slope = 2 * np.pi * HEIGHT / LONGEST_SINE * np.cos(angle).sum(axis=-1)

@@ -99,7 +99,7 @@ def apart(computed: np.ndarray, true: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Solver:
+class AttitudeSolver:
     """A setting, ready to run: a rule of our own, or the sphere of an engine."""
 
     setting: Setting
@@ -153,9 +153,9 @@ class InertialUnit:
             default=DEFAULTS.get((engine, method, float(step)), ""),
         )
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> AttitudeSolver:
         """One way to integrate, ready to run."""
-        return Solver(setting)
+        return AttitudeSolver(setting)
 
     def errors(self, solution: Attitudes) -> dict[str, float]:
         """Largest angle between the attitude and the true one at the instants."""

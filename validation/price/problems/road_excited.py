@@ -196,11 +196,11 @@ class RoadExcited:
             return self._states[index]
         return self._solution(times).T
 
-    def _largest_errors(self, off: np.ndarray) -> dict[str, float]:
+    def _largest_errors(self, state_errors: np.ndarray) -> dict[str, float]:
         """Largest force and state error from the states' differences (n, 8); the road cancels."""
         p = self.assembly.parameters
-        forces = off[:, :2] * [p.k1, p.k2] + off[:, 4:6] * [p.d1, p.d2]
-        return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(off).max())}
+        forces = state_errors[:, :2] * [p.k1, p.k2] + state_errors[:, 4:6] * [p.d1, p.d2]
+        return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(state_errors).max())}
 
 
 @cache

@@ -37,7 +37,7 @@ class Attitudes:
     counts: dict[str, int]
 
 
-def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
+def in_mujoco(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
     """``count`` steps of ``period`` (s) from an attitude (4,), every so many of them kept."""
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity, spec.option.integrator = period, [0, 0, 0], INTEGRATORS[method]
@@ -55,11 +55,11 @@ def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndar
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    attitudes = np.vstack([start, path[0, every - 1 :: every, 1:5]])
+    attitudes = np.vstack([start, path[0, stride - 1 :: stride, 1:5]])
     return _sound("mujoco", attitudes, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
 
 
-def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
+def in_exudyn(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
     """Attitudes of the turning sphere by Exudyn; Refused for methods that do not end their steps on samples."""
     name = method.split()[0]
     known = CATALOGUE["exudyn"][name]
@@ -72,13 +72,13 @@ def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndar
     mbs, sensor = _sphere(start, rates[0], pushed.tolist(), period, implicit, known.holds)
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.active = False, True
-    options.solution.sensors.writePeriod = period * every
+    options.solution.sensors.writePeriod = period * stride
     options.timeIntegration.automaticStepSize = False
     options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
     note = solve(mbs, Settings(name, period, count * period), options)
     kept = mbs.GetSensorStoredData(sensor)[:, 1:]
-    if note or len(kept) != count // every + 1:
-        raise RunFailed("exudyn", "the solver reported failure", period * every * len(kept))
+    if note or len(kept) != count // stride + 1:
+        raise RunFailed("exudyn", "the solver reported failure", period * stride * len(kept))
     attitudes = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
     return _sound("exudyn", attitudes, solver_counts(mbs))
 

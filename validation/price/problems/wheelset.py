@@ -89,7 +89,7 @@ class WheelsetResult:
 
 
 @dataclass(frozen=True)
-class Solver:
+class WheelsetSolver:
     """A run that is ready."""
 
     run: Callable[[], WheelsetResult]
@@ -165,7 +165,7 @@ class RollingWheels:
         kept = made.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made if kept else replace(made, order=0, nominal=made.order)
 
-    def build(self, setting: Setting) -> Solver:
+    def build(self, setting: Setting) -> WheelsetSolver:
         """The wheel in one engine; Refused for a step that the method cannot take, or a method that is not there."""
         method = setting.method.split()[0]
         if (setting.engine, method) in MISSING:
@@ -177,7 +177,7 @@ class RollingWheels:
             return self._mujoco(method, steps)
         if not setting.adaptive:
             check_step("reference", self.wheels, method, setting.value, steps)
-        return Solver(partial(self._run_by_method, method, setting.value))
+        return WheelsetSolver(partial(self._run_by_method, method, setting.value))
 
     def errors(self, solution: WheelsetResult) -> dict[str, float]:
         """Largest error of the creep forces along and across (N), and of the displacements along and across (m)."""
@@ -209,7 +209,7 @@ class RollingWheels:
             raise RunFailed("reference", done.message)
         return WheelsetResult(done.y[:, -1], {"steps": done.t.size - 1, "force calls": int(done.nfev)})
 
-    def _mujoco(self, method: str, steps: int) -> Solver:
+    def _mujoco(self, method: str, steps: int) -> WheelsetSolver:
         marcher = Marcher(model(self.wheels, DURATION / steps, method))
 
         def run() -> WheelsetResult:
@@ -217,9 +217,9 @@ class RollingWheels:
                 state = marcher.run(self._start[None], steps)[0, -1]
             return WheelsetResult(state, {"steps": steps, "force calls": STAGES[method] * steps})
 
-        return Solver(run)
+        return WheelsetSolver(run)
 
-    def _exudyn(self, setting: Setting, method: str) -> Solver:
+    def _exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
         calls, law = [0], Forces(self.wheels)
         slopes = counting(law.slopes, calls, SLOPE_EVALUATIONS) if setting.method.endswith(WITH_SLOPES) else None
         rolling = Rolling(self.wheels, counting(law.of, calls), slopes=slopes)
@@ -234,7 +234,7 @@ class RollingWheels:
                 state, {**solver_counts(rolling.mbs), "force calls": calls[0] - AT_START.get(method, 0)}
             )
 
-        return Solver(run)
+        return WheelsetSolver(run)
 
 
 @cache

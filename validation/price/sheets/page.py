@@ -36,18 +36,18 @@ def matrices(folder: Path, name: str, arrays: dict[str, np.ndarray]) -> None:
 
 
 def vector(values: Sequence[float] | np.ndarray) -> str:
-    """Numbers to all digits, in brackets."""
+    """Text of a vector with all digits of its numbers, in brackets."""
     return "(" + ", ".join(f"{value:.17g}" for value in values) + ")"
 
 
-def write(folder: Path, key: str, title: str, body: str, known: str, values: list[Value]) -> list[Value]:
+def write(folder: Path, key: str, title: str, body: str, reference_value: str, values: list[Value]) -> list[Value]:
     """The page: what is to be solved, then how the reference was made and what it gives; its values."""
     lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in values)
     (folder / f"{key}.md").write_text(f"""# {title}
 
 {body}
 
-{known}
+{reference_value}
 
 | quantity | value | unit | uncertainty |
 |---|---|---|---|

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import coarser_cells
-from models.contact.theories import Contact
+from models.contact.theories import RollingContact
 from models.core.discretisation import errors_of
 from models.systems.contact.run import POWERS, run
 from models.systems.contact.scene import ContactScene, build
@@ -65,6 +65,6 @@ def _sample(scene: ContactScene) -> Sample:
     return Sample(name, "", errors_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)
 
 
-def _rolled(body: Contact, motion: tuple[float, float, float], cells: int) -> tuple[float, float, float]:
+def _rolled(body: RollingContact, motion: tuple[float, float, float], cells: int) -> tuple[float, float, float]:
     forces = body.roll(motion, cells)
     return forces.fx, forces.fy, forces.mz

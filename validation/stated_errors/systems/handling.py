@@ -56,7 +56,7 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _sample(scene: HandlingScene, engine: str) -> Sample:
-    """Run with its error, and truth."""
+    """A run with its stated error, and the true error by a finer run."""
     with counted() as calls:
         try:
             told = run(scene, engine, error=True)
@@ -68,7 +68,7 @@ def _sample(scene: HandlingScene, engine: str) -> Sample:
     return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, told), calls[0], sum(calls[1:]))
 
 
-def _true_errors(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
+def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
@@ -78,7 +78,7 @@ def _true_errors(scene: HandlingScene, drive: Drive, engine: str, told: Result) 
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][::STEP]) ** 2)))
         for name, values in principal(drive).channels.items()
-        if name in errors_of(told)
+        if name in errors_of(stated_result)
     }
 
 

@@ -83,11 +83,14 @@ def _run_with_error(scene: HubScene, engine: str) -> Result:
         return error.partial
 
 
-def _true_errors(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[str, float]:
+def _true_errors(scene: HubScene, engine: str, stated_result: Result, names: list[str]) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
     vehicle = scene.cut_vehicle()
-    truth, stated = principal(vehicle, run(fine, engine).detail).channels, principal(vehicle, told.detail).channels
+    truth, stated = (
+        principal(vehicle, run(fine, engine).detail).channels,
+        principal(vehicle, stated_result.detail).channels,
+    )
     return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER]) ** 2))) for name in names}
 
 

@@ -74,10 +74,10 @@ def _sample(table: dict[str, Any], engine: str) -> Sample:
     return Sample(title, engine, errors_of(told), _true_errors(told, truth), steps, sum(calls) - steps)
 
 
-def _true_errors(told: Result, truth: Result) -> dict[str, float]:
+def _true_errors(stated_result: Result, truth: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
-    mine, fine = (each.detail.outcome for each in (told, truth))
+    mine, fine = (each.detail.outcome for each in (stated_result, truth))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))
-        for name in errors_of(told)
+        for name in errors_of(stated_result)
     }

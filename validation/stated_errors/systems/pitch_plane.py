@@ -100,63 +100,63 @@ def _count_force_calls() -> Iterator[list[float]]:
         yield calls
 
 
-def _scene(drawn: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
+def _scene(rng: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
     table: dict[str, Any] = {
         "title": "random",
-        "vehicle": {"geometry": str(drawn.choice(["exact", "exact", "linear"])), "override": _vehicle(drawn)},
+        "vehicle": {"geometry": str(rng.choice(["exact", "exact", "linear"])), "override": _vehicle(rng)},
         "effects": {},
-        "run": {"duration": float(drawn.choice([1.0, 2.0, 3.0]))},
+        "run": {"duration": float(rng.choice([1.0, 2.0, 3.0]))},
     }
-    tolerance = {"tolerance": float(10.0 ** drawn.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
+    tolerance = {"tolerance": float(10.0 ** rng.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
     table["engines"] = {engine: {"integrator": integrator, **tolerance}}
-    kind = str(drawn.choice(["free", "road", "road", "road", "forces", "forces"]))
+    kind = str(rng.choice(["free", "road", "road", "road", "forces", "forces"]))
     if kind == "free":
-        table["start"] = {"pitch": float(drawn.uniform(-0.1, 0.1)), "z3": float(drawn.uniform(-0.1, 0.1))}
-        table["effects"] = _lift_off(drawn)
+        table["start"] = {"pitch": float(rng.uniform(-0.1, 0.1)), "z3": float(rng.uniform(-0.1, 0.1))}
+        table["effects"] = _lift_off(rng)
     elif kind == "road":
-        table["effects"] = {"road": _road(drawn, folder), **_lift_off(drawn)}
+        table["effects"] = {"road": _road(rng, folder), **_lift_off(rng)}
     else:
-        table["effects"] = _forces(drawn, folder, table)
+        table["effects"] = _forces(rng, folder, table)
     period = table.pop("period", None)
-    table["run"]["step"] = _step(drawn, table["run"]["duration"], period)
+    table["run"]["step"] = _step(rng, table["run"]["duration"], period)
     return build(table, "random.toml", folder)
 
 
-def _vehicle(drawn: np.random.Generator) -> dict[str, float]:
+def _vehicle(rng: np.random.Generator) -> dict[str, float]:
     """A published vehicle whose parameters are all half to twice its own, dampers down to a tenth."""
-    p = parameter_set(str(drawn.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
-    softer = float(drawn.choice([1.0, 0.3, 0.1]))
+    p = parameter_set(str(rng.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
+    softer = float(rng.choice([1.0, 0.3, 0.1]))
     return {
-        name: value * float(2.0 ** drawn.uniform(-0.7, 0.7)) * (softer if name in ("d3", "d4") else 1.0)
+        name: value * float(2.0 ** rng.uniform(-0.7, 0.7)) * (softer if name in ("d3", "d4") else 1.0)
         for name, value in p
         if name != "g"
     }
 
 
-def _lift_off(drawn: np.random.Generator) -> dict[str, Any]:
-    return {"lift_off": {}} if drawn.random() < 0.5 else {}
+def _lift_off(rng: np.random.Generator) -> dict[str, Any]:
+    return {"lift_off": {}} if rng.random() < 0.5 else {}
 
 
-def _road(drawn: np.random.Generator, folder: Path) -> dict[str, Any]:
-    speed = float(drawn.uniform(5.0, 35.0))
-    source = str(drawn.choice(["study", "hills", "iso8608", "csv"]))
+def _road(rng: np.random.Generator, folder: Path) -> dict[str, Any]:
+    speed = float(rng.uniform(5.0, 35.0))
+    source = str(rng.choice(["study", "hills", "iso8608", "csv"]))
     options: dict[str, Any] = {}
     if source == "iso8608":
-        options = {"road_class": str(drawn.choice(list("ABCDE"))), "seed": int(drawn.integers(1000))}
+        options = {"road_class": str(rng.choice(list("ABCDE"))), "seed": int(rng.integers(1000))}
     if source == "csv":
-        spacing = float(drawn.choice([0.01, 0.05, 0.2]))
+        spacing = float(rng.choice([0.01, 0.05, 0.2]))
         stations = spacing * np.arange(round(20.0 / spacing) + 1)
-        heights = np.cumsum(drawn.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
+        heights = np.cumsum(rng.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
         lines = [f"{s:.3f}, {h:.6f}, {h:.6f}" for s, h in zip(stations, heights - heights[0], strict=True)]
         (folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
         options = {"file": "road.csv", "beyond_end": "mirrored"}
     return {"source": source, "speed": speed, **options}
 
 
-def _forces(drawn: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     """Wheel forces that a virtual measurement leaves, perhaps with noise, perhaps with the pitch held."""
-    period, duration = float(drawn.choice(PERIODS)), table["run"]["duration"]
-    road = {"source": "study", "speed": float(drawn.uniform(8.0, 25.0))}
+    period, duration = float(rng.choice(PERIODS)), table["run"]["duration"]
+    road = {"source": "study", "speed": float(rng.uniform(8.0, 25.0))}
     on_road = build(
         {
             **{key: table[key] for key in ("title", "vehicle")},
@@ -171,23 +171,23 @@ def _forces(drawn: np.random.Generator, folder: Path, table: dict[str, Any]) -> 
     both = {"z3": ("m", measured["z3"][::every]), "pitch": ("rad", measured["pitch"][::every])}
     write_time_series(folder / "both.csv", both, period)
     table["period"] = period
-    rule = str(drawn.choice(["held", "linear", "smooth"]))
-    forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(drawn.choice(["inertial", "body"]))}
-    noise = {"force_noise": {"deviation": 30.0, "seed": int(drawn.integers(1000))}} if drawn.random() < 0.5 else {}
+    rule = str(rng.choice(["held", "linear", "smooth"]))
+    forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(rng.choice(["inertial", "body"]))}
+    noise = {"force_noise": {"deviation": 30.0, "seed": int(rng.integers(1000))}} if rng.random() < 0.5 else {}
     holds: tuple[dict[str, Any], ...] = (
         {},
-        {"pitch_spring": {"stiffness": 3e3, "damping": 1e3, "dead_band": float(drawn.choice([0.0, 0.01]))}},
+        {"pitch_spring": {"stiffness": 3e3, "damping": 1e3, "dead_band": float(rng.choice([0.0, 0.01]))}},
         {"high_pass": {"cut_off": 0.3}},
         {"prescribed_pitch": {"file": "pitch.csv", "bandwidth": 10.0}},
         {"prescribed_heave_and_pitch": {"file": "both.csv", "bandwidth": 10.0}},
         {"kalman_filter": {"file": "pitch.csv", "force_deviation": 50.0, "pitch_deviation": 2e-3}},
     )
-    return {"wheel_forces": forces, **noise, **holds[int(drawn.integers(len(holds)))]}
+    return {"wheel_forces": forces, **noise, **holds[int(rng.integers(len(holds)))]}
 
 
-def _step(drawn: np.random.Generator, duration: float, period: float | None) -> float:
+def _step(rng: np.random.Generator, duration: float, period: float | None) -> float:
     """A random step from 20 microseconds to 8 ms that divides the duration and the period."""
-    wanted = float(np.exp(drawn.uniform(np.log(2e-5), np.log(8e-3))))
+    wanted = float(np.exp(rng.uniform(np.log(2e-5), np.log(8e-3))))
     whole = duration if period is None else period
     step = whole / max(1, round(whole / wanted))
     assert divides(step, duration)

@@ -62,9 +62,9 @@ def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
 def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample:
     marched, march = list[float](), system.path
 
-    def counted(other: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
-        path = march(other, engine, speed)
-        marched.append((len(path.times) - 1) * _cells(other))
+    def counted(other_scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
+        path = march(other_scene, engine, speed)
+        marched.append((len(path.times) - 1) * _cells(other_scene))
         return path
 
     with mock.patch.object(system, "path", counted):

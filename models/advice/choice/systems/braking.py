@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import RunFailed
 from models.systems.braking.procedures import engines_of
 from models.systems.braking.run import run
@@ -16,7 +16,7 @@ from models.systems.braking.stop_report import Stop
 ENGINE, WINDOWED = "reference", False
 
 
-def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> RunQuantities:
     """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
@@ -31,7 +31,7 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
             numbers[key] += [*np.atleast_1d(np.asarray(value, float))[:, None]]
         steps += drive.counts()["steps"]
         states = path.states[0].size + path.turning.shape[1] + (scene.pressure is not None) * path.pressures.shape[1]
-    return Answer(
+    return RunQuantities(
         {
             name: Quantity(name.partition("[")[2].rstrip("]"), tuple(cases))
             for name, cases in numbers.items()

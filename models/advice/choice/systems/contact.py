@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import InputError
 from models.systems.contact.run import creepages, run
 from models.systems.contact.scene import ContactScene
@@ -11,13 +11,13 @@ ENGINE, WINDOWED = "reference", False
 QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
-def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -> RunQuantities:
     """Press the bodies and roll them at every creepage."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     forces = run(scene, error=error)
     quantities = {name: Quantity(forces.data[name].attrs["units"], (forces[name],)) for name in QUANTITIES}
-    return Answer(quantities, forces.counts(), forces.seconds)
+    return RunQuantities(quantities, forces.counts(), forces.seconds)
 
 
 def steps(scene: ContactScene) -> int:

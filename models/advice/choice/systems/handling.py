@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.handling.run import REPORTS, run
 from models.systems.handling.scene import HandlingScene
 
@@ -14,7 +14,7 @@ TYRES = ("load", "fx", "fy", "mz")
 """Of every tyre, a case each."""
 
 
-def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> RunQuantities:
     """Drive every manoeuvre."""
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [each.detail for each in runs]
@@ -31,7 +31,7 @@ def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) 
         "states": 2 * len(handling.vehicle.coordinates()),
         "terms": len(handling.waves) * len(handling.vehicle.tyres),
     }
-    return Answer(quantities, counts, sum(each.seconds for each in runs))
+    return RunQuantities(quantities, counts, sum(each.seconds for each in runs))
 
 
 def steps(scene: HandlingScene) -> int:
@@ -49,5 +49,5 @@ def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
 
 
 def coarsen(table: dict[str, Any], scene: HandlingScene, times: int) -> None:
-    """Steps so many times as long."""
+    """The scene with its step multiplied by a whole factor."""
     table.setdefault("run", {})["step"] = times * scene.run.step

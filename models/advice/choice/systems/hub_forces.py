@@ -2,21 +2,21 @@
 
 from typing import Any
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.hub_forces.run import MOTION, run
 from models.systems.hub_forces.scene import HubScene
 
 ENGINE, WINDOWED = "mujoco", True
 
 
-def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> RunQuantities:
     """Measure, and run as the scene holds roll and pitch."""
     path = run(scene, engine, error=error)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION.items()}
     names = path.data["element"].values
     quantities |= {str(name): Quantity("N", (path["section_force"][:, i],)) for i, name in enumerate(names)}
     counts = path.counts()
-    return Answer(
+    return RunQuantities(
         quantities, {"steps": counts["steps"], "calls": counts["force calls"], "states": counts["states"]}, path.seconds
     )
 

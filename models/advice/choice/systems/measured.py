@@ -1,11 +1,12 @@
-"""A recording of a vehicle in space: quantities are its answers at all sections, held as the scene says."""
+"""A recording of a vehicle in space: its quantities are the section forces, with roll and pitch held as in the
+scene."""
 
 import math
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import InputError
 from models.systems.measured.clock import LEAST
 from models.systems.measured.run import Examination, read_files, run
@@ -16,7 +17,7 @@ FINE = 60
 """Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
 
 
-def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> RunQuantities:
     """Record, and march; the seconds are those of the march."""
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
@@ -28,7 +29,7 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
     quantities = {each.name: Quantity(each.unit, (exam.outcome.samples(each),)) for each in forces}
     counts = result.counts()
     called = {"steps": counts["steps"], "calls": counts["force calls"], "states": counts["states"]}
-    return Answer(quantities, called, result.seconds)
+    return RunQuantities(quantities, called, result.seconds)
 
 
 def steps(scene: MeasuredScene) -> int:

@@ -3,7 +3,7 @@
 import time
 from typing import Any
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assemble
 
@@ -12,7 +12,7 @@ CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Calls of a step of methods that do not count them."""
 
 
-def computed_quantities(scene: Scene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
     """Run the scene."""
     assembly = assemble(scene)
     begun = time.process_time()
@@ -24,7 +24,7 @@ def computed_quantities(scene: Scene, engine: str, error: bool = False) -> Answe
     quantities = {
         str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in result.data.data_vars.items()
     }
-    return Answer(quantities, counts, seconds)
+    return RunQuantities(quantities, counts, seconds)
 
 
 def steps(scene: Scene) -> int:

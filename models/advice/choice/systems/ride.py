@@ -5,8 +5,8 @@ from math import gcd
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, Quantity
-from models.advice.ride_choice.in_time import UNIT, InTime, in_time
+from models.advice.choice.answer import Quantity, RunQuantities
+from models.advice.ride_choice.in_time import UNIT, CopiesInTime, in_time
 from models.core.errors import InputError
 from models.engines.spatial_protocol import curves
 from models.systems.ride.of_scene import scene_errors
@@ -16,15 +16,15 @@ from models.systems.ride.scene import RideScene
 ENGINE, WINDOWED = "reference", True
 
 
-def opened(scene: RideScene | InTime) -> InTime:
-    """The scene as it is run in time, which knows its effects and how it is shortened and taken in longer steps."""
-    if isinstance(scene, InTime):
+def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
+    """The scene for runs in time, with its effects and functions that shorten the run and lengthen its steps."""
+    if isinstance(scene, CopiesInTime):
         return scene
     with scene_errors(scene):
         return in_time(ReducedScene.complete(scene))
 
 
-def computed_quantities(scene: InTime, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -> RunQuantities:
     """March the copies at every speed, by their own equations; InputError for another engine."""
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
@@ -44,14 +44,14 @@ def computed_quantities(scene: InTime, engine: str, error: bool = False) -> Answ
         "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
     quantities = {name: Quantity(units[name], tuple(cases), True) for name, cases in squares_of.items()}
-    return Answer(quantities, counts, seconds)
+    return RunQuantities(quantities, counts, seconds)
 
 
-def steps(scene: InTime) -> int:
+def steps(scene: CopiesInTime) -> int:
     """Number of steps of all copies at all speeds."""
     return scene.steps
 
 
-def parts(scene: InTime) -> int:
+def parts(scene: CopiesInTime) -> int:
     """Steps of which whole numbers make up what is run, before and while outputs count."""
     return UNIT // gcd(UNIT, scene.times)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import Answer, Quantity
+from models.advice.choice.answer import Quantity, RunQuantities
 from models.rail.equations import STATES
 from models.systems.wheelset.of_scene import path_speeds
 from models.systems.wheelset.run import run
@@ -13,7 +13,7 @@ from models.systems.wheelset.scene import WheelsetScene
 ENGINE, WINDOWED = "reference", True
 
 
-def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> Answer:
+def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> RunQuantities:
     """Run every path. Of quantities of patches a path begins with the first one, all its times one after the other."""
     paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
     quantities = {
@@ -24,7 +24,7 @@ def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) 
     }
     counts = {key: sum(path.counts()[key] for path in paths) for key in ("steps", "force calls")}
     cells = 2 * scene.contact.cells**2 if scene.contact.law == "fastsim" else 0  # of FASTSIM's nets under both wheels
-    return Answer(
+    return RunQuantities(
         quantities,
         {"steps": counts["steps"], "calls": counts["force calls"], "states": STATES, "terms": cells},
         sum(path.seconds for path in paths),

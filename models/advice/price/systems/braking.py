@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.meshed import chosen, run_and_quantity
 from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
@@ -63,18 +63,18 @@ class PricedBraking:
         """Forces of tyres, once a step, whatever the engine."""
         return "force calls"
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """The one method of braking, its chassis carried by each engine."""
         run = self.scene.run
         values = tuple(run.sample / n for n in sorted({*SUBSTEPS, run.substeps}))
-        return [Ladder(engine, METHOD, values, 1, default=run.sample / run.substeps) for engine in self.engines]
+        return [SettingLadder(engine, METHOD, values, 1, default=run.sample / run.substeps) for engine in self.engines]
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """Twice the steps on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
-        return Ladder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
+        return SettingLadder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """None, as there is no second method: a stop with valves in the loop has one method."""
         return None
 
@@ -87,11 +87,11 @@ class PricedBraking:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path
 
-    def answer(self, solution: tuple[int, BrakingPath]) -> Answer:
+    def answer(self, solution: tuple[int, BrakingPath]) -> PricedRun:
         """One number, as a history that does not change; every step asks for the forces of each wheel once."""
         substeps, path = solution
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
-        return Answer(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
+        return PricedRun(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
         """Steps within a sample."""

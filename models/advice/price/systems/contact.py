@@ -9,10 +9,10 @@ from itertools import islice
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
-from models.core.tables import Block, blocks
+from models.core.tables import RowBlock, blocks
 from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, COLUMNS, solved_rows
 from models.systems.contact.run import run, table_contacts
 from models.systems.contact.scene import ContactScene, Method
@@ -36,7 +36,7 @@ class PricedContact:
 
     scene: ContactScene
     channels: tuple[str, ...]
-    rows: Block | None
+    rows: RowBlock | None
     kink_period = 0.0
     whole = first = 1.0
     counted = "contact cells"
@@ -66,12 +66,12 @@ class PricedContact:
         """What the price leaves out."""
         return "errors are those of cells: how far the theory is off stands beside the forces of a run"
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """Every march of the scene's theory over the cells."""
         name, usual = self.scene.method.name, self.scene.method
         values = tuple(1.0 / n for n in sorted({*CELLS, usual.cells}))
         return [
-            Ladder(name, march or name, values, self._order(march), default=self._default(march), cells=True)
+            SettingLadder(name, march or name, values, self._order(march), default=self._default(march), cells=True)
             for march in MARCHES[name]
         ]
 
@@ -81,15 +81,15 @@ class PricedContact:
     def _order(self, march: str) -> int:
         return int(self._method(march, self.scene.method.cells).order)
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """The march of the highest order on cells that halve."""
         name = self.scene.method.name
         march = MARCHES[name][0]
         values = tuple(1.0 / n for n in REFERENCE)
         said = "half the cells change it by"
-        return Ladder(name, march or name, values, self._order(march), cells=True, said=said)
+        return SettingLadder(name, march or name, values, self._order(march), cells=True, said=said)
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """No other family has the same theory."""
         return None
 
@@ -108,11 +108,11 @@ class PricedContact:
             values = answered[:, [COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
-    def answer(self, solution: tuple[np.ndarray, int]) -> Answer:
+    def answer(self, solution: tuple[np.ndarray, int]) -> PricedRun:
         """Rows stand in for times; one row stands there twice, as a span of time has two ends."""
         values, cells = solution
         values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
-        return Answer(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
+        return PricedRun(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
 
     def lines(self, setting: Setting) -> list[str]:
         """Lines of a scene that set the number of cells and the march."""
@@ -135,7 +135,7 @@ def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, 
     return PricedContact(scene, channels, None if scene.cases is None else _sound_rows(scene))
 
 
-def _sound_rows(scene: ContactScene) -> Block:
+def _sound_rows(scene: ContactScene) -> RowBlock:
     """The first rows of a table that can be answered; InputError where there are none."""
     file = scene.cases_file()
     for block in islice(blocks(file, (BY_AXES, BY_CURVATURES), ROWS), 1):
@@ -144,5 +144,5 @@ def _sound_rows(scene: ContactScene) -> Block:
         sound = np.setdiff1d(np.arange(len(block.lines)), wrong)
         if len(sound):
             columns = {name: column[sound] for name, column in block.values.items()}
-            return Block([block.lines[i] for i in sound], columns, {})
+            return RowBlock([block.lines[i] for i in sound], columns, {})
     raise InputError(file, "", None, f"has no sound row among its first {ROWS:,}")

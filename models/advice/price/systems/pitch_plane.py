@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.result import Result
@@ -94,7 +94,7 @@ class PricedPitchPlane:
         """Every method's work is its force calls."""
         return "force calls"
 
-    def ladders(self) -> list[Ladder]:
+    def ladders(self) -> list[SettingLadder]:
         """Every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and the recommended."""
         ladders = []
         for engine in self.engines:
@@ -107,15 +107,15 @@ class PricedPitchPlane:
                     values = values[:1] if (engine, name) in MISSING else values
                     order = 0 if adaptive else known.order
                     default = DEFAULTS.get((engine, method), 0.0)
-                    ladders.append(Ladder(engine, method, values, order, adaptive, default))
+                    ladders.append(SettingLadder(engine, method, values, order, adaptive, default))
         return ladders
 
-    def reference(self) -> Ladder:
+    def reference(self) -> SettingLadder:
         """The written equations by RK4; each step is half the one before."""
         most = max(1, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
-        return Ladder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
+        return SettingLadder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
-    def second(self, last: Setting) -> Setting | None:
+    def second(self, reference_setting: Setting) -> Setting | None:
         """The second method, LSODA, unless it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 
@@ -129,9 +129,9 @@ class PricedPitchPlane:
         every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
         return run(every_step, engine, settings, self.assembly)
 
-    def answer(self, solution: Result) -> Answer:
+    def answer(self, solution: Result) -> PricedRun:
         """The quantity's channels."""
-        return Answer(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
+        return PricedRun(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
     def lines(self, setting: Setting) -> list[str]:
         """The setting as the scene file holds it."""
@@ -192,7 +192,7 @@ def _lengths(assembly: Assembly) -> tuple[float, float]:
 
 
 def _unit(scene: PricedPitchPlane) -> str:
-    """The one unit of the quantity's channels; InputError for what is no channel, or several units."""
+    """The common unit of the quantity's channels; InputError for an unknown channel, or several units."""
     longest = float(scene.assembly.scene.settings("reference").step or scene.base)
     settings = Settings("RK4", scene.base / math.ceil(scene.base / longest * (1 - 1e-9)), scene.base)
     channels = scene.run("reference", settings).data.data_vars

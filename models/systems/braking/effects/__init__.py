@@ -137,7 +137,7 @@ TABLE = {
         "one answer of the controller per sample",
         {"controllers": 1},
         excludes=MEASURED,
-        why="which leave nothing to a controller",
+        why="which leaves a controller nothing to control",
         usual={"kind": "slip_bang_bang"},
         there=lambda scene: scene.controller.kind != "none",
     ),
@@ -180,7 +180,7 @@ TABLE = {
         "one exchange per sample, and what stands behind it",
         {"asked": 1},
         excludes=MEASURED,
-        why="which leave nothing to ask",
+        why="which leaves no controller that could be asked",
         usual={},
     ),
     "pressure_calibration": _of_sensor(
@@ -292,7 +292,7 @@ TABLE = {
         put_in=_with_slow_apply,
     ),
     "suspension": Entry(
-        "A vehicle from a file on its springs, whose body rolls and pitches as it brakes",
+        "A vehicle with suspension from a vehicle file, whose body rolls and pitches under braking",
         "vehicle.file",
         "every freedom of its file, and a step of an engine around the compiled tyres",
         modules=("models.brake.sprung", "models.engines.braking_sprung"),

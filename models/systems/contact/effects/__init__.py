@@ -106,7 +106,7 @@ TABLE = {
     "profiles": Entry(
         "Cross-sections of wheel and rail, whose patches are looked for",
         "profiles",
-        "a search of where both touch, once, and one contact per patch",
+        "a search for the contact points, once, and a contact computation per patch",
         {"searches": 1},
         **BOUND_BY_CONSTANT_FRICTION,
         leave_out=_without_profiles,

@@ -1,4 +1,4 @@
-"""Pitch drawn by a moment towards what a Kalman filter makes of measured angle and rate, gaps and all.
+"""A moment that draws the pitch towards a Kalman filter's estimate from measured angle and rate, also across gaps.
 
 The filter runs before the simulation and alone, beside a vehicle of the scene's own parameters and forces
 (``pitch_filter``). The simulation then feels two moments. One is what the model's inertia lacks by the filter's
@@ -159,7 +159,7 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     return _LATEST[key]
 
 
-def _read(assembly: Assembly, estimated: "PitchEstimate", measured: "Measurement") -> Guide:
+def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> Guide:
     from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
@@ -168,7 +168,7 @@ def _read(assembly: Assembly, estimated: "PitchEstimate", measured: "Measurement
     relative = np.zeros((8, len(share)))
     relative[KEPT] = estimated.states[:, :6].T
     moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
-    fits = consistency(estimated.innovations, [names[column] for column in measured.columns])
+    fits = consistency(estimated.innovations, [names[column] for column in measurement.columns])
     return Guide(
         estimated.period,
         estimated.states,
@@ -253,9 +253,9 @@ def _assumption(guide: Guide) -> Assumption:
     )
 
 
-def _places_in_intervals(known: Consistency, run: Result) -> Watched:
+def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
     """Where each figure lies in its interval, from -1 to 1."""
-    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in known.figures}
+    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.figures}
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:

@@ -156,7 +156,7 @@ TABLE = {
     "varying_speed": Entry(
         "A speed that varies along the road",
         "drive",
-        "a covariance that is marched, in place of one that is solved",
+        "a covariance integrated in time instead of the stationary solution",
         {"drives": 1},
         modules=("models.ride.varying_speed",),
         leave_out=_hold_mean_speed,
