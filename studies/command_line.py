@@ -18,7 +18,16 @@ from models.core.errors import InputError, RunFailed
 from models.core.whole_files import reason_of
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import causes, checked_study, engines_of, findings_of, load_scene, plain_arrays, plan_of
+from studies.command.asked import (
+    causes,
+    check_by_any,
+    checked_study,
+    engines_of,
+    findings_of,
+    load_scene,
+    plain_arrays,
+    plan_of,
+)
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import given_crew
 from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
@@ -122,6 +131,7 @@ def show(
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
     if not price:
+        check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
         plan = plan_of(loaded).describe(loaded)
         return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search(loaded)]))
     _say_user_code(loaded)

@@ -79,6 +79,27 @@ def test_show_of_a_combination_that_an_engine_refuses(twinrig, capsys):
     assert "exudyn     refused: DVERK6" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "scene,change,said",
+    [
+        ("race_car", "drive.low_pass=1e9", "drive.low_pass = 1000000000.0: must be below 25 Hz"),
+        ("race_car", "options.measurement=nowhere.csv", "options.measurement = 'nowhere.csv': no such file"),
+        ("conicity", "conicity.table=flat.csv", "rows = 1: at least 3 rows of numbers are needed"),
+    ],
+)
+def test_show_refuses_what_no_engine_would_run(twinrig, capsys, scene, change, said):
+    path = Path("flat.csv").resolve()
+    path.write_text("y [m],dr [m]\n0,0\n")
+    assert twinrig("show", scene, "--set", change.replace("=flat.csv", f"={path}")) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("speed,said", [("0", "unstable at 0 m/s"), ("-3", "unstable at -3 m/s"), ("5", "dies out")])
+def test_show_tells_whether_a_bicycle_stays_upright(twinrig, capsys, speed, said):
+    assert twinrig("show", "bicycle", "--set", f"run.speed={speed}") == 0
+    assert said in capsys.readouterr().out
+
+
 def test_run_saves_every_engine_and_prints_json_alone(twinrig, capsys):
     assert twinrig("run", "study_road", *SHORT, "--json") == 0
     said = capsys.readouterr()

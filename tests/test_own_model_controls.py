@@ -59,8 +59,8 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
         late = [first._replace(steps=first.steps + 1), *rest[:-1], rest[-1]._replace(steps=rest[-1].steps - 1)]
         return honest(late if fault == "late" else changed, *words)
 
-    honest = marching._by_build
-    monkeypatch.setattr(marching, "_by_build", wrong)
+    honest = marching.path_by
+    monkeypatch.setattr(marching, "path_by", wrong)
     report = paths(twin, table=table)
     assert not report.alike and report.distances[FILE] > 1e-8
 
@@ -68,7 +68,7 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
 def test_the_ledger_sees_other_controls(twin, tmp_path):
     """The fault: work of the constant controls of the file."""
     legs = read_controls(tmp_path / "controls.csv", twin.model).legs(twin, 500, 0.002)
-    path = marching._by_build(legs, "plain", tuple(rows[0] for rows in random_states(twin, 1)), 0.002)
+    path = marching.path_by(legs, "plain", tuple(rows[0] for rows in random_states(twin, 1)), 0.002)
     assert marching._ledger(legs, path, 0.002) < 1e-5 < 1e-2 < marching._ledger(constant_leg(twin, 500), path, 0.002)
 
 

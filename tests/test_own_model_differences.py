@@ -4,6 +4,7 @@ import pytest
 
 from models.own_model.explain import compare
 from models.own_model.file import read
+from models.own_model.two_paths import paths_apart
 from studies.command.twin import _comparison_lines
 
 FLAGS = '<option><flag gravity="enable"/></option>'
@@ -85,10 +86,25 @@ def test_a_spring_that_one_file_lacks_brings_its_reference(tmp_path):
     assert not comparison.alike and comparison.unexplained < 1e-10
 
 
+def test_paths_of_two_files_are_compared_joint_by_joint(tmp_path):
+    """In another order of bodies the same to rounding, with another spring far apart."""
+    start, end = MODEL.index('<body name="b"'), MODEL.index("</worldbody>")
+    turned = MODEL[:start] + MODEL[end:]
+    turned = turned.replace('<body name="a">', MODEL[start:end] + '<body name="a">')
+    first, second, third = (
+        _twin(tmp_path, text, f"{i}.xml") for i, text in enumerate((MODEL, turned, MODEL.replace('"3"', '"4"')))
+    )
+    assert first.names == second.names[::-1]
+    same, other = paths_apart(first, second), paths_apart(first, third)
+    assert same.distance < 1e-12 and same.horizon == 1.0
+    assert other.distance > 1e-3 and other.worst == "joint 'a'" and "most at joint 'a'" in other.line()
+
+
+def _twin(folder, text, name):
+    path = folder / name
+    path.write_text(text)
+    return read(path).twin
+
+
 def _compared(folder, text):
-    twins = []
-    for name, each in (("a", MODEL), ("b", text)):
-        path = folder / f"{name}.xml"
-        path.write_text(each)
-        twins.append(read(path).twin)
-    return compare(*twins, 3)
+    return compare(_twin(folder, MODEL, "a.xml"), _twin(folder, text, "b.xml"), 3)

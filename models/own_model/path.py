@@ -115,7 +115,7 @@ def paths(
     legs = table.legs(twin, steps, step) if table else constant_leg(twin, steps)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
     for i, build in enumerate((*ENGINES, PLAIN)):
-        _march(build, partial(_by_build, legs, build, (q, v), step), built, failed)
+        _march(build, partial(path_by, legs, build, (q, v), step), built, failed)
         told((i + 1) / (len(ENGINES) + 3))
     held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
     _march(FILE, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
@@ -125,8 +125,8 @@ def paths(
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None, controls=under)
     soft = twin.driven.tied
     calm = PLAIN if soft and PLAIN in built else ENGINES[0]
-    disturbed = _by_build(legs, calm, (q + DISTURBED, v), step)
-    rows = _sliding_rows(legs, first[: _rows(built.get(calm, first), disturbed, steps)])
+    disturbed = path_by(legs, calm, (q + DISTURBED, v), step)
+    rows = _sliding_rows(legs, first[: rows_alike(built.get(calm, first), disturbed, steps)])
     rows, struck = _unlimited_rows(twin, first[:rows])
     base = {FILE: built.get(SOFT, first)} if soft else {}
     distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
@@ -143,13 +143,18 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
     except RunFailed as error:
         failed[name] = error.reason
         return
-    if np.isfinite(path).all() and np.abs(path).max() < LARGEST:
-        built[name] = path
-    else:
+    if blown_up(path):
         failed[name] = "the motion blows up at this step"
+    else:
+        built[name] = path
 
 
-def _by_build(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
+def blown_up(path: np.ndarray) -> bool:
+    """Whether a path has left all measure."""
+    return not (np.isfinite(path).all() and np.abs(path).max() < LARGEST)
+
+
+def path_by(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
     """States (steps + 1, 2 n) of a build from coordinates and rates (n,), leg by leg, by steps of so many seconds."""
     path = np.concatenate(start)[None]
     for leg in legs:
@@ -187,7 +192,7 @@ def file_path(
         model.opt.timestep, model.opt.integrator = before
 
 
-def _rows(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
+def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
     """How many states lie before a disturbance has grown to what counts as different."""
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
     grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= ALIKE * np.maximum(size, 1.0)))

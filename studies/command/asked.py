@@ -61,6 +61,23 @@ def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
     return module
 
 
+def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
+    """InputError for what no engine would run; what only some of them refuse, the scene's plan tells."""
+    try:
+        checked_study(scene, engines)
+    except InputError:
+        if not any(_runs(scene, engine) for engine in engines):
+            raise
+
+
+def _runs(scene: Any, engine: str) -> bool:
+    try:
+        checked_study(scene, (engine,))
+    except InputError:
+        return False
+    return True
+
+
 def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
     """Whether a study needs no array library besides numpy: it has no workers, no units to convert, no user's code."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)

@@ -14,6 +14,7 @@ from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
 from models.own_model.path import PathReport, paths, steps_of_path
 from models.own_model.states import COUNT
+from models.own_model.two_paths import PathGap, paths_apart
 from models.own_model.urdf import Misread, misread
 
 Tell = Callable[[str, float], None]
@@ -63,10 +64,12 @@ class Examined:
 
 @dataclass(frozen=True, eq=False)
 class Twins:
-    """What the command found: one file or two, and their comparison."""
+    """What the command found: one file or two, their comparison, and how far their paths are apart, None where these
+    were not asked for or the files have not the same coordinates."""
 
     examined: tuple[Examined, ...]
     comparison: Comparison | None
+    gap: PathGap | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,7 +128,9 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
     names = [each.name for each in examined]
     if names[0] == names[1]:
         names = [str(path) for path in files]
-    return Twins(tuple(examined), compare(replace(first, name=names[0]), replace(second, name=names[1])))
+    comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
+    gap = paths_apart(first, second) if wanted.paths and comparison.apart is not None else None
+    return Twins(tuple(examined), comparison, gap)
 
 
 def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
@@ -179,7 +184,8 @@ def lines(twins: Twins) -> list[str]:
     rows = list[str]()
     for each in twins.examined:
         rows += _file_lines(each)
-    return rows + (_comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else [])
+    rows += _comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else []
+    return rows + ([twins.gap.line()] if twins.gap is not None else [])
 
 
 def verdict(each: Examined) -> str:

@@ -19,6 +19,17 @@ def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
     scene.whipple.eigenvalues(scene.run.speed, scene.control)
 
 
+def _upright(scene: BicycleScene) -> str:
+    """Whether a small lean dies out at the speed of the run, by the linear equations."""
+    speed = scene.run.speed
+    growth = float(scene.whipple.eigenvalues(speed, scene.control).real.max())
+    if growth <= 0.0:
+        return f"at {speed:g} m/s a small lean dies out, by the linear equations"
+    return (
+        f"unstable at {speed:g} m/s: a small lean grows e-fold in {1.0 / growth:.3g} s, and the bicycle may fall over"
+    )
+
+
 def describe(scene: BicycleScene) -> str:
     """The scene's plan as text."""
     bicycle, run, speeds, tyres = scene.whipple, scene.run, scene.speeds, scene.tyres
@@ -33,6 +44,7 @@ def describe(scene: BicycleScene) -> str:
         "stable": f"without control from the weave speed to the capsize speed: {told}",
         "speeds": f"{speeds.count} from {speeds.start:g} to {speeds.stop:g} m/s, linear equations",
         "run": f"from {run.speed:g} m/s upright with a lean rate of {run.lean_rate:g} rad/s, {run.duration:g} s",
+        "upright": _upright(scene),
         "tyres": f"brushes of {tyres.cells} cells per strip, {tyres.stiffness:g} times as stiff as {tyres.cornering:g} "
         f"of the load per rad and {tyres.vertical:g} N/m",
         "engines": f"bodies and joints, tyres and control by one compiled kernel, Runge-Kutta 4, {run.step:g} s",

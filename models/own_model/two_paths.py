@@ -1,0 +1,55 @@
+"""Paths of two files from one state, by the same build, tableau and step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.engines.free_vehicle import ENGINES
+from models.own_model.control_table import constant_leg
+from models.own_model.elements import short
+from models.own_model.path import DISTURBED, DURATION, blown_up, path_by, rows_alike, steps_of_path
+from models.own_model.reading import TwinModel
+from models.own_model.states import random_states
+
+
+@dataclass(frozen=True)
+class PathGap:
+    """horizon : until when (s) paths are compared, as of ``PathReport``; distance : largest difference of a coordinate
+    or rate up to there, by the largest of the first file, at least 1; worst : whose; failed : why there is none."""
+
+    horizon: float
+    distance: float
+    worst: str
+    failed: str = ""
+
+    def line(self) -> str:
+        """For the terminal."""
+        if self.failed:
+            return f"paths of both files from one state are not compared: {self.failed}"
+        until = "" if self.horizon >= DURATION else f", where a disturbance of {DISTURBED:g} makes them different"
+        return (
+            f"paths of both files from one state, in Exudyn: {short(self.distance)} apart up to {self.horizon:.3g} s"
+            f"{until}; most at {self.worst}"
+        )
+
+
+def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
+    """How far paths over 1 s are apart, at the step of the first file; both have the same names of coordinates."""
+    steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
+    step, order = DURATION / steps, [first.names.index(name) for name in second.names]
+    legs = [constant_leg(twin, steps) for twin in (first, second)]
+    try:
+        with np.errstate(all="ignore"):  # what blows up is told
+            path = path_by(legs[0], ENGINES[0], (q, v), step)
+            disturbed = path_by(legs[0], ENGINES[0], (q + DISTURBED, v), step)
+            other = path_by(legs[1], ENGINES[0], (q[order], v[order]), step)
+    except RunFailed as error:
+        return PathGap(0.0, np.nan, "", error.reason)
+    if blown_up(path) or blown_up(other):
+        return PathGap(0.0, np.nan, "", "the motion blows up at this step")
+    rows, places = rows_alike(path, disturbed, steps), np.argsort(order)
+    there = other[:rows, np.concatenate((places, first.size + places))]
+    apart = np.abs(there - path[:rows]).max(axis=0)
+    at, size = int(apart.argmax()), max(1.0, float(np.abs(path[:rows]).max()))
+    return PathGap((rows - 1) * step, float(apart[at]) / size, first.names[at % first.size])
