@@ -52,6 +52,7 @@ def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
         assert (found.rate[3], found.power[3]) == (pytest.approx(q, rel=1e-9), 1)  # the body walks with the road
 
 
+@pytest.mark.grounds("closed form")
 def test_half_car_splits_into_quarter_cars():
     a, b, v = 1.2, 1.5, 17.0
     front, rear, inertia = split_half_car(CORNER, a, b)
@@ -272,6 +273,7 @@ def test_a_weighted_output_is_that_of_the_quadrature(truck):
     assert found.variance[-1] == pytest.approx(other.variance[at], rel=1e-10)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_the_fast_route_equals_the_direct_one(truck):
     vehicle, roads = truck
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles

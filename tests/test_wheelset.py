@@ -62,6 +62,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
     assert (n_y, n_z) == pytest.approx(tuple(toward), abs=3e-7)
 
 
+@pytest.mark.grounds("closed form")
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
     pose = (y, 0.0, -CHOSEN.tilt * y, 0.0)
@@ -84,6 +85,7 @@ def test_klingels_wave():
     assert 2 * math.pi * 0.2 / slow.imag == pytest.approx(klingel(FREE), rel=1e-4)
 
 
+@pytest.mark.grounds("plain counterpart")
 def test_critical_speed():
     speed = critical_speed(CHOSEN)
     assert abs(growth(CHOSEN, speed)) < 1e-9
@@ -95,6 +97,7 @@ def test_critical_speed():
         critical_speed(CHOSEN.changed(stiffness_x=1e9, stiffness_y=1e9))
 
 
+@pytest.mark.grounds("closed form")
 def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     """Potential energy of the load, by the height at which both cones touch: independent of the written matrices."""
 
@@ -112,6 +115,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     assert heavier[0, 0] == pytest.approx(2 * measured[0], rel=1e-4)  # creep forces do not follow y in the first row
 
 
+@pytest.mark.grounds("closed form")
 def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
     equations = Equations(CHOSEN, 50.0)
     path = equations.run(equations.rest, 0.01, 5e-4)

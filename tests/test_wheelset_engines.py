@@ -25,6 +25,7 @@ LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 both = pytest.mark.parametrize("engine", ENGINES)
 
 
+@pytest.mark.grounds("plain counterpart")
 @both
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
 def test_accelerations_are_those_of_the_equations(engine, law):
@@ -56,6 +57,7 @@ def test_paths_over_a_second():
         assert (path.contacts["power"] <= 0.0).all()
 
 
+@pytest.mark.grounds("plain counterpart")
 @both
 def test_klingels_wave_and_critical_speed(engine):
     assert wavelength(engine, CHOSEN) == pytest.approx(wavelength(Equations, CHOSEN), rel=1e-6)  # 4e-11 seen
@@ -85,6 +87,7 @@ def test_threads_agree_to_the_last_bit():
     assert one.tobytes() == two.tobytes()
 
 
+@pytest.mark.grounds("closed form")
 def test_joints_and_states():
     states = LIVELY * np.random.default_rng(2).normal(size=(4, eq.STATES))
     assert from_joints(to_joints(states)) == pytest.approx(states, abs=1e-15)
