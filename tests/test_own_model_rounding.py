@@ -1,5 +1,7 @@
 """Each coordinate is judged by its own size, and rounding is no difference."""
 
+from dataclasses import replace
+
 import pytest
 
 from models.own_model import certificate as certifying
@@ -66,3 +68,16 @@ def test_rounding_of_a_stiff_constraint_is_no_difference(tmp_path, safe):
     apart = 1.0 + 1e-3
     state = [(q * apart, v) for q, v in states_of(twin, 5)]
     assert agreement("", reference(twin, state, SOFT), moved_at(equations(twin, SOFT), state)).alike
+
+
+@pytest.mark.parametrize("anchor", ["0 0 0", "0 .1 0"])
+def test_rounding_of_what_constraints_stop_is_no_difference(tmp_path, anchor):
+    """A free body that is welded to the ground: its accelerations are 0, and rounding of those of gravity."""
+    mass = '<inertial pos=".1 0 .3" mass="1" diaginertia=".1 .08 .05"/>'
+    text = f"""<mujoco><worldbody><body name="a"><joint name="a" axis="0 1 0"/>{mass}</body><body name="b" pos="0 1 0">
+    <freejoint name="f"/>{mass}</body></worldbody><equality><weld body1="b" anchor="{anchor}"/>
+    </equality></mujoco>"""
+    twin = _read(tmp_path, text).twin
+    assert all(row.alike for row in certificate(twin, 20))
+    heavier = replace(twin.driven, gravity=(1.0 + 1e-8) * twin.driven.gravity)
+    assert not any(row.alike for row in certificate(replace(twin, driven=heavier), 5))

@@ -63,9 +63,13 @@ def _free(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
 
 
 def _constrained(sensitive: Moved, free: Moved) -> Moved:
-    """Sensitivities with those of what constraints take away: where they stop a joint, the rounding of that is left."""
-    force, acceleration = sensitive.force + abs(free.force), sensitive.acceleration + abs(free.acceleration)
-    return sensitive._replace(force=force, acceleration=acceleration)
+    """Sensitivities with those of what constraints take away: where they stop a coordinate, the rounding of the motion
+    of all others is left, weighted with the root of inertia."""
+    weight = np.sqrt(free.mass.diagonal())
+    taken = float((weight * np.abs(free.acceleration)).max())
+    return sensitive._replace(
+        force=sensitive.force + taken * weight, acceleration=sensitive.acceleration + taken / weight
+    )
 
 
 def reach_of(twin: TwinModel) -> float:
