@@ -2,6 +2,7 @@
 machine; and the order in which the long tests begin.
 """
 
+import gc
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import wraps
@@ -12,6 +13,7 @@ import pytest
 
 import models  # noqa: F401  before any test imports numpy: it sets the threads of linear algebra
 
+gc.set_threshold(100_000, 20, 50)  # compiling makes many objects that stay: a twelfth of its time went to counting them
 SEPARATE_FILES = ("test_cases", "test_saved_results")
 """Files whose tests share nothing that takes long to make: each of their tests may be run by another process."""
 LONGEST_FIRST = (
