@@ -29,9 +29,9 @@ class BrakingPath:
     """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest;
-    coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
-    clock on the wall told of overruns, if the run kept to it.
+    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest; coordinates : names
+    of those of the states, the first three always x, y (m) and heading (rad); clock : report of the real-time clock on
+    overruns, if the run kept to one.
     """
 
     times: np.ndarray
@@ -46,8 +46,9 @@ class BrakingPath:
 
 
 class Start(NamedTuple):
-    """State from which a run continues: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in
-    rad/s."""
+    """State from which a run continues: positions and rates (2, 2 + U), and the wheels' speeds of turning (W,) in
+    rad/s.
+    """
 
     state: np.ndarray
     turning: np.ndarray
@@ -144,7 +145,9 @@ class Braked:
     def _moving(
         self, commands: Commands, record: Record, row: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``row`` and in ``motion``, moved on sample by sample; see ``samples``."""
+        """Start the loop that moves the vehicle sample by sample from the state in ``row`` and ``motion``; see
+        ``samples``.
+        """
         air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
@@ -183,7 +186,7 @@ def _tell(commands: Commands, command: Command, braked: bool) -> None:
 
 
 def _take(rows: list[np.ndarray], record: Record) -> None:
-    """Put what was recorded to the rows."""
+    """Append a copy of the recorded rows to ``rows``, and empty the record."""
     rows.append(record.rows[: record.left[0]].copy())
     record.left[0] = 0
 

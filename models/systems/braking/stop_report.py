@@ -27,13 +27,13 @@ LIMITS = (0.2, 0.5)
 
 
 def wheel_names(count: int) -> tuple[str, ...]:
-    """Names of the wheels of a vehicle that has so many with those of what it tows."""
+    """Names of a vehicle's ``count`` wheels, those of towed vehicles included."""
     return (*WHEELS, *TOWED_WHEELS[count - len(WHEELS)])
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Quantities over time of a run: of the first unit's centre of mass, along and across its path.
+    """Time histories of a braking run, for the first unit's centre of mass, along and across its path.
 
     times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
     """
@@ -52,7 +52,7 @@ class Stop:
 
     @property
     def speed(self) -> np.ndarray:
-        """(n,) m/s."""
+        """Speed (n,) of the first unit's centre of mass in m/s."""
         return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
 
     @property
@@ -104,7 +104,7 @@ class Stop:
         return self.path.states[:, 0, places] if places else None
 
     def of_body(self) -> dict[str, float]:
-        """Results of the sprung body over a stop, by name and unit; none of a plane vehicle."""
+        """Results for the sprung body over a stop, by name and unit; empty for a plane vehicle."""
         if self.lean is None:
             return {}
         roll, pitch = np.degrees(self.lean).T
@@ -125,12 +125,14 @@ class Stop:
 
     @property
     def hitch(self) -> np.ndarray | None:
-        """Angle (n,) in rad, positive to the left, of what is towed first against the vehicle; None without a train."""
+        """Angle (n,) in rad from the towing vehicle to the first towed unit, positive to the left; None without a
+        train.
+        """
         units = self.units
         return units[:, 3] - units[:, 2] if units.shape[1] > 3 else None
 
     def of_hitch(self) -> dict[str, float]:
-        """Results of a train's hitch over a stop, by name and unit; none of a vehicle that tows nothing."""
+        """Results for the hitch of a train over a stop, by name and unit; empty for a vehicle that tows nothing."""
         hitch = self.hitch
         if hitch is None:
             return {}
@@ -158,7 +160,8 @@ class Stop:
         }
 
     def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
-        """Results ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
+        """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
+        and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """
@@ -182,5 +185,5 @@ class Stop:
 
 
 def _peak(values: np.ndarray) -> int:
-    """Where the largest magnitude is."""
+    """Index of the value with the largest magnitude."""
     return int(np.argmax(np.abs(values)))

@@ -23,7 +23,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: ContactScene) -> tuple[Finding, ...]:
-    """A doubt about every radius that is not large beside the contact."""
+    """A doubt for every radius of curvature that is not large compared with the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
     from models.systems.contact.run import hertz_of

@@ -131,7 +131,7 @@ class Method(Strict):
 
     @property
     def order(self) -> float:
-        """Power of the size of a cell with which the error of the forces falls."""
+        """Order of convergence: the power of the cell's size with which the error of the forces falls."""
         return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
@@ -199,7 +199,9 @@ def _refuse(scene: ContactScene, *checks: Callable[[ContactScene], Wrong]) -> No
 
 
 def _geometry(scene: ContactScene) -> Wrong:
-    """One geometry; a turned or mirrored rail, and a wheel in mm, are told as what they are."""
+    """Refusals of several geometries or none, and of a turned or mirrored rail and a wheel in mm, which are
+    recognised.
+    """
     tables = [name for name in GEOMETRIES if getattr(scene, name) is not None]
     if len(tables) != 1:
         known = ", ".join(GEOMETRIES)
@@ -249,7 +251,7 @@ def _contact(scene: ContactScene) -> Wrong:
 
 
 def _sizes(scene: ContactScene) -> Wrong:
-    """The theories refuse what is larger, but know neither the file nor the key."""
+    """Refusals of values beyond LARGEST: the theories refuse these, too, but do not know the file and the key."""
     for place, most in LARGEST.items():
         table, key = place.split(".")
         values = {place: getattr(getattr(scene, table), key, None)}
@@ -278,7 +280,7 @@ ON_PROFILES = ("simplified", "exact")
 
 
 def _method(scene: ContactScene) -> Wrong:
-    """No key that the theory would not read, and no theory that the geometry does not fit."""
+    """Refusals of keys that the theory does not read, and of a theory that does not suit the geometry."""
     method = scene.method
     for key in sorted(method.model_fields_set & method.unread()):
         yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
@@ -289,7 +291,7 @@ def _method(scene: ContactScene) -> Wrong:
 
 
 def _friction(scene: ContactScene) -> Wrong:
-    """Friction falls in FASTSIM marched to second order, and not in a table of cases."""
+    """Refusals of falling friction in a table of cases, and in a march that is not of second order."""
     march = scene.method.march
     if scene.falling_friction is None:
         return

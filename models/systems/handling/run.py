@@ -80,8 +80,9 @@ MOTION = {
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A run (times, positions, rates) and its reports: tyres (m, w, REPORTED) and ledgers (m, LEDGER) of ``forces``;
-    CPU seconds of the march."""
+    """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) and ledger (m, LEDGER) : reports of
+    ``forces``; seconds : CPU time of the march.
+    """
 
     handling: Handling
     run: Trajectory
@@ -90,7 +91,7 @@ class Drive:
     seconds: float = 0.0
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """(m, w): a channel of REPORTS."""
+        """A channel (m, w) of REPORTS by its name, with a column for each tyre."""
         return self.tyres[:, :, REPORTS[channel][0]]
 
     @property
@@ -99,7 +100,9 @@ class Drive:
         return self.run.positions[:, :3]
 
     def velocity(self) -> np.ndarray:
-        """(m, 3): velocities ahead and to the left (m/s) below the chassis' centre, yaw rate (rad/s)."""
+        """Motion (m, 3) of the point below the chassis' centre: velocities forward and to the left (m/s), and yaw rate
+        (rad/s).
+        """
         yaw, rates = self.run.positions[:, 2], self.run.rates
         place = chassis_of(self.handling.given).position
         ahead = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * place[1]
@@ -107,21 +110,23 @@ class Drive:
         return np.column_stack([ahead, aside, rates[:, 2]])
 
     def lateral_acceleration(self) -> np.ndarray:
-        """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
+        """Acceleration (m,) in m/s^2 of the point below the chassis' centre, positive to the vehicle's left."""
         ahead, aside, turning = self.velocity().T
         return np.gradient(aside, self.run.times) + ahead * turning
 
     def motion(self) -> dict[str, np.ndarray]:
-        """(m,) of each channel of MOTION."""
+        """The channels (m,) of MOTION by name."""
         ahead, aside, turning = self.velocity().T
         return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
 
     def slip_angles(self) -> np.ndarray:
-        """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
+        """Slip angles (m, w) in rad: direction in which each wheel's contact moves relative to the wheel's plane,
+        positive to the right.
+        """
         return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
 
     def grip(self) -> np.ndarray:
-        """(m, w) N: mu N, the largest horizontal force of each tyre."""
+        """Largest horizontal force (m, w) of each tyre in N, mu N."""
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
@@ -129,14 +134,14 @@ class Drive:
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
-        """(m,) W: of all that the ledgers tell and of the tyres' creep forces."""
+        """Power (m,) in W of everything that the ledgers report and of the tyres' creep forces."""
         ledger = self.ledger
         power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
         return power + self["power"].sum(axis=1)
 
 
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
-    """A manoeuvre, the first where none is named, in "exudyn", "mujoco" or "reference"; its detail is the Drive.
+    """Run a manoeuvre, by default the first, in "exudyn", "mujoco" or "reference"; the result's detail is the Drive.
 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
@@ -151,7 +156,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
 
 
 def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
-    """A drive as the result of a scene's manoeuvre, which says what assumptions it breaks."""
+    """The result of a scene's manoeuvre from its drive, with the assumptions that the drive breaks."""
     vehicle = drive.handling.vehicle
     channels = {
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
@@ -172,7 +177,9 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
-    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
+    """The result with errors of its motion and of its tyres' forces, estimated by longer steps and by other grids of
+    the patch.
+    """
     rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
@@ -225,10 +232,10 @@ class ManoeuvreRerun:
         return principal(read_run(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
-        """Errors of the net, by a run in the same steps with a third of its cells.
+        """Errors of the patch's grid, estimated by a run in the same steps with a third of its cells.
 
-        A net's error does not fall evenly: how many times as large the difference of both runs is as the error, their
-        creep forces at the same states tell, beside those of a net with twice as many cells.
+        The error does not fall evenly with the number of cells. How many times it is contained in the difference of
+        both runs is told by creep forces at the same states, compared with those of a grid with twice as many cells.
         """
         cells = self.drive.handling.tyres.cells
         other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
@@ -247,7 +254,7 @@ class ManoeuvreRerun:
         return told
 
     def _creep(self, cells: int) -> np.ndarray:
-        """Creep forces (m, w, 2) in N at some states of the drive, by a net of so many cells."""
+        """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
         times, positions, rates = (
@@ -259,7 +266,7 @@ class ManoeuvreRerun:
 
 
 def principal(drive: Drive, start_time: float = 0.0) -> Series:
-    """Channels whose error is told, of a drive that begins at a time (s)."""
+    """Channels whose error is estimated, over the time of a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNITS, drive.velocity().T, strict=False))
     return Series(start_time + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
 
@@ -298,8 +305,9 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: the bodies, what acts along their coordinates, and the compiled forces with their
-    whole table."""
+    """The car as engines build it: its bodies, the elements along its coordinates, and the compiled forces with their
+    whole table.
+    """
     parts = joint_parts(handling.vehicle)
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
@@ -368,7 +376,7 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
 
 
 def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
-    """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
+    """Displacement d (m,) of a joint element from positions (m, n), or its rate from rates."""
     places = handling.vehicle.coordinates()
     columns = [places.index(place) for place in element.coordinates]
     return np.asarray(values[..., columns] @ np.array(element.factors))

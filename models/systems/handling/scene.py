@@ -122,13 +122,13 @@ class HandlingScene(SceneFile):
     """Controls of the measured drives that were driven."""
 
     def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
-        """How an engine that picks its own steps marches a manoeuvre; None for Runge-Kutta 4."""
+        """Settings with which an engine marches a manoeuvre in steps that it picks itself; None for Runge-Kutta 4."""
         adaptive = self.engines.get(engine)
         duration = self.manoeuvres[manoeuvre].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
     def handling(self, name: str) -> Handling:
-        """Vehicle, tyres, road and controls of one manoeuvre; a measured drive is marched for its torques, once."""
+        """Vehicle, tyres, road and controls of one manoeuvre. A measured drive is marched once, to find its torques."""
         car = self.car(name)
         if not self.manoeuvres[name].measured:
             return car
@@ -139,7 +139,7 @@ class HandlingScene(SceneFile):
         return car.changed(controls=self._along[name])
 
     def car(self, name: str) -> Handling:
-        """Vehicle, tyres and road of one manoeuvre, and its controls as far as the scene says them."""
+        """Vehicle, tyres and road of one manoeuvre, and those of its controls that the scene gives."""
         manoeuvre, road = self.manoeuvres[name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
@@ -148,7 +148,7 @@ class HandlingScene(SceneFile):
         return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
 
     def drive(self, name: str) -> "MeasuredDrive":
-        """The measured drive of a manoeuvre, as long as the manoeuvre; InputError for a file that holds none."""
+        """The measured drive of a manoeuvre, cut to the manoeuvre's duration; InputError for a file that holds none."""
         from models.measured.drive import read_drive
 
         manoeuvre = self.manoeuvres[name]

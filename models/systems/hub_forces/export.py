@@ -19,7 +19,9 @@ def exported(scene: HubScene, engine: str) -> Exported:
 
 
 def of_cut(engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]) -> Exported:
-    """A cut vehicle; ``further_omissions`` says what else it leaves out."""
+    """Export a cut vehicle; ``further_omissions`` lists what the model leaves out besides hub forces and some
+    elements.
+    """
     division = divide(vehicle.tree, vehicle.elements, engine)
     weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
     driven = Driven(vehicle.tree, weight, np.zeros(1), None, None, division.native)

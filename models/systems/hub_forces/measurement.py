@@ -26,7 +26,7 @@ class HubForces:
     frame: str
 
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
-        """Hub inputs at half steps."""
+        """Hub forces as a run's inputs, sampled at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
         return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
@@ -52,7 +52,9 @@ class Angles:
 def two_tracks(
     vehicle: CutVehicle, left: RoadProfile, right: RoadProfile, speed: float, step: float, steps: int
 ) -> HubInputs:
-    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
+    """Heights and rates of the road under the wheels at half steps. The front axle is at s = v t, and axles behind it
+    reach the same place later.
+    """
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
     for tyre in vehicle.uncut.tyres:
@@ -64,13 +66,14 @@ def two_tracks(
 
 
 def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
-    """The vehicle on its tyres, its hub forces in a frame."""
+    """Run the vehicle on its tyres; its hub forces are expressed in ``frame``."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
 
 def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
-    """Travel (m,) of every spring, mount and bar from the design position by name, m (rad of a bar), positive in
-    compression, along a run."""
+    """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
+    positive in compression.
+    """
     gauges = tuple(element.gauge() for element in vehicle.elements)
     still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
@@ -94,5 +97,5 @@ def model(
     duration: float,
     interpolation: Interpolation = "linear",
 ) -> HubModel:
-    """The cut vehicle on measured hub forces, free."""
+    """Model of the cut vehicle under measured hub forces, without a stabiliser."""
     return build(engine, vehicle, forces.hub_inputs(step, round(duration / step), interpolation), step, duration)
