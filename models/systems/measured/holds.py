@@ -27,7 +27,9 @@ def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHo
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
-    """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
+    """Standard deviations of the noise (SI, by key): as stated, else as estimated but at least those of usual
+    transducers, since filters hide noise.
+    """
     deviations = dict[str, float]()
     for key, quantity in NOISE.items():
         sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])

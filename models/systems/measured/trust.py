@@ -32,7 +32,7 @@ POINTS = 2000
 
 @dataclass(frozen=True)
 class Level:
-    """Error level of a measurement: deviations of forces and moments, bias, initial tilt and rate.
+    """Errors of a measurement: noise of forces and moments, their bias, and the initial error of tilt and rate.
 
     force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
     hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
@@ -51,7 +51,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of a free run by the errors of its measurement.
+    """Drift of a free run that the errors of its measurement cause.
 
     means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
     deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
@@ -91,7 +91,9 @@ class Drift:
         return float(self.times[-1]) if passed is None else passed
 
     def trust(self, angle: float | None = None) -> Trust:
-        """Times by source; ``angle`` (rad) other than that of the section forces: 0.05 rad for the motion itself."""
+        """Time by source of error at which ``angle`` (rad) is passed, by default that of section forces; 0.05 rad for
+        the motion itself.
+        """
         limit = self.angle if angle is None else angle
         times = {name: self.passes(limit, name) for name in ("noise", *self.means)}
         return Trust({**times, "all together": self.passes(limit)}, float(self.rates.max()), limit)
@@ -113,7 +115,7 @@ def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, fra
 
 
 def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray, frame: str) -> np.ndarray:
-    """Size (n, 3) in m of the error of x, y, z at times (n,) of a free run: noise, bias and tilt at the start.
+    """Error (n, 3) in m of x, y, z of a free run at times (n,), from noise, bias and the initial tilt.
 
     Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
     bias alone. One standard deviation of the noise beside the others' means.
@@ -132,7 +134,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 
 @dataclass(frozen=True)
 class _AngleResponse:
-    """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
+    """Response of the rigid vehicle's angles to errors, at times (n,), equally spaced from 0."""
 
     rigid: Rigid
     frame: str
@@ -150,19 +152,19 @@ class _AngleResponse:
         return np.asarray(self._modes[0].real)
 
     def _matrices_of_modes(self, factors: np.ndarray) -> np.ndarray:
-        """Matrices (n, 3, 3) of modal factors (n, 3)."""
+        """Matrices (n, 3, 3) of the angles from the factors (n, 3) of the modes."""
         shapes = self._modes[1]
         return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
 
     @cached_property
     def impulse(self) -> np.ndarray:
-        """G (n, 3, 3): angles after a sudden rate."""
+        """Response G (n, 3, 3) of the angles to a sudden rate."""
         turns = np.outer(self.times, self._modes[0])
         return self._matrices_of_modes(self.times[:, None] * np.sinc(1j * turns / np.pi))
 
     @cached_property
     def step(self) -> np.ndarray:
-        """(n, 3, 3): angles after a tilt."""
+        """Response (n, 3, 3) of the angles to an initial tilt."""
         return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
     def summed(self, values: np.ndarray) -> np.ndarray:

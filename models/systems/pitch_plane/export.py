@@ -20,7 +20,7 @@ INPUTS = {
 
 
 def exported(scene: Scene, engine: str) -> Exported:
-    """The vehicle in "mujoco" or "exudyn"."""
+    """Export the pitch-plane vehicle to "mujoco" or "exudyn"."""
     assembly, subject = assemble(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":

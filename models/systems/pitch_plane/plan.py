@@ -36,7 +36,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: Scene) -> tuple[Finding, ...]:
-    """Queries about the vehicle, and doubts about what drives and what holds it."""
+    """Doubts about implausible parameters of the vehicle, and about the inputs that drive and hold it."""
     doubts = (Finding("input", "doubt", scene.file, text) for text in assemble(scene).doubts)
     return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 

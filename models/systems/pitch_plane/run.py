@@ -70,7 +70,9 @@ def run(
 
 
 def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
-    """``run`` of what may drift off: a run whose error is as large as itself is returned with it, and not refused."""
+    """``run`` for a vehicle that may drift off: a run whose error is as large as its motion is returned and not
+    refused.
+    """
     try:
         return run(scene, engine, error=error)
     except RunFailed as failure:
@@ -100,8 +102,9 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
-    """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
-    the error."""
+    """Rerun in which the engine's own longest step is doubled, too, where the input allows it: this step may dominate
+    the error.
+    """
     try:
         return rerun(replace(settings, step=2.0 * settings.step))
     except InputError:
@@ -113,8 +116,9 @@ def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Se
 
 
 def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """Sizes to which errors of enforced moment and force are related: from the chassis' inertia, as both may be
-    zero."""
+    """Sizes by which errors of the enforced moment and force are divided. They come from the chassis' inertia, as
+    moment and force may be zero.
+    """
     sizes = {}
     if "enforced_moment" in channels:
         sizes["enforced_moment"] = size_of(channels["inertia_term"][2])
@@ -124,8 +128,9 @@ def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
 
 
 def _growth(assembly: Assembly) -> dict[str, float]:
-    """Rms of an error of the pitch over a whole run by that over its first part: a free vehicle under wheel forces
-    tilts ever faster."""
+    """Ratio of the rms pitch error over a whole run to that over its first part: a free vehicle under wheel forces
+    tilts ever faster.
+    """
     if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
         return {}
     from models.drift.growth import pitch_variance
@@ -138,7 +143,7 @@ def _growth(assembly: Assembly) -> dict[str, float]:
 
 
 def _settings_of_longer_step(settings: Settings, times: float, share: float) -> Settings:
-    """Steps so many times as long, over a share of the run, in whole steps."""
+    """Settings with a step ``times`` as long, over ``share`` of the run, rounded to whole steps."""
     step = times * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 

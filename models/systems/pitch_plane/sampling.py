@@ -67,20 +67,23 @@ def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scen
 
 
 def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
-    """The reading with white noise on each sample: ``sampling_rate``, ``deviation``, ``seed`` and ``path`` of p."""
+    """The sampled reading with white noise on each sample; ``p`` has sampling_rate, deviation, seed and path."""
     number = instant_numbers(times, p.sampling_rate)
     noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
     return read_samples(times, values, p.sampling_rate, scene, place) + noise[number]
 
 
 def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
-    """Assumption that a sensor stays within its range; channels by the names of their sensors."""
+    """Assumption that a sensor stays within its range; ``channels`` gives the run's channel for each name of a
+    sensor.
+    """
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
     return Assumption(f"{effect} in range", says, remedy, watching(**channels), unit, -limit, limit)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:
-    """The samples themselves as a file that other effects read: name of its column -> channel of the result.
+    """Write samples to a file that other effects read; ``columns`` gives the result's channel for each name of a
+    column.
 
     Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
     """

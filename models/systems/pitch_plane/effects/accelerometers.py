@@ -57,7 +57,7 @@ class Parameters(Strict):
     path: int = PATH
 
     def positions(self) -> dict[str, tuple[float, float, float]]:
-        """Places (m) of all sensors by name."""
+        """Positions (m) of all sensors by name."""
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
@@ -73,7 +73,7 @@ def readings_of(result: Result, p: Parameters) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Accelerometers:
-    """The sensors as an output of the run."""
+    """Output of a run that gives the readings of the sensors."""
 
     parameters: Parameters
 

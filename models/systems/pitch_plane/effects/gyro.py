@@ -38,7 +38,7 @@ class Parameters(Strict):
 
 @dataclass(frozen=True)
 class Gyro:
-    """The gyro as an output of the run."""
+    """Output of a run that gives the reading of the gyro."""
 
     parameters: Any
 
