@@ -277,8 +277,8 @@ def _examined(examination: Examination, folder: Path, progress: Progress, error:
 
 
 def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
-    """Predict the drift of the free run, which begins level and at rest: from noise, and from the measured initial tilt
-    and rates.
+    """Predict the drift of the free run, which begins level and at rest: from noise, from moments that the motion
+    contradicts, and from the measured initial tilt and rates.
     """
     recording, free = examination.recording, examination.holds[FREE]
     tilt, rate = (

@@ -28,8 +28,9 @@ Alone = Callable[[int], np.ndarray]
 
 
 def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
-    """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
-    fewer speeds between which the quasi-stationary ones are straight."""
+    """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
+    its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly.
+    """
     assert scene.drive is not None
     drive: VaryingSpeed = run.detail
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
@@ -58,7 +59,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
 
 
 def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
-    """The drive up to a time (s)."""
+    """The drive cut off at a time (s)."""
     before = profile.times < end - 1e-9
     times = [*profile.times[before], end]
     return SpeedProfile(times, [*profile.speeds[before], float(profile.speed(end))])
@@ -106,7 +107,7 @@ def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
 def _of_steps(
     vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors and orders (p,) of the copies' deviations at a speed."""
+    """Errors (p,) of the copies' deviations at a speed that their steps cause, and observed orders (p,)."""
     twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
     count = len(twice)
     deviation = np.sqrt(fine.about_mean()[:count].mean(axis=0))
@@ -119,7 +120,9 @@ def _of_steps(
 def _of_gains(
     equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
+    """Errors of deviations by statistical linearisation, from their difference to those of the copies at the copies'
+    speeds.
+    """
     beside = [(equivalents[speed], each) for speed, each in copies.items()]
     gains = np.array([each.covariance.deviation for each, _ in beside])
     true = np.array([each.deviation for _, each in beside])

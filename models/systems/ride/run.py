@@ -53,7 +53,7 @@ def run(
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
-    """Run a scene by the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
+    """Run a scene with the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
 
     vehicle, points : in place of the scene's own. sampling : asks for a run in time, as springs do that are bent and
     tyres that may lift; the reference then answers by statistical linearisation with copies beside, an engine by one
@@ -79,7 +79,9 @@ def run(
 def _deviations_by_speed(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
 ) -> Result:
-    """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
+    """Standard deviations (correlation, speed, output). Assumptions are judged on the scene's own road, or on the last
+    one.
+    """
     from models.ride.sweep import sweep
 
     assert scene.speeds is not None
@@ -111,7 +113,9 @@ def _deviations_by_speed(
 
 
 def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
-    """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
+    """Standard deviations (time, output) along a drive, and the quasi-stationary ones, as if each speed had always been
+    driven.
+    """
     from models.ride.varying_speed import quasi_stationary, varying_speed
     from models.systems.ride.errors_in_time import with_error_of_drive
 

@@ -52,7 +52,9 @@ PARAMETERS = (
 
 
 def plain(source: Path, target: Path) -> Path:
-    """The race's file as a table that scenes take: one of EVERY samples, nothing of what those cannot show."""
+    """Write the race's file as a table that scenes can read: one of EVERY samples, low-passed so that frequencies which
+    these cannot resolve are removed.
+    """
     raw = _raw(source)
     period = float(np.median(np.diff(raw["t"])))
     columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
