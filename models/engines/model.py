@@ -8,7 +8,7 @@ from models.core.trajectory import Trajectory
 
 
 class Model(Protocol):
-    """A vehicle in an engine, or as written equations, with what drives it and how it is marched.
+    """A vehicle in an engine, or as written equations, together with its input and its time integration.
 
     Ride asks beside that for a linear vehicle (``spatial_protocol``), and a braked vehicle, whose wheels take smaller
     steps than its chassis, for single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is
@@ -25,5 +25,5 @@ class Model(Protocol):
         ...
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         ...
