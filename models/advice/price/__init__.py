@@ -32,17 +32,17 @@ class SettingLadder:
     said: str = ""
 
     def setting(self, i: int) -> Setting:
-        """The setting on a rung."""
+        """The setting on rung ``i`` of the ladder."""
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
         return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
 
     def work(self, old_value: float, new_value: float) -> float:
-        """Ratio of the work at one setting's value to that at another: cells lie along and across."""
+        """Ratio of the work with one setting's value to that with another. Cells count along and across the contact."""
         return 1.0 if self.adaptive else (old_value / new_value) ** (2 if self.cells else 1)
 
 
 class InCells(Setting):
-    """One whose value is the share of a contact's length that a cell has."""
+    """A setting whose value is the ratio of a cell's length to that of the contact."""
 
     def label(self) -> str:
         """Number of cells along the contact, as text."""
@@ -51,7 +51,9 @@ class InCells(Setting):
 
 @dataclass(frozen=True)
 class PricedRun:
-    """times (n,) in s from 0; values (n, k) of the quantity's channels, in its unit; counts of what it took."""
+    """Result of a run. times (n,) : s, from 0; values (n, k) : of the quantity's channels, in its unit; counts : of the
+    work that the run took.
+    """
 
     times: np.ndarray
     values: np.ndarray
@@ -68,7 +70,7 @@ class PricedScene(Protocol):
 
     @property
     def quantity(self) -> str:
-        """The quantity that the tolerance is set on."""
+        """Name of the quantity to which the tolerance applies."""
         ...
 
     @property
@@ -78,12 +80,12 @@ class PricedScene(Protocol):
 
     @property
     def whole(self) -> float:
-        """Length of the scene's run, s."""
+        """Duration (s) of the scene's run."""
         ...
 
     @property
     def first(self) -> float:
-        """Length (s) of the first part of the run, in which settings are searched."""
+        """Duration (s) of the first part of the run, in which settings are searched."""
         ...
 
     @property
@@ -98,7 +100,7 @@ class PricedScene(Protocol):
 
     @property
     def counted(self) -> str:
-        """Name among the counts of what work is counted in."""
+        """Name of the count that measures the work, such as force calls."""
         ...
 
     def ladders(self) -> list[SettingLadder]:
@@ -110,17 +112,19 @@ class PricedScene(Protocol):
         ...
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """A setting of another family that must agree with the reference's last one; None where there is none."""
+        """A setting of another family of methods that must agree with the reference's finest one; None where there is
+        none.
+        """
         ...
 
     def solve(self, setting: Setting, duration: float) -> Any:
-        """Build and run; InputError or RunFailed where that cannot be done."""
+        """Build and run the scene with a setting; InputError or RunFailed where this is impossible."""
         ...
 
     def answer(self, solution: Any) -> PricedRun:
-        """The quantity in what ``solve`` gave."""
+        """The quantity, read from what ``solve`` returned."""
         ...
 
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as a scene file holds it."""
+        """Lines of a scene file that contain the setting."""
         ...

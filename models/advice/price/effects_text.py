@@ -16,7 +16,7 @@ ROUNDING_CHANGE = 1e-12
 
 
 def lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    """Lines of text: the cost of the scene, then every effect with its cost and its changes."""
+    """Text of a price list: the cost of the scene, then every effect with its cost and the changes that it makes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
@@ -74,7 +74,7 @@ def _counts(price: EffectPrice) -> str:
 
 
 def _changes(price: EffectPrice, quantities: list[str]) -> str:
-    """The quantities that were asked for, or those that change most."""
+    """Text on the changes of the requested quantities, or of those that change most."""
     asked = [change for change in price.changes if change.name in quantities]
     shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
     return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
