@@ -287,8 +287,8 @@ class Chooser:
         return self.ended
 
     def told(self, omitted_effects: Set, times: int) -> np.ndarray:
-        """Predicted changes (quantities,) if effects are left out and the step is lengthened as well; the effect of the
-        step comes from a shorter one.
+        """Predicted changes (quantities,) if effects are left out and the step is lengthened as well. What the step
+        changes comes from a comparison with a shorter step.
         """
         screen, runs = self.teller, self.whole.variants
         change = screen.change(omitted_effects) if omitted_effects else None
