@@ -181,7 +181,7 @@ def named_coordinates(twin: TwinModel) -> dict[str, int]:
 
 
 def _bare(name: str) -> str:
-    """Name of a joint without its type, as a user types it."""
+    """Name of a joint as a user types it, without its type."""
     return name.removeprefix("joint ").replace("'", "")
 
 

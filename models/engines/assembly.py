@@ -20,7 +20,7 @@ Channels = dict[str, tuple[str, str, np.ndarray]]
 
 @dataclass(frozen=True)
 class Assembly:
-    """A pitch-plane system to compute: effects extend it, engines read it.
+    """A pitch-plane system to be computed. Effects extend it, and engines build models from it.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Assembly:
 
     @property
     def guided(self) -> tuple[int, ...]:
-        """Coordinates that the input prescribes; empty for most modes."""
+        """Indices of the coordinates that the input prescribes; empty for most modes."""
         return GUIDED.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":

@@ -113,7 +113,7 @@ class OnSprings:
 
     @cached_property
     def _on_engine(self) -> OnEngine:
-        """Data for time steps of a vehicle whose tyres answer without lag."""
+        """Data that time steps need for a vehicle whose tyres respond without lag."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,
@@ -143,8 +143,8 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
-        """Advance the vehicle as ``models.brake.advance.advance`` does, the state (2, n) having all coordinates and
-        their rates.
+        """Advance the vehicle as ``models.brake.advance.advance`` does; the state (2, n) has all coordinates and their
+        rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.

@@ -80,7 +80,7 @@ class Written(FreeModel):
         return rates
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
+        """Coordinates and rates (steps + 1, 2 n) at every step of the classical Runge-Kutta method."""
         states = np.empty((steps + 1, 2 * len(q)))
         states[0] = np.concatenate((q, v))
         march(self.numbers, states, step)
@@ -97,7 +97,8 @@ class HubModel:
     def __init__(
         self, engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, settings: Settings, forces: Route = "compiled"
     ) -> None:
-        """Refused where the step does not divide the duration or the inputs are not one row per half step.
+        """Build the model. Refused where the step does not divide the duration, or where the inputs do not have one row
+        per half step.
 
         settings : "RK4", or an integrator of the engine that picks its own steps.
         forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
@@ -133,7 +134,7 @@ class HubModel:
         return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
+        """Accelerations (n,) at a time (s), from coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
@@ -175,7 +176,7 @@ class HubModel:
             parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
-        """Contents of the built model: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         return self.model.plan()
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:
@@ -198,7 +199,9 @@ class HubModel:
         return reported(self.vehicle, self.numbers, times, states)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
-        """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""
+        """Generalised forces (n,) on all joints (N, N m) that the compiled forces exert at time 0, at coordinates (n,)
+        with zero rates.
+        """
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()

@@ -34,7 +34,7 @@ Reader = Callable[[Any, float, float], float]
 
 @dataclass
 class Build:
-    """Handles of what was put into Exudyn's system.
+    """Exudyn's system while it is being built, with handles of its items.
 
     places maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
     """
@@ -47,7 +47,7 @@ class Build:
 
 
 def _exact_bodies(assembly: Assembly) -> Build:
-    """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
+    """The vehicle as point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     built = Build(container, mbs)
@@ -270,7 +270,9 @@ class ExudynModel:
         set_start(self.built.mbs, *whole)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
+        """Accelerations (4,) at a time (s), from coordinates and rates (4,) by Exudyn's own residual and mass
+        matrix.
+        """
         accelerations = self._free_acceleration(time, q, v)
         accelerations[list(self.assembly.guided)] = self._prescribed_accelerations(time)
         return accelerations
@@ -290,7 +292,7 @@ class ExudynModel:
         return np.linalg.solve(*mass_force)[self._columns]
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         data = self.built.mbs.systemData
         return {
             "degrees of freedom": 4,
@@ -340,7 +342,7 @@ class ExudynModel:
         options.timeIntegration.generalizedAlpha.resetAccelerations = False
 
     def _recorded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (n,) and states (n, 8) from the sensors; heave is y, pitch the rotation."""
+        """Times (n,) and states (n, 8) as the sensors stored them; Exudyn's y is the heave, its rotation the pitch."""
         read = self.built.mbs.GetSensorStoredData
         halves = [[read(sensor) for sensor in sensors] for sensors in self._sensors]
         times = halves[0][0][:, 0]
@@ -352,7 +354,7 @@ class ExudynModel:
         return grid if fixed else times, np.column_stack(states)
 
     def _enforced(self) -> np.ndarray | None:
-        """Enforced force and moment (n, constraints): the multipliers, with the sign of loads on the chassis.
+        """Enforced force and moment (n, constraints): the Lagrange multipliers, with the sign of loads on the chassis.
 
         Exudyn has no multipliers at t = 0 yet; those follow from the accelerations of the start.
         """

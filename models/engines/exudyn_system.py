@@ -58,7 +58,7 @@ def quiet_settings() -> Any:
 
 
 def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
-    """Sensors that store the coordinates of every node, and those that store their rates."""
+    """Add sensors that store the coordinates of every node, and sensors that store their rates."""
     return [
         [
             mbs.AddSensor(

@@ -87,7 +87,7 @@ class Build:
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
-        """Number of coordinates of a node."""
+        """Number of coordinates that a node has."""
         return sum(node == each for each, _ in self.places.values())
 
     def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ class Model(Protocol):
     """
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (n,)."""
+        """Accelerations (n,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (n,)."""
         ...
 
     def run(self) -> Trajectory:

@@ -252,7 +252,7 @@ class MujocoModel:
         return padded
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
         out = np.empty(4)
         with installed(self.drive.law):
             out[self.free] = self._free_acceleration(time, q, v, round(time / self.settings.step))

@@ -102,7 +102,8 @@ def pushing_law() -> Any:
 
 @cache
 def body_fixed_law() -> Any:
-    """Callback for wheel forces along the chassis' vertical axis: from the table or, where held, from the controls.
+    """Callback for wheel forces along the chassis' vertical axis, read from the table or, if they are held, from the
+    controls.
 
     A column of the table beyond those of the forces is a moment on the chassis.
     """

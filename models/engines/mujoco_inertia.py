@@ -61,7 +61,7 @@ def _turning_freedoms(body: Body) -> list[str]:
 
 
 def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
-    """Bodies whose axes are always parallel to those of a body."""
+    """Names of the bodies whose axes always remain parallel to those of ``name``."""
 
     def leader(name: str) -> str:
         body = vehicle.body(name)

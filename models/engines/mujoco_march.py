@@ -18,7 +18,7 @@ FORCE_CALLS = {"RK4": 4}
 
 
 def warnings(data: mujoco.MjData) -> str:
-    """MuJoCo's own warnings as a phrase; empty if there are none."""
+    """Text with MuJoCo's own warnings; empty if there are none."""
     names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
     return f"; MuJoCo warned {', '.join(names)}" if names else ""
 

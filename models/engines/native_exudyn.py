@@ -183,7 +183,7 @@ def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
 
 
 class Coordinates:
-    """Connectors and constraints between coordinates of one node."""
+    """Builder of connectors and constraints between coordinates of one node."""
 
     def __init__(self, build: Build, node: Any) -> None:
         self.built, self.node, self.markers = build, node, dict[int, Any]()

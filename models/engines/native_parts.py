@@ -51,7 +51,7 @@ class AxialTravel:
 
     @property
     def design(self) -> float:
-        """axis . (tip - foot) in the design position."""
+        """Design value of the travel: axis . (tip - foot) in the design position."""
         return float(self.axis @ (self.tip - self.foot))
 
 
@@ -81,7 +81,7 @@ class GroundSpring:
 
 @dataclass(frozen=True)
 class LineSpring:
-    """A spring and damper along the straight line between points of two bodies, None for the ground.
+    """A spring and damper along the straight line between points of two bodies; None means the ground.
 
     Both are drawn together by F = stiffness (l - length) + damping l', l their distance (m); first_point, second_point
     in the design position, m; length in m, stiffness in N/m, damping in N s/m.

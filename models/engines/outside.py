@@ -104,8 +104,7 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
 
 
 def _call_engine(name: str, question: str, function: Callable, *arguments: Any) -> Any:
-    """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
-    errors."""
+    """The value that a function of an outside engine returns; RunFailed for any exception but the project's own."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
@@ -195,7 +194,9 @@ class Guarded:
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) at a time (s), coordinates and rates (4,), which the class gets as one state (8,)."""
+        """Accelerations (4,) at a time (s), from coordinates and rates (4,), which the outside class receives as one
+        state (8,).
+        """
         answer = _call_engine(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
         return _answer_as_array(self.name, "acceleration", answer, (4,))
 

@@ -109,7 +109,7 @@ class Reference:
         return Trajectory(times, states, enforced, counts)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
         return derivative_of(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:

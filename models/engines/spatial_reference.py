@@ -59,7 +59,7 @@ class SpatialReference:
         self.size = len(self.index)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
+        """Accelerations (n,) from positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
         self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
         for body in self.vehicle.bodies:

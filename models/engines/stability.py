@@ -121,7 +121,7 @@ def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndar
 
 
 def growth(integrator: str, step: float, duration: float, linear: Linear) -> float:
-    """Natural logarithm of the growth of the fastest growing mode over a run; 0 if none grows."""
+    """Natural logarithm of the factor by which the fastest growing mode grows over a run; 0 if none grows."""
     matrix = step_matrix(integrator, step, linear)
     if matrix is None:
         return 0.0
@@ -130,7 +130,7 @@ def growth(integrator: str, step: float, duration: float, linear: Linear) -> flo
 
 
 def limit(integrator: str, step: float, duration: float, linear: Linear) -> float:
-    """Longest step (s) below an unstable one at which no mode grows over the run, to four digits."""
+    """Longest step (s), to four digits, at which no mode grows over the run; the search starts at an unstable step."""
     allowed, stable = math.log(GROWTH), step / 2
     while growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
         stable /= 2

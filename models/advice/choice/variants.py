@@ -99,7 +99,7 @@ class Variants:
         return self.scene.beside(name) if self._opened else with_effects(self.scene, name)
 
     def says(self, name: str) -> str:
-        """Sentence on what an effect is, or what leaving it out means."""
+        """Sentence that describes an effect, or what leaving it out means."""
         told = self.scene.said if self._opened else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 

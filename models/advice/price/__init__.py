@@ -13,7 +13,7 @@ from models.advice.price.problem import Setting
 
 @dataclass(frozen=True)
 class SettingLadder:
-    """Settings of one engine's method, from coarse to fine.
+    """Settings of one method of an engine, ordered from coarse to fine; each is a rung.
 
     values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
     declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not its
@@ -61,7 +61,7 @@ class PricedRun:
 
 
 class PricedScene(Protocol):
-    """Protocol of a priced scene, which the search for settings uses."""
+    """Protocol of a scene that can be priced: what the search for the cheapest settings needs."""
 
     @property
     def title(self) -> str:
@@ -90,7 +90,7 @@ class PricedScene(Protocol):
 
     @property
     def kink_period(self) -> float:
-        """Time between kinks of the quantity, s; 0 where there are none."""
+        """Time (s) between points where the quantity is not smooth; 0 where there are none."""
         ...
 
     @property
@@ -108,7 +108,7 @@ class PricedScene(Protocol):
         ...
 
     def reference(self) -> SettingLadder:
-        """Settings that are refined until the truth is known; each step is half the one before."""
+        """Ladder of the settings that are refined until the truth is known; each step is half the one before."""
         ...
 
     def second(self, reference_setting: Setting) -> Setting | None:

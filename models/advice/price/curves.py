@@ -28,7 +28,8 @@ def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float
 
 
 def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
-    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to EQUAL_ERROR_SHARE.
+    """Groups of curves (name -> {setting: error}) that coincide: their errors at all common settings agree to
+    EQUAL_ERROR_SHARE.
 
     At least three settings must be common: two curves that merely cross are not the same.
     """

@@ -46,7 +46,7 @@ def _micros(spread: tuple[float, float]) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """A number with so many digits, without an exponent where a number is large."""
+    """A number as text with ``digits`` significant digits, without an exponent even if it is large."""
     large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
@@ -89,7 +89,7 @@ def _changed(change: QuantityChange) -> str:
 
 
 def as_dict(prices: PriceList) -> dict[str, Any]:
-    """The price list as plain values for JSON; None for what is not finite."""
+    """The price list as plain values for JSON; values that are not finite become None."""
     plain: dict[str, Any] = _plain(asdict(prices))
     return plain
 

@@ -69,7 +69,7 @@ class MeshedScene(ABC):
 
     @abstractmethod
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as the scene file holds it."""
+        """Lines of a scene file that contain the setting."""
 
     @property
     def counted(self) -> str:

@@ -28,7 +28,7 @@ class Setting:
 
     @property
     def curve(self) -> str:
-        """Name of the curve that the setting lies on."""
+        """Name of the work-precision curve to which the setting belongs."""
         return f"{self.engine} {self.method}"
 
     def label(self) -> str:
@@ -42,7 +42,7 @@ class Solver(Protocol):
     """A model that has been built and can be run."""
 
     def run(self) -> Any:
-        """Solve; raises RunFailed rather than give a wrong answer."""
+        """Solve the problem; raises RunFailed rather than give a wrong answer."""
         ...
 
 
@@ -75,7 +75,7 @@ class Problem(Protocol):
         ...
 
     def build(self, setting: Setting) -> Solver:
-        """A model ready to run; raises Refused where the engine would answer wrongly."""
+        """A model of the problem, ready to run; raises Refused where the engine would answer wrongly."""
         ...
 
     def errors(self, solution: Any) -> dict[str, float]:

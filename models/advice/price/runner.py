@@ -113,7 +113,7 @@ class MeasuredPoints:
 
     @property
     def costs(self) -> tuple[str, str]:
-        """Names of the two costs: the unit of counted work, and seconds."""
+        """Names of the two kinds of cost: the count that measures the work, and seconds."""
         return next(kind for kind in WORK if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
@@ -130,7 +130,7 @@ class MeasuredPoints:
         return HOLLOW * self.uncertainty[quantity or self.quantity]
 
     def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
-        """Points of each curve, from coarse to fine; None takes every status."""
+        """Points of each curve with this status, from coarse to fine; None means any status."""
         points_of = defaultdict(list)
         for p in sorted(self.points, key=lambda p: -p.setting.value):
             if status in (None, p.status):
@@ -173,7 +173,7 @@ class MeasuredPoints:
         return wrong
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
-        """Cost at which each curve meets ``target``, in one of ``costs``; curves that do not meet it are left out."""
+        """Cost of the kind ``kind`` at which each curve meets ``target``; curves that do not meet it are left out."""
         reaches = {
             curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
@@ -183,7 +183,7 @@ class MeasuredPoints:
     def _reach(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
-        """``curves.reach`` on the points of one curve."""
+        """Cost at which the points of one curve meet a target, by ``curves.reach``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
         return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)

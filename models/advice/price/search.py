@@ -119,7 +119,7 @@ class Search:
                 low = i + 1
 
     def meeting(self, engine: str = "") -> list[TriedSetting]:
-        """The tried settings that meet the tolerance, of one engine or of all."""
+        """Outcomes of the settings, of one engine or of all, that meet the tolerance."""
         return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
     def meets(self, attempt: TriedSetting) -> bool:

@@ -122,7 +122,7 @@ def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | 
 
 
 def _failures(tried: tuple[TriedSetting, ...]) -> list[str]:
-    """Settings without an answer, by method, with the reason of the last one that was tried."""
+    """Lines on settings without an answer, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[TriedSetting]](list)
     for attempt in tried:
         if attempt.status != "ok":

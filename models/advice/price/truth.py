@@ -54,7 +54,7 @@ class ReferenceTruth:
 
     @property
     def size(self) -> float:
-        """Largest magnitude of the quantity."""
+        """Largest magnitude of the quantity over the run."""
         return float(np.abs(self.answer.values).max())
 
 

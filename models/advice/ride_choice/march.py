@@ -73,7 +73,7 @@ class March:
 
     @cached_property
     def longest(self) -> float:
-        """Longest stable step (s)."""
+        """Longest step (s) at which the vehicle's march is stable."""
         return self.reduced.of_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
@@ -168,7 +168,7 @@ class RunInSteps(Protocol):
 
     @property
     def longest(self) -> float:
-        """Longest stable step (s)."""
+        """Longest step (s) at which the run is stable."""
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""

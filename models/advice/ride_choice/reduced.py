@@ -127,7 +127,7 @@ class Roads:
         return self._numbers.of(ride, lambda: (ride.road, *tables_of(ride)))
 
     def of(self, scene: ReducedScene) -> Excitation:
-        """The road of a scene."""
+        """The road of a reduced scene, made when it is first requested."""
         number = self.number(scene)
         if number not in self._made:
             self._made[number] = scene.excitation()
@@ -194,7 +194,7 @@ class Vehicles:
 
 
 def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:
-    """The speed (m/s) on which a vehicle's matrices depend; None where they do not."""
+    """The speed (m/s) if the vehicle's matrices depend on it, else None."""
     return speed if vehicle.side_forces or vehicle.drags else None
 
 

@@ -81,7 +81,9 @@ class Sensitivity:
 
 
 def _sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Real part of sums over frequencies of back (w, q, i) times moved (v, w, q, j): (v, q, i, j)."""
+    """Real part (v, q, i, j) of the sums over frequencies w of products of ``back`` (w, q, i) and ``moved`` (v, w, q,
+    j).
+    """
     left = np.concatenate([back.real, -back.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
     right = np.concatenate([moved.real, moved.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
     return np.asarray(left @ right)

@@ -67,7 +67,7 @@ def at_axles(
 
 @dataclass(frozen=True)
 class CornerPair:
-    """Two corners (1/m) of an axle's filter."""
+    """Two corners (1/m) of an axle's filter, whose product contributes to the spectral density."""
 
     corners: tuple[complex, complex]
 
@@ -149,6 +149,6 @@ def variances(
 
 
 def weighting_factors(weightings: Sequence[str], omega: np.ndarray) -> np.ndarray:
-    """Factors (q, w) of weightings by their names, 1 for "", at angular frequencies (rad/s)."""
+    """Factors (q, w) of frequency weightings, by their names, at angular frequencies (rad/s); 1 for the name ""."""
     frequency = omega / (2 * np.pi)
     return np.array([WEIGHTINGS[name].response(frequency) if name else np.ones(len(omega)) for name in weightings])

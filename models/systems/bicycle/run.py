@@ -82,8 +82,9 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
 
 
 def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
-    """Run the bicycle on tyres in an engine with a step (s); rows are at most ROWS_APART steps apart, the work counts
-    all steps."""
+    """Run the bicycle on its tyres in an engine with a step (s). Recorded rows are at most ROWS_APART (s) apart, while
+    the work counts all steps.
+    """
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*straight(rolling.bicycle, run.speed, run.lean_rate))

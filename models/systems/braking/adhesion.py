@@ -71,13 +71,14 @@ class Utilised:
 
     @property
     def epsilon(self) -> float:
-        """Adhesion utilisation by the anti-lock system: at least 0.75 of a category 1 system; above 1 calls for k to be
-        measured again."""
+        """Adhesion utilisation by the anti-lock system. Category 1 requires at least 0.75; above 1, k must be measured
+        again.
+        """
         return self.z / self.k_vehicle
 
 
 def axles(scene: BrakingScene) -> Axles:
-    """Loads and lengths of the scene's vehicle."""
+    """Axle loads, wheelbase and height of the centre of mass of the scene's vehicle."""
     truck = vehicle_of(scene)
     weight = truck.mass * GRAVITY
     front = weight * -truck.rear.x / truck.wheelbase
@@ -91,7 +92,9 @@ def trailer_loads(vehicle: Braked, z: float) -> np.ndarray:
 
 
 def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
-    """The scene's vehicle with its trailer, if no change takes that away, on one surface everywhere."""
+    """The scene's vehicle on the same surface everywhere; ``changes`` replace values of the scene, for example its
+    trailer.
+    """
     road = RoadTable(stretches=[Stretch(left=surface)])
     return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
 

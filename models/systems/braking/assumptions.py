@@ -47,7 +47,7 @@ CORNERING = 1e-3
 
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
-    """Assumptions of a braking procedure, with the vehicle that drives it."""
+    """Assumptions of a braking procedure with a given vehicle."""
     parts = (
         _of_loads(scene),
         _of_bodies(scene, vehicle),
@@ -58,7 +58,9 @@ def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[As
 
 
 def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
-    """Assumptions on the loads of a plane vehicle; springs carry their loads as they are."""
+    """Assumptions on the wheel loads of a plane vehicle; none for a vehicle on its suspension, whose springs carry the
+    loads.
+    """
     if scene.vehicle.file is not None:
         return
     if scene.load_transfer is None:
@@ -245,7 +247,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
 
 
 def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator[Assumption]:
-    """Assumptions on pressures, torques and the valves behind them."""
+    """Assumptions on brake pressures, brake torques and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(

@@ -103,7 +103,9 @@ def repeatable(scene: BrakingScene) -> bool:
 
 
 def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
-    """Whether a controller in the loop, or something unknown behind the port, has let pressures fall."""
+    """Whether pressures fall in a run because a controller in the loop, or something unknown at the port, released
+    brakes.
+    """
     none = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
     return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 

@@ -89,7 +89,7 @@ class Braked:
         return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
 
     def rolling(self, speed: float) -> Start:
-        """Steady rolling along x at a speed (m/s)."""
+        """Start state of steady rolling along x at a speed (m/s)."""
         state = np.zeros((2, len(self.coordinates)))
         state[1, 0] = speed
         return Start(state, speed / self.plane.radius)
@@ -139,7 +139,7 @@ class Braked:
 
     @property
     def on_road(self) -> OnRoad:
-        """The vehicle on its road as compiled functions take them."""
+        """The vehicle and its road in the form that compiled functions take."""
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
@@ -166,7 +166,7 @@ class Braked:
 def on_tyres(
     plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = UNIFORM_ROAD, **more: Any
 ) -> Braked:
-    """A vehicle whose wheels point straight ahead, all with the same kind of tyre where no other is named.
+    """A vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
 
     tyres : tables, surface by surface and kind by kind; more : as of ``Braked``.
     """

@@ -30,7 +30,7 @@ SPRUNG_ENGINE = "mujoco"
 
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
-    """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
+    """The scene's vehicle with its brakes on the road of a procedure; InputError for parts that are inconsistent."""
     plane, known = plane_of(scene), (*NAMES, *scene.tyres.files)
     for name, scale in scene.tyres.scale.items():
         if name not in known:
@@ -97,7 +97,7 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
 
 
 def sprung_of(scene: BrakingScene) -> Any:
-    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
+    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
     from models.brake.sprung import sprung
 
     return sprung(spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
@@ -195,7 +195,7 @@ def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
 
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
-    """Brake of one axle's wheels."""
+    """Law of the brakes on one axle's wheels."""
     brake: BrakeTable = getattr(scene.brakes, axle)
     return read(
         Brake,
@@ -211,7 +211,7 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
 
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
-    """Chambers of all wheels; without dynamics their time constants are zero."""
+    """Brake chambers of all wheels; without the table [pressure] their time constants are zero."""
     pressure, none = scene.pressure, np.zeros(wheels)
     if pressure is None:
         return Chambers(none, none, scene.brakes.supply)

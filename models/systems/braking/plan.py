@@ -157,7 +157,7 @@ def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:
 
 
 def user_code(scene: BrakingScene) -> str:
-    """Code of the user's that a run of the scene executes, "" if there is none."""
+    """Name of the user's own code that a run of the scene executes, "" if there is none."""
     named = [key for key in ("callable", "command", "fmu") if getattr(scene.port, key, None) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
 

@@ -155,14 +155,14 @@ class Circle:
     sprung: bool = False
 
     def state(self, unknown: np.ndarray) -> np.ndarray:
-        """Positions and rates (2, n)."""
+        """Positions and rates (2, n) for these unknowns."""
         both = np.zeros((2, unknown.size + 1))
         both[0, 3:], both[1, 2 : 3 if self.sprung else None] = unknown[2:], self.speed / self.radius
         both[1, :2] = self.speed * np.cos(unknown[1]), self.speed * np.sin(unknown[1])
         return both
 
     def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and speeds of turning (W,) of the wheels."""
+        """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
         vehicle, state, steer = self.vehicle, self.state(unknown), steered(self.vehicle, unknown[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
@@ -185,12 +185,12 @@ class Circle:
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
 
     def turn(self, unknown: np.ndarray) -> SteadyTurn:
-        """The steady turn with which a procedure begins."""
+        """The steady turn, with which a procedure begins, for these unknowns."""
         return SteadyTurn(steered(self.vehicle, unknown[0]), Start(self.state(unknown), self.motion(unknown)[1]))
 
 
 def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
-    """The steady ``Circle`` of a vehicle; None if there is none.
+    """The steady circle (see ``Circle``) of a vehicle; None if there is none.
 
     That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
     """

@@ -57,20 +57,20 @@ class Stop:
 
     @property
     def way(self) -> np.ndarray:
-        """Length (n,) of the path so far in m."""
+        """Distance (n,) in m along the path since the start."""
         steps = np.diff(self.path.states[:, 0, :2], axis=0)
         return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
 
     @property
     def side_slip(self) -> np.ndarray:
-        """Angle (n,) from the vehicle's x axis to its velocity in rad; 0 where it is slower than SLOWEST."""
+        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where it is slower than SLOWEST."""
         course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
         angle = np.remainder(course - self.path.states[:, 0, 2] + np.pi, 2.0 * np.pi) - np.pi
         return np.where(self.speed > SLOWEST, angle, 0.0)
 
     @property
     def across(self) -> np.ndarray:
-        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, to the left."""
+        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, positive to the left."""
         before, after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
         size = np.maximum(self.speed[:-1], 1e-9)
         change = (after - before) / np.maximum(self.lengths, 1e-12)[:, None]
@@ -99,7 +99,9 @@ class Stop:
 
     @property
     def lean(self) -> np.ndarray | None:
-        """Roll to the right and pitch nose down (n, 2) in rad of a vehicle on its suspension, None of a plane one."""
+        """Angles (n, 2) in rad of a vehicle on its suspension: roll to the right, and pitch nose down; None for a plane
+        vehicle.
+        """
         places = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
         return self.path.states[:, 0, places] if places else None
 
@@ -116,7 +118,9 @@ class Stop:
 
     @property
     def units(self) -> np.ndarray:
-        """Positions (n, 2 + U): of the first unit's centre (m), and the headings (rad) of all, on a suspension too."""
+        """Positions (n, 2 + U): of the first unit's centre (m), then the headings (rad) of all units; also for a
+        vehicle on its suspension.
+        """
         places = self.path.states[:, 0]
         if self.lean is None:
             return places
@@ -180,7 +184,7 @@ class Stop:
         }
 
     def locks(self) -> Locks:
-        """Locks of the wheels above 15 km/h."""
+        """Table of the wheels' locks above 15 km/h."""
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 

@@ -31,7 +31,8 @@ COURSE = {"aside": 1.0, "yaw": 5.0}
 @dataclass(frozen=True)
 class Stops:
     """Ensemble of stops: path i brakes from speed (1 + spread e_i), where e_i is standard normal and depends on the
-    seed and i alone. ``table`` is the scene's."""
+    seed and i alone. ``table`` : the scene's tables.
+    """
 
     table: Mapping[str, Any]
     file: str

@@ -75,7 +75,7 @@ def answer_table(
     executor: Executor | None = None,
     store: Store | None = None,
 ) -> dict[str, int]:
-    """Answer the table at ``path`` into ``output_path``; returns how many rows there are and how many were wrong.
+    """Answer the table at ``path`` into ``output_path``; returns the numbers of all rows and of refused rows.
 
     errors : whether the answer has columns of errors, which take the forces again on half the cells. executor :
     computes the blocks of rows; store : keeps those that are finished (see ``models.ensemble.runner``). Raises

@@ -114,7 +114,7 @@ def run(
     answers: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Result:
-    """Forces of a scene at every creepage, with ``Rolls`` as detail; or of its table of cases.
+    """Compute the forces of a scene at every creepage, with ``Rolls`` as detail; or answer its table of cases.
 
     error : whether to state how far forces are off, which takes another evaluation of each on half the cells; what is
     assumed is judged always. fields : whether the
@@ -278,7 +278,7 @@ def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: Simplif
 
 
 def touches(scene: ContactScene, built: Built) -> list[TouchingPlace]:
-    """Where the profiles of a scene touch."""
+    """Places at which the wheel's and the rail's profile touch."""
     p = scene.profiles
     assert p is not None
     return wheel_on_rail(
@@ -303,7 +303,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProf
 
 
 def hertz_of(scene: ContactScene) -> Hertz:
-    """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
+    """Hertz' contact from semi-axes, curvatures or radii, under a load or at an approach."""
     built = scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:

@@ -49,7 +49,7 @@ class Radii(Strict):
     rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
 
     def curvatures(self, file: str) -> tuple[float, float]:
-        """A and B (1/m); raises InputError for a radius of zero or bodies that do not touch on an ellipse."""
+        """Curvatures A and B (1/m); InputError for a radius of zero, or bodies that do not touch on an ellipse."""
         for name, radius in self:
             if radius == 0:
                 raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
@@ -169,7 +169,7 @@ class ContactScene(SceneFile):
         return next(name for name in GEOMETRIES if getattr(self, name) is not None)
 
     def cases_file(self) -> Path:
-        """The file of cases."""
+        """Path of the file with the table of cases."""
         assert self.cases is not None
         return self.path(self.cases.file, "cases.file")
 

@@ -72,12 +72,14 @@ class ContactCase:
 
     @property
     def limit(self) -> float:
-        """mu N (N)."""
+        """Largest tangential force mu N in N."""
         return self.friction * self.load
 
     @property
     def motion(self) -> Motion:
-        """xi_x, xi_y and spin (1/m): ``level`` 1 is where a single creepage reaches mu N by the linear theory."""
+        """Creepages xi_x and xi_y, and spin (1/m). At ``level`` 1 a single creepage reaches mu N by the linear
+        theory.
+        """
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
         unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
@@ -85,7 +87,7 @@ class ContactCase:
 
     @property
     def force(self) -> Array:
-        """Exact force divided by mu N, (2,)."""
+        """Exact force (2,) divided by mu N: fx and fy."""
         return np.array([self.fx, self.fy])
 
     def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:

@@ -87,7 +87,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
 
 
 def _unbuilt_stops(handling: Handling) -> list[Assumption]:
-    """Assumptions on coordinates whose stops are not built."""
+    """Assumptions that coordinates stay within their stops, for stops that the model does not have."""
     places = handling.vehicle.coordinates()
     return [
         Assumption(

@@ -9,7 +9,7 @@ AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll 
 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
-    """The vehicle of the first manoeuvre in "mujoco" or "exudyn" without springs, tyres and driver."""
+    """Export the vehicle of the first manoeuvre to "mujoco" or "exudyn", without springs, tyres and driver."""
     handling = scene.car(next(iter(scene.manoeuvres)))
     return of_handling(
         engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]

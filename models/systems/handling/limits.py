@@ -23,7 +23,7 @@ yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."
 
 
 def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
-    """Refuse a run whose car turns over or whose train jackknifes: the model does not hold from there on."""
+    """Refuse a run in which the car turns over or the train jackknifes, as the model is invalid from then on."""
     for body, freedoms, most, what in _bounds(h):
         columns = [
             i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms

@@ -96,7 +96,7 @@ class Drive:
 
     @property
     def path(self) -> np.ndarray:
-        """(m, 3): x, y (m) of the chassis' place on the road, and yaw (rad)."""
+        """Path (m, 3) of the chassis on the road: x, y (m) and yaw (rad)."""
         return self.run.positions[:, :3]
 
     def velocity(self) -> np.ndarray:
@@ -130,7 +130,7 @@ class Drive:
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
-        """(m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
+        """Utilised friction (m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
@@ -195,7 +195,9 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreRerun:
-    """Reruns of a drive in an engine, from a speed (m/s), with other steps or another mesh of the tyre's patch."""
+    """Function that repeats a drive in an engine, from a speed (m/s), with other steps or another grid of the tyres'
+    patches.
+    """
 
     engine: str
     drive: Drive
@@ -208,7 +210,7 @@ class ManoeuvreRerun:
 
     @cached_property
     def in_double_step(self) -> Series:
-        """The manoeuvre in twice the step; raises RunFailed."""
+        """Series of the manoeuvre in twice the step; raises RunFailed."""
         return self._with_net(self.drive.handling.tyres.cells, 2.0)
 
     def _with_net(self, cells: int, factor: float) -> Series:
@@ -272,7 +274,7 @@ def principal(drive: Drive, start_time: float = 0.0) -> Series:
 
 
 def _later(handling: Handling, start_time: float) -> Handling:
-    """A copy of the manoeuvre that starts at a time (s)."""
+    """The same manoeuvre with time counted from ``start_time`` (s)."""
 
     def moved(control: Control) -> Control:
         return tuple((time - start_time, value) for time, value in control)
@@ -290,7 +292,7 @@ def _later(handling: Handling, start_time: float) -> Handling:
 
 
 def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
+    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
     division, whole = divided(handling, engine), driven_by(handling)
@@ -333,8 +335,9 @@ def driven_adaptively(engine: str, handling: Handling, speed: float, settings: S
 
 @contextmanager
 def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
-    """Report that a failed march failed because its car turned over: engines cannot integrate the motion that
-    follows."""
+    """Context in which a march fails with the message that the car turned over, where that is the reason: engines
+    cannot integrate the motion that follows.
+    """
     try:
         yield
     except RunFailed as error:
@@ -344,7 +347,9 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
 
 
 def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """``reported`` for a run with fixed steps; RunFailed where the steps are too long for the motion."""
+    """The drive from a run in fixed steps, as from ``reported``; RunFailed where the steps are too long for the
+    motion.
+    """
     drive = reported(handling, run, engine, seconds)
     check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
@@ -352,7 +357,9 @@ def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
 
 
 def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """Reports of a run; RunFailed where a tyre's force is not finite, or the car turns over."""
+    """The drive from a run, with the reports of its tyres; RunFailed where a tyre's force is not finite, or the car
+    turns over.
+    """
     report, ledger = _reports(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
@@ -361,7 +368,9 @@ def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
 
 
 def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
-    """Tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; the reference has its own."""
+    """Reports of the tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; for the reference they come from its own
+    equations.
+    """
     if engine == REFERENCE:
         return _plain(handling).report(run.times, run.positions, run.rates)
     count, tyres = len(run.times), len(handling.vehicle.tyres)

@@ -99,7 +99,7 @@ class Manoeuvre(Strict):
     rough: bool = Field(default=False, description="on the rough road of [road], else on a flat one")
 
     def controls(self) -> Controls:
-        """Steering and drive of the driver over time."""
+        """Steering, brakes and drive of the driver over time."""
         steer, brake, drive = (
             tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
         )
@@ -160,11 +160,11 @@ class HandlingScene(SceneFile):
         return replace(read, **{key: getattr(read, key)[:count] for key in ("times", "steer", "speed")})
 
     def begins(self, name: str) -> float:
-        """Time (s) at which results of a manoeuvre begin: that of the measured file, or else 0."""
+        """Time (s) at which the results of a manoeuvre begin: the start of its measured file, or else 0."""
         return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
 
     def given(self) -> SpatialVehicle:
-        """The vehicle of the file with what it tows, its cornering stiffness as [tyres] says."""
+        """The vehicle of the file and the bodies that it tows, with its cornering stiffness scaled as in [tyres]."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
         if not (ratios := self.tyres.cornering):
             return vehicle
@@ -190,7 +190,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
 
 
 def _with_measured(scene: HandlingScene) -> HandlingScene:
-    """The scene with speed and duration of its measured drives; refuses a manoeuvre that has no speed."""
+    """The scene with the speed and duration of each measured drive filled in; refuses a manoeuvre that has no speed."""
     filled = dict[str, Manoeuvre]()
     for name, manoeuvre in scene.manoeuvres.items():
         if manoeuvre.measured:
@@ -203,7 +203,7 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
 
 
 def _measured(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
-    """A measured drive with its speed and duration; refuses what contradicts the file."""
+    """A manoeuvre with the speed and duration of its measured drive; refuses keys that contradict the measured file."""
     file, place, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
     for control in LIMITS:
         if getattr(manoeuvre, control) != AT_REST:
@@ -230,7 +230,7 @@ def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None
 
 
 def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
-    """Refuse times that do not rise, values beyond the limits, and a change that no step of the run sees."""
+    """Refuse times that do not rise, values beyond the limits, and changes that are too fast for the run's step."""
     (times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")

@@ -35,7 +35,7 @@ class SteadyTurn:
 
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
-    """Closed form of the vehicle at a speed (m/s), at its static wheel loads."""
+    """Steady turn in closed form at a speed (m/s), for the static wheel loads."""
     free = handling.vehicle
     mass = sum(body.mass for body in free.bodies)
     centre = sum(body.mass * body.position[0] for body in free.bodies) / mass

@@ -145,7 +145,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
 
 
 def _balanced(vehicle: CutVehicle) -> Assumption:
-    """Assumption that measured forces carry the vehicle."""
+    """Assumption that the measured vertical forces carry the vehicle's weight on average."""
     return Assumption(
         "balance",
         "over the run the vertical forces carry the weight",
@@ -170,7 +170,7 @@ def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: floa
 
 
 def _sampled(scene: HubScene, road: Road) -> Assumption:
-    """Assumption on the sampling of a virtual measurement."""
+    """Assumption that a virtual measurement samples fast enough for the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
     other = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""

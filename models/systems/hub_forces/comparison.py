@@ -38,7 +38,7 @@ class Comparison:
 
     @property
     def results(self) -> dict[str, Result]:
-        """The true run, where it is known, and all others, by their names."""
+        """All results by name: the true run, if it is known, and all other runs."""
         return {**({"true": self.truth} if self.truth else {}), **self.runs}
 
     def errors(self, run: Result) -> np.ndarray:
@@ -63,7 +63,7 @@ class Comparison:
         return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
     def drift_off(self, run: Result) -> float:
-        """First time (s) at which roll or pitch is off by DRIFTED; infinite if never."""
+        """First time (s) at which the error of roll or pitch exceeds DRIFTED; infinite if it never does."""
         off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFTED
         return float(run.times[np.argmax(off)]) if off.any() else float("inf")
 

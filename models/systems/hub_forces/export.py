@@ -12,7 +12,7 @@ AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose 
 
 
 def exported(scene: HubScene, engine: str) -> Exported:
-    """The cut vehicle in "mujoco" or "exudyn" without hub forces and stabiliser."""
+    """Export the cut vehicle to "mujoco" or "exudyn", without hub forces and stabiliser."""
     vehicle = scene.cut_vehicle()
     held = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
     return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), held)

@@ -15,7 +15,8 @@ from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
 @dataclass(frozen=True)
 class HubForces:
-    """Measured hub forces: samples (m, 6 h), N and N m hub by hub, the first at t = 0, ``period`` (s) apart.
+    """Measured hub forces. samples (m, 6 h) : N and N m hub by hub, the first at t = 0; period : time (s) between
+    samples.
 
     frame : "hub", axes of what carries the wheel; "body", of the chassis; "inertial", of the space. x forward, y
     left, z up; the force acts on the hub from outside, the moment about the hub.
@@ -38,7 +39,9 @@ class HubForces:
 
 @dataclass(frozen=True)
 class Angles:
-    """Measured roll, pitch and their rates (m, 4), rad and rad/s, every ``period`` (s) from t = 0 on."""
+    """Measured angles. samples (m, 4) : roll, pitch (rad) and their rates (rad/s), the first at t = 0; period : time
+    (s) between samples.
+    """
 
     samples: np.ndarray
     period: float

@@ -105,7 +105,7 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
 
 
 def _frames(vehicle: CutVehicle) -> str:
-    """Text on the bodies in whose axes the elements' axes are fixed."""
+    """Text that names the bodies to which the axes of the elements are fixed."""
     others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
     return "; ".join(["in the chassis' axes", *others])
 
@@ -126,7 +126,7 @@ def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
 
 
 def _noise(scene: HubScene) -> str:
-    """Text on the noise of every sample, stated of files or added to a virtual measurement."""
+    """Text on the noise of every sample: stated for files, or added to a virtual measurement."""
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"

@@ -70,7 +70,7 @@ class Measurement:
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
-        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` guides roll and pitch.
+        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` holds roll and pitch.
 
         Raises InputError.
         """
@@ -95,13 +95,13 @@ class Measurement:
 
 
 def enforced(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
-    """Hub inputs with measured angles enforced, once through a low-pass of ``smoothing`` (Hz); raises InputError."""
+    """Hub inputs with measured roll and pitch enforced, after a low-pass of ``smoothing`` (Hz); raises InputError."""
     quiet = smoothed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
     return with_angles(hub_inputs, quiet, angles.period, step)
 
 
 def with_angles(hub_inputs: HubInputs, angles: np.ndarray, period: float, step: float) -> HubInputs:
-    """The hub inputs with roll and pitch (m, 2), rad, enforced: a quintic spline through the samples."""
+    """Hub inputs with enforced roll and pitch (m, 2), rad, interpolated by a quintic spline through the samples."""
     motion = Smooth(angles, period, derivatives=2, degree=5)
     return replace(hub_inputs, guide=motion.sample(0.0, step / 2, len(hub_inputs.hubs)))
 
@@ -190,7 +190,7 @@ def principal(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Seri
 
 
 def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Channels whose values are more than a small share of the largest channel's in the same unit."""
+    """Channels that vary by more than a small share of the variation of the largest channel with the same unit."""
     change = {name: float(np.std(values)) for name, values in channels.items()}
     most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
     largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)
@@ -209,7 +209,8 @@ def run(
     measurement: Measurement | None = None,
     error: bool = False,
 ) -> Result:
-    """The cut vehicle on its hub forces; the result's detail is the HubRun. Raises InputError, Refused, RunFailed.
+    """Run the cut vehicle under its hub forces; the result's detail is the HubRun. Raises InputError, Refused,
+    RunFailed.
 
     method : what holds roll and pitch, the scene's own where none is named; measurement : of the scene, where it was
     made before, as for runs in several engines; else this engine makes it. error : whether the error of the steps is

@@ -92,7 +92,8 @@ class TiltFilter:
         self.state = FilterState()
 
     def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Estimates (n, 4) and deviations at samples of hub forces (n, 6 h) and angles (n, 4), NaN where not measured.
+        """Estimates (n, 4) and their standard deviations at samples of hub forces (n, 6 h) and angles (n, 4), which are
+        NaN where not measured.
 
         The first sample is the last one of the block before. Raises InputError where angles and forces contradict
         one another, or are infinite.

@@ -70,7 +70,7 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
 
 
 def find(source: Source, name: str, file: str, place: str) -> Channel:
-    """The one channel of a file with this name; InputError that offers the nearest ones."""
+    """The channel of a file with this name; InputError, with the most similar names, if there is not exactly one."""
     alike = [channel for channel in source.channels if channel.name == name]
     if len(alike) == 1:
         return alike[0]
@@ -83,7 +83,7 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
 
 
 def _similar_channels(name: str, source: Source) -> str:
-    """Phrase with the channels of a file that are most like a name, or else the first ones."""
+    """Text with the channels of a file whose names are most similar to ``name``, or else with its first channels."""
     plain = {channel.name.casefold(): channel.name for channel in source.channels}
     close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]
     if close:

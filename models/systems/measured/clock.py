@@ -85,7 +85,8 @@ def record(
     folder: Path,
     progress: Progress = no_progress,
 ) -> Recording:
-    """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
+    """Bring mapped signals of opened files onto one clock, store them as columns in ``folder``, and apply the scene's
+    effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
     Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
@@ -241,7 +242,9 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
 def _columns(
     folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
 ) -> Columns:
-    """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
+    """Columns of this recording, new or begun earlier from the same files; InputError where the folder holds other
+    ones.
+    """
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
     now = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}

@@ -16,7 +16,9 @@ NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "an
 
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
-    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
+    """For each run by name, the way in which roll and pitch are held: free, and by the stabiliser that the scene
+    names.
+    """
     stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
     held = {
         stabilised.method: AttitudeHold(

@@ -55,7 +55,7 @@ class StepGrid:
         return max(round(self.step / self.period), 1)
 
     def check(self, file: str = "") -> None:
-        """InputError unless step and period are multiples of one another."""
+        """Raise InputError unless one of step and period is a multiple of the other."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
             fitting = f"must be a part or a multiple of the recording's period of {self.period:g} s"
@@ -119,7 +119,7 @@ class Inputs:
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
     def wrenches(self, first: int, count: int) -> np.ndarray:
-        """Hub forces (n, 6 h), N and N m, samples ``first`` .. first + count - 1; components not measured are 0."""
+        """Hub forces (count, 6 h), N and N m, at samples from ``first`` on; components that were not measured are 0."""
         return self._block(self.hubs, first, count, 0.0)
 
     def around(self, first: int, count: int) -> np.ndarray:
@@ -176,7 +176,7 @@ class Prescribed:
     """
 
     def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
-        """``bandwidth`` : Hz, of the low-pass over the whole recording; InputError where an angle is missing."""
+        """``bandwidth`` (Hz) : of a low-pass over the whole recording. InputError where an angle is missing."""
         whole = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(whole).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")

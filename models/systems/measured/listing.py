@@ -115,7 +115,7 @@ def guess(channel: Channel) -> ChannelGuess | None:
 
 
 def _words_of_name(name: str) -> str:
-    """Words of a name in small letters, parted by spaces."""
+    """Words of a name in lower case, separated by spaces."""
     return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
 
 
@@ -137,7 +137,8 @@ def _has_words(names: str, words: str) -> bool:
 
 
 def describe(path: Path) -> str:
-    """Channels with unit, rate, samples, times and range; what the reader noticed; a scene with a guessed map.
+    """Text on a file: its channels with unit, rate, samples, times and range, remarks of the reader, and a scene with a
+    guessed channel map.
 
     All but the scene is in comments: the whole is a scene file.
 
@@ -206,5 +207,5 @@ def _row(name: str, guess: ChannelGuess | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A TOML string."""
+    """A text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)

@@ -58,7 +58,7 @@ class PlaneJob:
 
     @property
     def effect(self) -> str | None:
-        """Name of the effect that holds the pitch."""
+        """Name of the effect that holds the pitch; None for a free run."""
         return EFFECTS.get(self.hold.method)
 
 
@@ -163,7 +163,7 @@ def trusted_time(scene: Scene, deviation: float) -> Trust | None:
 
 
 def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
-    """Vertical force (n,) of an axle, short gaps bridged; InputError for a long one, or a wheel that is missing."""
+    """Vertical force (n,) of an axle with short gaps bridged; InputError for a long gap or a missing wheel."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
         whole, left, right = map(repr, AXLES[axle])

@@ -33,7 +33,7 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
 
 
 def opened(scene: MeasuredScene) -> tuple[Source, ...]:
-    """The files of a scene; raises InputError."""
+    """The scene's files, opened; raises InputError."""
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 

@@ -93,7 +93,7 @@ class Examination:
 
     @property
     def stopped(self) -> bool:
-        """Whether an error in the recording forbids a run."""
+        """Whether the recording has an error because of which no run is made."""
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
@@ -112,7 +112,9 @@ class Examination:
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
 
     def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
-        """Section forces and moments of a run at the sections that the scene names, all if none."""
+        """Section forces and moments of a run at the sections that the scene names, or at all sections if it names
+        none.
+        """
         wanted = self.scene.hand_on.sections
         return [answer for answer in forces(outcome.answers) if wanted is None or answer.section in wanted]
 
@@ -157,7 +159,7 @@ def run(
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
-    """Run a recording held as its scene says; the result's detail is the Examination.
+    """Run a recording with roll and pitch held as the scene says; the result's detail is the Examination.
 
     folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole_run : whether
     the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
@@ -299,7 +301,7 @@ def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
 
 
 def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
-    """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
+    """Mean (rad, rad/s) of an angle or a rate over its first tenth of a second; 0 where it is not measured."""
     for signal in recording.find(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0

@@ -175,7 +175,7 @@ class MeasuredScene(SceneFile):
         }
 
     def plane(self) -> Parameters | None:
-        """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
+        """Parameters of the vehicle if it is one in the pitch plane, None for a vehicle in space; raises InputError."""
         parameters = self.vehicle.parameters
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 

@@ -75,7 +75,7 @@ class SectionRun:
 
     @property
     def grid(self) -> StepGrid:
-        """Steps on the recording's clock."""
+        """Steps of the run, in relation to the recording's samples."""
         return StepGrid(self.step or self.recording.period, self.recording.period)
 
     @property
@@ -235,7 +235,9 @@ class _March:
         self._save()
 
     def _marched(self, model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
-        """States of a block until its end or until the vehicle topples, and the failure that says when."""
+        """States of a block until its end or until the vehicle topples, and in the latter case the failure with its
+        time.
+        """
         began, steps = self.done * self.grid.period * self.grid.skip, model.steps
         try:
             states = model.marched(*np.split(self.state, 2)).states

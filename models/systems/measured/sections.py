@@ -118,7 +118,7 @@ def names(vehicle: CutVehicle) -> tuple[str, ...]:
 
 
 def guided(vehicle: CutVehicle) -> tuple[str, ...]:
-    """Bodies that ride on the chassis or on one another."""
+    """Names of the bodies that are guided by the chassis or by another body."""
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 

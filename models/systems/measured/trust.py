@@ -45,7 +45,7 @@ class Level:
     rate: Sequence[float] = (0.0, 0.0)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
-        """Standard deviations (6 h,), hub by hub."""
+        """Standard deviations (6 h,) of the samples' noise, N and N m hub by hub."""
         return np.tile(np.repeat([self.force, self.moment], 3), len(vehicle.hubs))
 
 
@@ -64,7 +64,7 @@ class Drift:
     frame: str = "hub"
 
     def passes(self, angle: float = ANGLE, source: str | None = None) -> float | None:
-        """First time (s) at which half of all runs have roll or pitch off by more than ``angle`` (rad).
+        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad).
 
         source : one of ``means`` or "noise" alone; None: all together.
         """
@@ -81,12 +81,12 @@ class Drift:
 
     @property
     def angle(self) -> float:
-        """Error (rad) from which on the section forces of a free run are not trusted."""
+        """Error (rad) of roll or pitch beyond which the section forces of a free run are not trusted."""
         return ANGLE if self.frame == "inertial" else UPRIGHT
 
     @property
     def trusted(self) -> float:
-        """Time (s) until which the section forces of a free run are trusted; at most that of the run."""
+        """Time (s) until which the section forces of a free run are trusted; at most the duration of the run."""
         passed = self.passes(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
@@ -100,7 +100,9 @@ class Drift:
 
 
 def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
-    """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
+    """Drift of a free run under hub forces that are given in a frame and sampled every ``period`` (s), over a duration
+    (s).
+    """
     body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
     noise = period * body.turning(level.deviations(vehicle))
     spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))

@@ -208,7 +208,8 @@ def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Ch
 
 
 def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:
-    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and ``scene.toml`` beside it.
+    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and a ``scene.toml`` that reads
+    this file.
 
     Returns the scene's path. Raises InputError where a file exists or the format has no room for the channels.
     """
@@ -228,12 +229,12 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
 
 
 def _toml(value: object) -> str:
-    """A TOML value: text, number, truth or a list of these."""
+    """TOML text of a value: a string, number, boolean or list of these."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
-    """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
+    """TOML lines of the table [[files]] for a file with these channels; ``offset`` (s) is added to the file's clock."""
     lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
         entry = {key: getattr(signal, key) for key in ("channel", "quantity", "at", "component", "frame")}

@@ -65,11 +65,13 @@ class NoisePaths:
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
-        """The whole run of one path; raises RunFailed if it leaves all bounds."""
+        """Trajectory of one path over the whole run; RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, or its RunFailed; raises PathFailed for failures that are not of the simulated physics."""
+        """Trajectory of each path, or its RunFailed; PathFailed for a failure that is not one of the simulated
+        physics.
+        """
         for path in paths:
             try:
                 yield self.trajectory(path)
@@ -97,7 +99,7 @@ class NoisePaths:
         return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the paths depend on."""
+        """Everything on which the paths depend, by name."""
         forces = self.base.input
         return {
             "engine": self.engine,
@@ -175,7 +177,9 @@ class MujocoThreads(NoisePaths):
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, from one call of ``rollout``; a path that MuJoCo warned of is run again alone."""
+        """Trajectory of each path, all from one call of ``rollout``. If MuJoCo warns, the paths are run again one by
+        one.
+        """
         models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
         times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)

@@ -41,7 +41,7 @@ class PathStatistics:
 
     @property
     def first(self) -> Arrays:
-        """Arrays of the first paths."""
+        """Arrays of the first ``saved`` paths."""
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 
     @property

@@ -122,7 +122,7 @@ KNOWN = 1e-6
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measured pitch and/or pitch rate.
+    """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
     period : s; columns : PITCH, RATE or both; deviations : white noise of each column, per sample
@@ -191,7 +191,7 @@ class PitchFilter(ExtendedKalmanFilter):
         self._seen = [self._model_of_columns(there) for there in range(1 << len(measurement.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
-        """State and Jacobians over step number ``u``.
+        """Predict the state and its Jacobians over step number ``u``.
 
         A force sample that is read linearly acts on the step before it, too. That part, ``late``, is not in P: it
         joins one step later, with what the same sample does then. So the noise that joins is white, and the

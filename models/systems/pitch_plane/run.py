@@ -82,7 +82,9 @@ def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
 
 
 def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
-    """The result with the error of its principal channels, at all steps and not at the saved rows alone."""
+    """The result with the errors of its principal channels, estimated from all steps and not only from the saved
+    rows.
+    """
     engine, names = run.data.attrs["engine"], principal(assembly)
     fine, sizes = _series(run.detail.times, channels, names), _sizes(assembly, channels)
     method = CATALOGUE[engine][settings.integrator]
@@ -179,7 +181,7 @@ def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> 
 
 
 def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
-    """The input at the saved times: on a uniform grid, or one by one for adaptive engines."""
+    """The input at the saved times, sampled on a uniform grid or, for adaptive engines, time by time."""
     if assembly.input is None:
         return None
     step = times[1] - times[0]

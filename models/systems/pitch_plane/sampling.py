@@ -26,7 +26,7 @@ NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, 
 
 
 def check_rate(scene: Scene, place: str, rate: float) -> None:
-    """Refuse, before a run, a sampling rate whose instants fall between the rows of an engine."""
+    """Refuse, before a run, a sampling rate whose sampling times are not at steps of an engine."""
     if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
         raise InputError(scene.file, place, rate, NO_ROW)
     for engine in CATALOGUE:
@@ -40,7 +40,7 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
 
 
 def check_end(scene: Scene, place: str, file: str, end: float) -> None:
-    """Refuse a file that ends (s) before the run does."""
+    """Refuse a file whose data end at a time ``end`` (s) before the run does."""
     length = scene.run.duration
     if end < length * (1 - 1e-9):
         from models.core.time_series import other_unit
@@ -50,12 +50,12 @@ def check_end(scene: Scene, place: str, file: str, end: float) -> None:
 
 
 def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
-    """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
+    """Number (n,) of the sensor's last sampling time at or before each of the times (n,) in s."""
     return np.floor(times * rate + SLACK).astype(np.int64)
 
 
 def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
-    """Sampled values at the sensor's last instant at or before each row, shape (n,).
+    """Values (n,) held by a sensor: for each row the value at the last sampling time at or before it.
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
     """

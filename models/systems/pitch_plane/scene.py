@@ -91,7 +91,7 @@ class Scene(SceneFile):
 
 
 def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
-    """A published set by its name, or the user's own from a TOML file."""
+    """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
         return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
     if name not in parameter_sets():
@@ -134,7 +134,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
 
 
 def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
-    """The scene with some values of its tables changed, by the tables' names."""
+    """The scene with some values changed; ``tables`` gives them by the names of the scene's tables."""
     table = scene.table()
     tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
     return build({**table, **tables_now}, scene.file, Path(scene.folder))

@@ -170,7 +170,7 @@ class Bench:
         return rigid_pitch(self.parameters).total
 
     def spring(self, stiffness: float) -> dict[str, float]:
-        """Settings of a spring to the ground with its damper."""
+        """Settings of a spring to the ground, with a damper of fixed damping ratio."""
         return {"stiffness": stiffness, "damping": 2.0 * DAMPING * math.sqrt(stiffness * self.resisting)}
 
     def _methods(self) -> dict[str, dict[str, Any]]:
@@ -227,7 +227,7 @@ class Bench:
         return [{"engine": engine, "road": self.road, **self.row(name, effects, result), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
-        """A run of the perturbed model under noisy forces."""
+        """Result of a run of the perturbed model under the noisy forces, with these effects."""
         return run(self._scene(effects), engine)
 
     def _scene(self, effects: dict[str, Any]) -> Scene:

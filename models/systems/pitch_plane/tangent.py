@@ -220,7 +220,7 @@ def tilted(assembly: Assembly) -> np.ndarray:
 
 
 def tilt_map(path: TangentPath) -> np.ndarray:
-    """Matrix that maps tilt and tilt rate at the start of a path to those at its end, shape (2, 2).
+    """Matrix (2, 2) that maps tilt and tilt rate at the start of a path to tilt and tilt rate at its end.
 
     The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
     fast motion is in the four numbers.
@@ -257,7 +257,7 @@ class CovarianceOverTime:
     matrices: np.ndarray
 
     def deviation(self, coordinate: str) -> np.ndarray:
-        """Standard deviation (n,) of a coordinate by its name: m or rad."""
+        """Standard deviation (n,) of a coordinate over time, by its name; m or rad."""
         i = STATES.index(coordinate)
         return np.sqrt(self.matrices[:, i, i])
 

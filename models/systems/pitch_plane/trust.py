@@ -65,7 +65,7 @@ class GrowthCurve:
     size: np.ndarray
 
     def passes(self, angle: float = ANGLE) -> float | None:
-        """First time (s) at which the size exceeds ``angle`` (rad), None if it never does."""
+        """First time (s) at which the error exceeds ``angle`` (rad), None if it never does."""
         beyond = ~(self.size <= angle)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
@@ -165,7 +165,7 @@ class Trust:
 
     @property
     def until(self) -> tuple[str, float] | None:
-        """The source that comes first and its time (s); None if nothing limits the run."""
+        """The source of error that ends the trust first, and its time (s); None if nothing limits the run."""
         limits = [(time, name) for name, time in self.times.items() if time is not None]
         return min(limits)[::-1] if limits else None
 

@@ -38,7 +38,7 @@ def perturbed(p: Parameters, factors: Mapping[str, float] = PAPER) -> dict[str, 
 
 
 def measure(scene: Scene, error: bool = False) -> Result:
-    """The run on the road, in the reference by Runge-Kutta steps; ``error`` as in ``run``."""
+    """Run the vehicle on the road in the reference, with Runge-Kutta steps; ``error`` as in ``run``."""
     return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=error)
 
 

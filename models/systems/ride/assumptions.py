@@ -101,7 +101,7 @@ def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
 
 
 def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
-    """Assumption on the travel of a linear spring between a wheel and what it carries."""
+    """Assumption that the linear spring between a wheel and the body that it carries stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     ends = {spring.first_body, spring.second_body}
     if abs(spring.axis[2]) < UPRIGHT or None in ends or not ends & wheels:

@@ -73,7 +73,7 @@ def with_error_of_copies(
     copies: Mapping[float, Copies],
     seed: int,
 ) -> Result:
-    """The result with the errors of its deviations, by output.
+    """The result with the errors of its standard deviations, one for each output.
 
     Copies: by longer steps of some of them on the same roads, and by chance. Statistical linearisation: by the copies
     beside it, less what chance makes of their difference; by what its gains leave out where that is more.

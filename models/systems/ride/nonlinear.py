@@ -304,7 +304,7 @@ class Ride:
         return float(self.times[1] - self.times[0])
 
     def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies (f,) in Hz and one-sided densities (f, p) of the outputs by Welch's method.
+        """Frequencies (f,) in Hz, and one-sided power spectral densities (f, p) of the outputs by Welch's method.
 
         They end at ``highest`` (Hz), and begin where windows no longer leak.
         """

@@ -44,7 +44,7 @@ class Built:
 
 
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
-    """The scene's vehicle with its effects, and with gravity where its operating point is the loaded one.
+    """The scene's vehicle with its effects; it has gravity if its operating point is the loaded one.
 
     InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
     that their moments about z would pull it back or push it on; and for a tyre that may lift where small motion is
@@ -167,7 +167,7 @@ def excitation_of(
 
 @contextmanager
 def scene_errors(scene: RideScene) -> Iterator[None]:
-    """Turn a computation's error, which names no file, into an error of the scene's key that caused it."""
+    """Context that turns an error without a file into an error of the scene's key that caused it."""
     try:
         yield
     except InputError as error:

@@ -50,7 +50,7 @@ def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
 
 
 def has_omissions(scene: RideScene, sort: str) -> bool:
-    """Whether a scene's vehicle and road hold any effects of a sort."""
+    """Whether a scene's vehicle and road have effects of this sort, which can be left out."""
     return bool(SORTS[sort](ReducedScene.complete(scene)))
 
 

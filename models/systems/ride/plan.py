@@ -83,7 +83,9 @@ def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> t
 
 
 def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
-    """A line per body, then the number of freedoms and their frequencies where no speed is needed."""
+    """Lines on each body, then on the number of freedoms and their natural frequencies where these do not depend on the
+    speed.
+    """
     for body in vehicle.bodies:
         on = f" on {body.parent}" if body.parent else ""
         yield "  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"

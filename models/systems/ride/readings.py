@@ -74,8 +74,9 @@ def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str])
 
 
 def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> np.ndarray:
-    """Error (N, p) of the quasi-stationary deviations, relative to the largest deviation of the drive; 0 where that is
-    0."""
+    """Error (N, p) of the quasi-stationary standard deviations, divided by each output's largest standard deviation in
+    the drive; 0 where that is 0.
+    """
     both = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
     known = np.where(both, drive.deviation, 0.0)
     largest = known.max(axis=0)

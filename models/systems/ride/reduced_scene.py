@@ -90,7 +90,7 @@ def illegal(omitted_effects: Iterable[Effect]) -> str:
 
 
 def without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
-    """The scene without these effects; its tables [effects.NAME] go first and together."""
+    """The scene without these effects; effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:
         scene = scene.without_tables(*tables)

@@ -33,7 +33,7 @@ QUASI_STATIONARY = 90
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """Speeds and correlations at which a linear vehicle is solved, in place of the scene's.
+    """Speeds and correlations at which a linear vehicle is solved; they replace the scene's own.
 
     speeds : m/s, those of the scene if None. correlations : of the road, left to right and front to rear, by name; None
     is the scene's own.

@@ -40,8 +40,10 @@ class Axle(NamedTuple):
 
 
 class Car(NamedTuple):
-    """SI. mass; front, rear : from the centre of mass to the axles; inertia : about the upright; height : of the centre
-    of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces below and above 0."""
+    """Parameters of a car in SI units. mass; front, rear : from the centre of mass to the axles; inertia : about the
+    upright; height : of the centre of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces
+    below and above 0.
+    """
 
     mass: float
     front: float

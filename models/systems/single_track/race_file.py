@@ -68,7 +68,7 @@ def plain(source: Path, target: Path) -> Path:
 
 
 def _raw(source: Path) -> dict[str, np.ndarray]:
-    """Columns of the race's file, packed or not; InputError where one is missing, or times do not rise."""
+    """Columns of the race's file, gzipped or not; InputError where one is missing, or times do not rise."""
     with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
         head, *rows = list(csv.reader(file))
     for column, _ in COLUMNS.values():

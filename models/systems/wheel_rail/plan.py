@@ -30,6 +30,6 @@ def describe(scene: WheelRailScene) -> str:
 
 
 def case_text(yaw: float, friction: float) -> str:
-    """A case in words."""
+    """Text on a case: its yaw, and whether it rolls with friction or is only pressed."""
     turned = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
     return f"{turned}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")

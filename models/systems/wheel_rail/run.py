@@ -163,7 +163,7 @@ def patches(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
 
 
 def position_quantities(placed: WheelsetPlacement) -> dict[str, Any]:
-    """Every quantity of a position, and of every patch of both wheels."""
+    """Quantities of the wheelset at a position and of every patch of both wheels, by name."""
     return {
         "shift": 1e3 * placed.shift,
         "yaw": 1e3 * placed.yaw,

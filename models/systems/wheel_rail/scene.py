@@ -35,7 +35,7 @@ class Positions(Strict):
     count: int = Field(default=21, ge=1, le=1000, description="number of displacements")
 
     def values(self) -> np.ndarray:
-        """All displacements (m)."""
+        """All lateral displacements (m) of the wheelset."""
         return np.linspace(self.start, self.stop, self.count)
 
 

@@ -122,7 +122,7 @@ def _table(
 
 
 def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
-    """InputError where no amplitude of a scene has a wave."""
+    """Raise InputError where the wheelset has no wave at any of the scene's amplitudes."""
     if len(conicities.why) == len(conicities.rows):
         amplitude, why = next(iter(conicities.why.items()))
         table = scene.conicity.table if scene.conicity else None
@@ -130,7 +130,9 @@ def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
 
 
 def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
-    """Both conicities as plain numbers at each amplitude (m), the wave's centre (m); None where there is no wave."""
+    """Both conicities at each amplitude (m) as plain numbers, with the centre (m) of the wave; None where there is no
+    wave.
+    """
     rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
     return {
         "conicity": [
@@ -141,7 +143,7 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
 
 
 def lines(conicities: Conicities) -> list[str]:
-    """Both conicities at every amplitude, as text."""
+    """Text with both conicities at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     told = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):

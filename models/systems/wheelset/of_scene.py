@@ -59,13 +59,15 @@ def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset
 
 
 def implementation(engine: str) -> type[Equations]:
-    """The equations of motion of an implementation; its engine is imported here and not before."""
+    """The class of the equations of motion for an implementation; only its own engine is imported, when it is
+    needed.
+    """
     module, _, name = IMPLEMENTATIONS[engine].rpartition(".")
     return getattr(import_module(module), name)
 
 
 def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
-    """The scene's wheelset with its law of creep at a speed (m/s)."""
+    """Equations of motion of the scene's wheelset, with its law of creep, at a speed (m/s)."""
     return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
 

@@ -58,7 +58,7 @@ def describe(scene: WheelsetScene) -> str:
 
 
 def _assumed(scene: WheelsetScene) -> list[str]:
-    """Lines on the assumptions of paths and eigenvalues."""
+    """Lines on the assumptions of paths and of eigenvalues."""
     equations = equations_of(scene, "reference", path_speeds(scene)[0])
     return assumption_lines([*assumptions(equations), *of_linear(equations.wheelset)])
 

@@ -120,7 +120,7 @@ class Linear:
 
 
 def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
-    """Eigenvalues over the scene's speeds with linear creep; the detail is ``Linear``.
+    """Eigenvalues over the scene's speeds with linear creep; the result's detail is ``Linear``.
 
     error : whether that of the differences that linearise is told, at the last speed.
     """
@@ -235,7 +235,7 @@ def cycles(
 
 
 def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
-    """A cycle as a result over its period, whose detail is the orbit."""
+    """The result of a limit cycle over one period; its detail is the orbit."""
     labelled = with_assumptions(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
     period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
     if not error:

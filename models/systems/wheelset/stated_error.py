@@ -65,7 +65,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
 
 
 def series(path: WheelsetPath) -> Series:
-    """The principal channels of a path."""
+    """Time series of the principal channels of a path."""
     forces = {
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
     }

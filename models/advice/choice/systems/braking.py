@@ -45,7 +45,7 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
 
 
 def steps(scene: BrakingScene) -> int:
-    """Number of steps of a procedure of the longest allowed duration."""
+    """Number of steps of a procedure that lasts as long as a run may."""
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 

@@ -17,7 +17,9 @@ ENGINE, WINDOWED = "reference", True
 
 
 def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
-    """The scene for runs in time, with its effects and functions that shorten the run and lengthen its steps."""
+    """The scene as copies that run in time, an object that can leave out effects, shorten the run and lengthen its
+    steps.
+    """
     if isinstance(scene, CopiesInTime):
         return scene
     with scene_errors(scene):

@@ -20,7 +20,9 @@ def _differs(table: Any, keys: tuple[str, ...]) -> bool:
 
 
 def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: str, usual: dict[str, float]) -> Entry:
-    """An effect of the sensors behind a port: keys of [port.signals] or [port.pressures] other than a perfect one's."""
+    """An effect of the sensors at a port: present where keys of [port.signals] or [port.pressures] differ from those of
+    a perfect sensor.
+    """
 
     def there(scene: Any) -> bool:
         return scene.port is not None and _differs(getattr(scene.port, kind), keys)
@@ -111,7 +113,7 @@ def _on_another_surface(table: Table, scene: Any) -> None:
 
 
 def _in_the_plane(table: Table, scene: Any) -> None:
-    """Edit the scene's table to a vehicle in the plane with the same masses, axles and wheels."""
+    """Replace the vehicle by one in the plane with the same masses, axles and wheels."""
     from models.systems.braking.of_scene import vehicle_of
 
     table["vehicle"] = {"override": vehicle_of(scene).model_dump()}
@@ -125,7 +127,7 @@ def _with_trailer(table: Table, scene: Any) -> None:
 
 
 def _tows(scene: Any) -> bool:
-    """Whether the vehicle of a file has bodies with a hitch."""
+    """Whether the vehicle of the scene's file tows bodies."""
     from models.systems.braking.of_scene import spatial_vehicle_of
 
     given = spatial_vehicle_of(scene)

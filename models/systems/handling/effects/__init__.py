@@ -11,7 +11,7 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual: Any) -> Entry:
-    """An effect that a key of the manoeuvres names: left out of all of them, put into all of them."""
+    """An effect that a key of the manoeuvres switches on; it is left out of all manoeuvres, or put into all."""
 
     def there(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]

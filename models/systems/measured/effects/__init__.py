@@ -8,7 +8,9 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **counts: int) -> Entry:
-    """An effect of virtual transducers: a key of [virtual.faults]; files have the faults that they have."""
+    """An effect of virtual transducers, which a key of [virtual.faults] switches on. It cannot be chosen for files,
+    which have their own faults.
+    """
     why = "for files have the faults that they have"
 
     def there(scene: Any) -> bool:

@@ -41,7 +41,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The vehicle without tyres, driven by the two forces."""
+    """The vehicle without tyres, driven by two wheel forces from a file."""
     from models.core.time_series import read_time_series
 
     scene = assembly.scene
