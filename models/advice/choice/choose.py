@@ -163,7 +163,7 @@ class Chooser:
 
     def barred(self, omitted_effects: Set) -> bool:
         """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two effects this
-        is predicted: it breaks if some effect breaks one in every pair with another.
+        is predicted from pairs: it does if, for some effect, every pair with another one does.
         """
         runs = self.screen.variants
         if len(omitted_effects) <= 2:

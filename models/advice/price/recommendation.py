@@ -303,8 +303,8 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
 def _resolved(
     scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> Known:
-    """Truth and errors of the winners and defaults, with a truth more exact than they are: a setting may be far better
-    than its tolerance asks, and as good as the reference that it was compared with.
+    """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
+    be far better than its tolerance asks, and as good as the reference that it was compared with.
     """
     shown = _winners_and_defaults(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
@@ -327,7 +327,7 @@ def _whole_answer(scene: PricedScene, setting: Setting) -> PricedRun:
 
 
 def _blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
-    """Whether the smallest error is no larger than the uncertainty of the truth, and a better truth would take seconds,
+    """Whether the smallest error is too close to the uncertainty of the truth, and a better truth would take seconds,
     not minutes.
     """
     return (

@@ -218,8 +218,8 @@ class MeasuredPoints:
     def racing(self) -> list[Point]:
         """Points that are timed in several rounds because their seconds in a single run are decisive: default settings,
         points that determine the cheapest settings and those little slower, of each engine and of all, points that
-        determine a refined default, and those on the figure's front that are not slow. Runs of LONG_RUN_SECONDS count
-        for the middle tolerance alone. Work is counted, so that it needs no rounds.
+        determine a refined default, and those on the figure's front that are not slow. Runs longer than
+        LONG_RUN_SECONDS are chosen for the middle tolerance alone. Work is counted, so that it needs no rounds.
         """
         curves, usual = self.curves(), self.defaults.values()
         chosen = [p for p in usual if p.status == "ok"] + [

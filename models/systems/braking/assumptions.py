@@ -359,5 +359,5 @@ def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
 
 
 def _begun(values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) below a first row of NaN, so that there is a row for every sample: the first one has no value."""
+    """Values (n, ...) after a row of NaN, which makes a row for every sample: the first sample has no value."""
     return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))

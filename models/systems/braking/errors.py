@@ -119,8 +119,8 @@ def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
 
 
 def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
-    """Whether the controller answers differently to signals that are off as far as those of the run in longer steps, in
-    the opposite direction. Valves differ if any state differs, pressures if they differ by more than ALIKE.
+    """Whether the controller's commands change if the signals of a run are shifted by as much as longer steps shift
+    them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than ALIKE.
     """
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]

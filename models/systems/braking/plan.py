@@ -145,7 +145,9 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
 
 
 def _towed(scene: BrakingScene) -> list[tuple[str, str]]:
-    """Lines on the bodies that a suspended vehicle tows; their hitches are at distances ahead of its centre of mass."""
+    """Lines on the bodies that a suspended vehicle tows; hitch positions are measured forward from its centre of
+    mass.
+    """
     from models.vehicles.towing import hitch_line
 
     handling = sprung_of(scene).handling

@@ -67,7 +67,7 @@ def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
 
 
 def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
-    """Engines that a run was requested in, or the usual engine if none was.
+    """The requested engines, or the usual engine if none was requested.
 
     The reference takes minutes for a stop on a suspension: there it is used only if no other engine is requested.
     """

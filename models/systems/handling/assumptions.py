@@ -104,8 +104,8 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
 
 
 def _travels(handling: Handling) -> list[Assumption]:
-    """Assumptions on springs that alone carry a wheel: travel stays within the spring's curve or, without one, within a
-    car's stops.
+    """Assumptions on springs that alone carry a wheel: travel stays within the spring's curve or, without one, within
+    the usual stops of a car.
     """
     carrying = {chassis_of(handling.given).name, *handling.given.towed}
     bodies = {tyre.body for tyre in handling.given.tyres}

@@ -230,7 +230,7 @@ def pulled(
     hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
 ) -> HubInputs:
     """Hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as a spring and damper:
-    natural frequency 2 pi ``bandwidth`` (Hz), damping ``ratio``, inertia of the rigid vehicle.
+    natural angular frequency 2 pi times ``bandwidth`` (Hz), damping ratio ``ratio``, inertia of the rigid vehicle.
     """
     rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
     wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)

@@ -110,8 +110,8 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
 
 
 def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
-    """Assumption that a free run lies as the measured vehicle does, where forces keep their directions in space and
-    roll or pitch were measured.
+    """Assumption that a free run has the measured roll and pitch, where forces keep their directions in space and roll
+    or pitch were measured.
     """
     if scene.stabilise.method != "none" or examination is None:
         return []

@@ -46,12 +46,12 @@ class StepGrid:
 
     @property
     def every(self) -> int:
-        """Number of steps from one answer to the next."""
+        """Number of steps from one output sample to the next."""
         return max(round(self.period / self.step), 1)
 
     @property
     def skip(self) -> int:
-        """Number of samples from one answer to the next."""
+        """Number of samples of the recording from one output sample to the next."""
         return max(round(self.step / self.period), 1)
 
     def check(self, file: str = "") -> None:

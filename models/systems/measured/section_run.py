@@ -80,7 +80,7 @@ class SectionRun:
 
     @property
     def count(self) -> int:
-        """Number of answers, that is of output samples, in the whole run."""
+        """Number of output samples in the whole run."""
         return (self.recording.count - 1) // self.grid.skip + 1
 
 
@@ -184,7 +184,7 @@ def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: 
 
 
 class _March:
-    """A run in progress: ``done`` answers are on disk, and ``state`` (2 n,) belongs to the next one."""
+    """A run in progress: ``done`` output samples are on disk, and ``state`` (2 n,) belongs to the next one."""
 
     def __init__(self, job: SectionRun, folder: Path, length: int) -> None:
         self.job, self.grid, self.length, hold = job, job.grid, length, job.hold

@@ -305,7 +305,7 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
     """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by ``turn`` (rad)
-    and from the deviation ``inertia`` of the inertia's share.
+    and from ``inertia``, the standard deviation of the share by which 1/I is off.
     """
     p = assembly.parameters
     turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])

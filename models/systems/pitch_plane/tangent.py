@@ -263,7 +263,8 @@ class CovarianceOverTime:
 
 
 def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> CovarianceOverTime:
-    """Covariance along a free force-excited run that white noise causes, given its standard deviation (N) per sample.
+    """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
+    (N) per sample.
 
     longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
     every sample of a spline reaches into all periods.

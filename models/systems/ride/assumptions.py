@@ -164,8 +164,8 @@ def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
 
 
 def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
-    """Assumptions that, at constant speeds, the road waves that excite wheels and body are of known wavelengths. A
-    drive is slow only at its start.
+    """Assumptions that, at constant speeds, the road waves that excite wheels and body have wavelengths for which
+    spectra of roads are known. A drive is slow only at its start.
     """
     if scene.road.file is not None or vehicle.limits:
         return

@@ -51,7 +51,7 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 def with_error_of_sweep(
     run: Result, swept: Sweep, linear: Linear, roads: Mapping[str, Excitation], filters: Mapping[str, str], digit: float
 ) -> Result:
-    """The result with the rounding errors of its deviations, estimated at some speeds on all roads."""
+    """The result with the rounding errors of its standard deviations, estimated at some speeds on all roads."""
     at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED).round().astype(int))
     recomputed = np.array(
         [[_direct(linear, road, filters, float(swept.speeds[i]), digit) for i in at] for road in roads.values()]

@@ -107,7 +107,7 @@ def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
 def _of_steps(
     vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors (p,) of the copies' deviations at a speed that their steps cause, and observed orders (p,)."""
+    """Errors (p,) that the steps cause in the copies' standard deviations at a speed, and observed orders (p,)."""
     twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
     count = len(twice)
     deviation = np.sqrt(fine.about_mean()[:count].mean(axis=0))
@@ -120,8 +120,8 @@ def _of_steps(
 def _of_gains(
     equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """Errors of deviations by statistical linearisation, from their difference to those of the copies at the copies'
-    speeds.
+    """Errors of the standard deviations by statistical linearisation, from their difference to those of the copies at
+    the copies' speeds.
     """
     beside = [(equivalents[speed], each) for speed, each in copies.items()]
     gains = np.array([each.covariance.deviation for each, _ in beside])

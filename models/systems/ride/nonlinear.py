@@ -162,7 +162,7 @@ class CopiesBySpeed:
 
 
 def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
-    """Monte Carlo copies by their speed (m/s)."""
+    """Monte Carlo copies by their speed (m/s), computed by the scene's worker processes."""
 
     def tell(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
