@@ -110,7 +110,7 @@ def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSprin
 def _pitch_spring(build: Build, spring: PitchSpring) -> None:
     """Add a pitch spring to the ground; one with a dead band gets a force law as a callback.
 
-    Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
+    Exudyn has limit stops, but checks only once per step whether one is touched, not at every stage.
     """
 
     def moment(mbs: Any, t: float, item: int, angle: float, rate: float, *law: float) -> float:

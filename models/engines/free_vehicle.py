@@ -185,8 +185,9 @@ def native_share(
     """Lines of a plan, head and text, on the joints and springs that each engine computes natively, and on why others
     are not native, for a vehicle whose springs keep to the heading of its carrier. They are counted in built models.
 
-    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it. What
-    acts along coordinates is native. native : further parts of each engine, of springs that keep to other bodies.
+    Such springs act along axes that turn with the carrier only, while both their ends roll and pitch relative to it.
+    Elements along coordinates are native. native : further parts of each engine, of springs that keep to other
+    bodies.
     """
     along, bars, lines = joint_parts(vehicle), len(vehicle.bars), []
     count = len(vehicle.springs) + len(along)

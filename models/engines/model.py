@@ -10,10 +10,10 @@ from models.core.trajectory import Trajectory
 class Model(Protocol):
     """A vehicle in an engine, or as written equations, together with its input and its time integration.
 
-    Ride asks beside that for a linear vehicle (``spatial_protocol``), and a braked vehicle, whose wheels take smaller
-    steps than its chassis, for single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is
-    not its coordinates and their rates, and marches of many lengths about one linearisation: it is
-    ``rail.equations.Equations``, of which an engine gives accelerations and marches by a ``FreeModel``.
+    Ride also needs a linear vehicle (``spatial_protocol``). A braked vehicle, whose wheels take smaller steps than its
+    chassis, also needs single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is not its
+    coordinates and their rates, and marches of many lengths about one linearisation: it is
+    ``rail.equations.Equations``, for which an engine gives accelerations and marches by a ``FreeModel``.
     """
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -182,8 +182,8 @@ class Connection:
 class Division:
     """Division of a vehicle's elements between an engine and the compiled forces.
 
-    native : elements that the engine itself computes; shared : the rest of each law, which the compiled forces add;
-    reasons : why an element is shared, by its name.
+    native : elements that the engine itself computes; shared : the remainder of each law, which the compiled forces
+    add; reasons : why an element is shared, by its name.
     """
 
     native: tuple[NativePart, ...]

@@ -175,9 +175,9 @@ def balanced(
 ) -> None:
     """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments, the last column, and of forces.
 
-    ``balance`` gives, for a row, what is needed and the inertia terms m3 z3'' and I beta'' (N, N m), beside which
-    the error is judged where little is needed. A solver can follow a prescribed motion perfectly with a
-    multiplier that is wrong for ever.
+    ``balance`` gives, for a row, the required force and moment and the inertia terms m3 z3'' and I beta'' (N, N m),
+    which are the scale of the error where little is required. A solver can follow a prescribed motion perfectly with a
+    multiplier that stays wrong.
     """
     rows = np.unique(np.linspace(min(BALANCE_START, len(times) - 1), len(times) - 1, BALANCE_ROWS).astype(int))
     wanted, inertia = (np.array(part) for part in zip(*(balance(int(row)) for row in rows), strict=True))

@@ -209,7 +209,7 @@ def _act(parts, road, tyres, motion, moved, forces):
     """Compute the forces of the elements, write them in place of the travels, and add them to the joints that move
     points of bodies which never turn.
 
-    road : pointer to the heights (m) under so many tyres, and then their rates (m/s).
+    road : pointer to the heights (m) under ``tyres`` tyres, followed by their rates (m/s).
     """
     e, q, v = parts.elements, motion.positions, motion.rates
     for i in range(parts.element_count):

@@ -98,8 +98,9 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
 def _verlet(step: float, linear: Linear) -> np.ndarray:
     """Matrix (3n, 3n) that advances (q, q', q'') by one step of Exudyn's velocity Verlet.
 
-    The acceleration of a step's end reads the velocity of its middle, and the next step begins with it: a
-    state of its own. One step alone looks stable up to 5.6 ms where two are not beyond 2.7 ms.
+    The acceleration at the end of a step uses the velocity at its middle, and the next step begins with this
+    acceleration, which is therefore part of the state. A single step looks stable up to 5.6 ms, two are stable only up
+    to 2.7 ms.
     """
     a = first_order(linear)
     n = len(a) // 2

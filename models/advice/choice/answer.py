@@ -64,7 +64,7 @@ def sizes(full_results: Sequence[np.ndarray]) -> np.ndarray:
     """Sizes by which changes are divided, one for each case: the standard deviation of a path, the magnitude of a
     number.
 
-    A case that hardly moves beside the others is held to what it is of them.
+    A case that hardly moves compared with the others has at least the size HARDLY times the largest one.
     """
     amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full_results])
     return np.maximum(amounts, HARDLY * amounts.max(initial=0.0))

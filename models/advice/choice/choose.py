@@ -56,12 +56,13 @@ class Choice:
     """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
     relative changes (quantities,).
 
-    predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
-    add so much to that, where quantities are means of samples; within_tolerance : whether each sum of both is. calls
-    and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
-    scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
-    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried. barred : by
-    effects that stay, what would be broken without them that the scene keeps.
+    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run; chance
+    : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of both is.
+    calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene. rounds :
+    runs of the whole scene for confirmation; spent : calls of all runs. more : factor, roughly, by which more samples
+    would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether the search ended
+    before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps and that would be
+    broken without them.
     """
 
     candidates: tuple[str, ...]
@@ -85,9 +86,9 @@ class Chooser:
     """Search for the effects of a scene that can be left out in one implementation, for quantities (see
     ``models.advice.choice.answer``) and a tolerance.
 
-    progress(share) is told the share that is spent of the runs that the search may take. executor : computes the runs
-    without one effect or two that the screen is about to ask for; those that confirm, and those that are timed, are
-    this process's.
+    progress(share) : called with the share that is spent of the runs that the search may make. executor : computes the
+    runs without one or two effects that the screen will need; runs that confirm, and timed runs, are made by this
+    process.
     """
 
     def __init__(

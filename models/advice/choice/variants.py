@@ -59,9 +59,9 @@ class Variants:
     """Runs of a ``scene`` by one implementation. A variant is given by the effects that are left out and by the factor
     of the step.
 
-    None stands for one that cannot be, or whose run fails. ``executor`` : computes runs ``ahead``. ``calls`` : of all
-    runs that were asked for so far, without those that were repeated for their seconds; runs ahead that nobody asks for
-    do not count, so that no choice depends on who computes.
+    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``. ``calls``
+    : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never requested
+    do not count, so that no choice depends on the executor.
     """
 
     scene: Any
@@ -192,7 +192,7 @@ class Variants:
         """Variants of the first part of the run, of at least ``steps`` steps; of the whole run where this is hardly
         longer.
 
-        Of a length that the scene may have: whole samples of what it measures, for one.
+        The length is one that the scene may have, for example whole samples of a measurement.
         """
         if self._opened:
             return Variants(self.scene.fewer(steps), self.engine, self.executor)

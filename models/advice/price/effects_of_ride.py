@@ -25,7 +25,7 @@ STEPS = 500
 
 
 def price_list_of_ride(scene: Any) -> PriceList:
-    """Price list of effects at the scene's middle speed, in closed form; InputError for a speed that varies."""
+    """Price list of effects at the scene's middle speed, in closed form; InputError for a scene whose speed varies."""
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()

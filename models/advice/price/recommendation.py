@@ -280,7 +280,7 @@ class _Confirmed:
 def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _Confirmed:
     """The setting, or the next finer one of its method, that meets the tolerance over the whole run.
 
-    The seconds of all attempts are told by the rounds in which the first was timed.
+    The seconds of all attempts are scaled from the rounds in which the first one was timed.
     """
     (ladder, choice), failed = block, list[TriedSetting]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried

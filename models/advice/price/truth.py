@@ -92,9 +92,10 @@ def truth(
     """The truth of a scene's quantity over ``duration`` (s), to within a twentieth of ``tolerance``; ``second_method``
     : whether another family of methods must confirm it.
 
-    executor : computes the first two settings of the reference beside one another: fewer tell nothing.
+    executor : computes the first two settings of the reference at the same time, since fewer are never enough.
 
-    InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
+    InputError where this uncertainty cannot be reached, RunFailed where two families of solvers differ or no run
+    ends.
     """
     ladder = scene.reference()
     settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)

@@ -46,10 +46,10 @@ class RideChoice:
     """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
     standard deviations that result.
 
-    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
-    off : there with parameters that are off, where that is worst; within_tolerance : whether all of them are.
-    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, which no accuracy bounds.
-    rounds : choices that were confirmed. said : why promising effects were not left out.
+    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range; off
+    : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are. before,
+    after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy. rounds :
+    choices that were confirmed. said : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
@@ -89,7 +89,7 @@ class Chooser(Candidates):
         """Whether the tolerance holds without these effects: at all speeds of the range, with parameters off, and
         without errors that cancel each other.
 
-        A certificate is asked of what is chosen at last, and once it failed, of all that it failed for.
+        A certificate is required of the final choice and, once one has failed, of all sets for which it failed.
         """
         if not omitted_effects:
             return True

@@ -93,7 +93,8 @@ class March:
         """Gains (w, q, m) from the states of each axle's filter to the quantities, for waves whose phase turns by
         ``half`` in half a step, and for waves that turn by the opposite and look the same at the steps.
 
-        White noise is read as its mean over a step, as the filters' states at its begin, middle and end tell it.
+        White noise enters as its mean over a step, computed from the filters' states at the step's begin, middle and
+        end.
         """
         rates, seen, forced = self.motions
         road, z, end = self.reduced.excitation, step * rates, half**2
@@ -178,7 +179,8 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
     """Longest step (s) with which runs at every speed keep all quantities within a tolerance of their ``exact``
     deviations.
 
-    exact : of the whole scene, (q,) for each march. 0 where the shortest step that is looked at breaks it.
+    exact : standard deviations of the full scene, (q,) for each march. The result is 0 where the shortest step that is
+    tried breaks the tolerance.
     """
     runs = list(zip(marches, exact, strict=True))
 
@@ -208,7 +210,7 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 def _between(steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]) -> float:
     """Longest of ``FINE`` logarithmically spaced steps (s) below the first one that breaks the tolerance.
 
-    An error grows as a power of the step, so that a line tells where to look next.
+    An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
     (low, high), (below, above) = (0, FINE), shares
     while high - low > 1:

@@ -82,7 +82,7 @@ def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, i
     """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of calls
     of the right-hand side.
 
-    A step of a linear system is a matrix, which a step on the unit matrix tells.
+    A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
     n, steps, (_, m, copies) = march.vehicle, len(road) // 2, road.shape
     move, *weights = _step(march.reduced.system.A[:n, :n], step)

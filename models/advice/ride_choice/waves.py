@@ -23,8 +23,8 @@ def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, 
     """Angular frequencies (w,) in rad/s from 0 to the upper limit, weights (w,) of a sum that approximates the integral
     over them, and whether axles are treated as independent, ``apart`` (w,).
 
-    rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; ends : of the panels that are equal
-    on a logarithmic axis; the first one goes on to 0.
+    rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; frequency_limits : of the panels
+    that are equal on a logarithmic axis; the first panel extends to 0.
     """
     low, high = frequency_limits
     swinging = rates[rates.imag > 0]

@@ -236,8 +236,8 @@ class ManoeuvreRerun:
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
         """Errors of the patch's grid, estimated by a run in the same steps with a third of its cells.
 
-        The error does not fall evenly with the number of cells. How many times it is contained in the difference of
-        both runs is told by creep forces at the same states, compared with those of a grid with twice as many cells.
+        The error does not fall evenly with the number of cells. The ratio of the difference of both runs to the error
+        is estimated from creep forces at the same states, compared with those of a grid with twice as many cells.
         """
         cells = self.drive.handling.tyres.cells
         other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells

@@ -127,8 +127,8 @@ class TiltFilter:
     def biases(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
 
-        The springs of the vehicle, which the filter takes for noise, make innovations that hang together: by their
-        correlation with the one before as many fewer are independent.
+        The springs of the vehicle, which the filter takes for noise, make successive innovations correlated. The number
+        of independent ones is reduced according to the correlation of each innovation with the one before.
         """
         count, total, squares, products, _ = self.state.sums
         number = np.maximum(count, 1.0)

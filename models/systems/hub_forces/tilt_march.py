@@ -57,8 +57,9 @@ def march(x, p, turning, measured, noise, sums, kept):
 def _learn(p, gain, j, variance, kept):
     """Update the covariance with value j in Joseph's form, which no rounding makes negative.
 
-    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation. What the value's own error
-    leaves in another state, gain^2 variance, is left there even where rounding is larger than that.
+    kept : ratio of the value's variance to the innovation's, which is 1 - gain[j] computed without cancellation. The
+    variance gain^2 variance that the value's own error causes in another state is the least that remains there, even
+    where rounding is larger.
     """
     for m in range(4):
         before = p[j, m]

@@ -73,7 +73,8 @@ class ChannelGuess:
     """Guess at the meaning of a channel. ``unit`` is empty where the file's unit is usable; ``doubt`` names what is
     uncertain.
 
-    ``at`` is empty where no place can be named. ``left_out`` says why the guess is not to be used as it stands.
+    ``at`` is empty where no place can be named. ``left_out`` gives the reason why the guess should not be used
+    unchanged.
     """
 
     channel: str
@@ -140,9 +141,9 @@ def describe(path: Path) -> str:
     """Text on a file: its channels with unit, rate, samples, times and range, remarks of the reader, and a scene with a
     guessed channel map.
 
-    All but the scene is in comments: the whole is a scene file.
+    All lines but those of the scene are comments, so that the text is a scene file.
 
-    Raises InputError for what is no measurement file.
+    Raises InputError for a file that is no measurement.
     """
     source = open_source(path)
     began = f", began {source.start.isoformat(sep=' ')}" if source.start else ", which does not say when it began"

@@ -101,8 +101,8 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     """The verdict on a free run that ends before noise drives it off, after its pitch is compared with the measured
     pitch.
 
-    Where forces turn with the vehicle nothing grows, but offsets and forces of another frame drive it off all the same,
-    and its forces along the vehicle are as wrong as its pitch: there a measured pitch must bear the run out.
+    Where forces turn with the vehicle no error grows, but offsets and forces in another frame still drive it off, and
+    its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
     angles = job.recording.find("angle", CHASSIS, "pitch")
     if not angles:

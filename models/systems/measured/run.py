@@ -161,10 +161,10 @@ def run(
 ) -> Result:
     """Run a recording with roll and pitch held as the scene says; the result's detail is the Examination.
 
-    folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole_run : whether
-    the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
-    is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in
-    the detail, another one raises RunFailed.
+    folder : where samples are kept, so that an interrupted run can continue; without one they live as long as the
+    detail. whole_run : whether the recording is also checked, run free and judged, and files are handed on. error :
+    whether the error of the steps is estimated, by further runs. Raises InputError for files that cannot be read. If a
+    whole run fails, its detail has the reason; another run raises RunFailed.
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")

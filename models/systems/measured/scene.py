@@ -30,8 +30,9 @@ Engine = Literal["reference", "exudyn", "mujoco"]
 class Rig:
     """The vehicle that a recording drives, and the places of its sensors and sections.
 
-    name : of the vehicle or the parameter set; chassis : whose angles hold it; sections that can be asked for; angles :
-    the components that hold it; vehicle : cut at its wheels, None of the pitch plane.
+    name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : those at which
+    forces can be requested; angles : components of the measured angles; vehicle : cut at its wheels, None in the pitch
+    plane.
     """
 
     name: str

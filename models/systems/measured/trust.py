@@ -119,8 +119,9 @@ def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, fra
 def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray, frame: str) -> np.ndarray:
     """Error (n, 3) in m of x, y, z of a free run at times (n,), from noise, bias and the initial tilt.
 
-    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
-    bias alone. One standard deviation of the noise beside the others' means.
+    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; in the frame "inertial" there are only
+    noise and bias of the forces. The result combines one standard deviation of the noise with the means of the other
+    errors.
     """
     body, deviation = rigid(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))

@@ -178,8 +178,8 @@ def judge(
 ) -> Verdict:
     """The verdict on the run of a job that an engineer can give without knowing the true run.
 
-    trusted : s, predicted for a free run (``trust``), None if not known.
-    compared : check channels beside the run; noise : name -> standard deviation of the white noise of each, in SI.
+    trusted : time (s) predicted for a free run (``trust``), None if not known. compared : comparisons of check channels
+    with the run; noise : standard deviation of the white noise of each channel, by name, in SI.
     """
     shares = {
         channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared

@@ -232,8 +232,8 @@ def gap(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
     largest state in that time.
 
     reference, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
-    drift-off a rounding error is as large as the run, and no comparison says anything; nan where all paths have
-    drifted off before the first row past the start.
+    drift-off a rounding error is as large as the run, so that a comparison is meaningless; nan where all paths have
+    drifted off before the first row after the start.
     """
     count = len(other_paths["states"])
     until = np.minimum(reference["drift_off"][:count], other_paths["drift_off"])

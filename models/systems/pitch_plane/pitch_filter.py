@@ -281,7 +281,8 @@ def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
 def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
     """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
-    It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
+    The smoother supports linear steps only, x -> F x. An eighth state, always 1, carries the difference between the
+    nonlinear step and F x.
     """
     n = len(filtered.states)
     states, covariances = np.ones((n, 8)), np.zeros((n, 8, 8))

@@ -34,10 +34,10 @@ def run(
 ) -> Result:
     """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
 
-    settings : in place of the scene's own; assembly : what runs, where it is known already or was changed by hand;
-    error : whether the error of the steps is estimated, by further runs. What the run assumes is judged always.
-    The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the tree is compared with
-    the reference, and says so in "beside reference".
+    settings : replace the scene's own; assembly : replaces the one that the scene describes, where it is known already
+    or was changed by hand; error : whether the error of the steps is estimated, by further runs. The run's assumptions
+    are always judged. The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the
+    tree is compared with the reference; the result is in "beside reference".
     """
     assembly, settings = assembly or assemble(scene), settings or settings_of(scene, engine)
     rows = slice(None, None, _keep_every(scene, settings))
@@ -164,7 +164,7 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
 def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
     """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
 
-    ``model`` is the one that made the run, and is asked where an effect reads accelerations.
+    ``model`` is the model that made the run; effects that need accelerations compute them with it.
     """
     channels: Channels = {}
     for i, (name, meaning) in enumerate(zip(STATES, MEANINGS, strict=True)):

@@ -134,9 +134,9 @@ def compare(
 class Bench:
     """The measurement on one road, and runs of the perturbed model on the measured files.
 
-    Known before any run: ``trusted``, until when a free one can be trusted (s); ``holding``, which spring holds (N
-    m/rad); ``error``: whether the measurement tells the error of its steps, which all runs have in common; ``results``:
-    the measurement and all runs of methods, by name.
+    Known before any run: ``trusted``, the time (s) until which a free run can be trusted; ``holding``, the stiffness (N
+    m/rad) of a spring that holds; ``error``: whether the measurement states the error of its steps, which all runs
+    share; ``results``: the measurement and all runs of methods, by name.
     """
 
     def __init__(self, scene: Scene, road: str, options: Options, folder: Path, error: bool = False) -> None:

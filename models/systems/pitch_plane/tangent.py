@@ -222,8 +222,8 @@ def tilted(assembly: Assembly) -> np.ndarray:
 def tilt_map(path: TangentPath) -> np.ndarray:
     """Matrix (2, 2) that maps tilt and tilt rate at the start of a path to tilt and tilt rate at its end.
 
-    The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
-    fast motion is in the four numbers.
+    The slow error has no damping, so that the determinant of the exact map is 1. Its difference from 1 measures how
+    much of the fast motion is in the four numbers.
     """
     _, columns = path.carry(tilted(path.assembly))
     return columns[-1][:, [3, 7]].T

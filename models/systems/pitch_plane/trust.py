@@ -120,8 +120,9 @@ def interpolation(assembly: Assembly, longest: float = STEP) -> GrowthCurve:
 def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> GrowthCurve:
     """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
-    What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
-    The difference is carried along a run with the mean of both models, which leaves no error of second order.
+    The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
+    alone. The difference is propagated along a run with the mean of both models, which leaves no error of second
+    order.
     """
     parameters = assembly.parameters.model_dump()
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}

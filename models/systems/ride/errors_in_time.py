@@ -75,8 +75,9 @@ def with_error_of_copies(
 ) -> Result:
     """The result with the errors of its standard deviations, one for each output.
 
-    Copies: by longer steps of some of them on the same roads, and by chance. Statistical linearisation: by the copies
-    beside it, less what chance makes of their difference; by what its gains leave out where that is more.
+    Copies: the error of their steps, from longer steps for some of them on the same roads, and the statistical error.
+    Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of this
+    difference, or what the gains leave out where that is more.
     """
     first = next(iter(copies.values()))
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))

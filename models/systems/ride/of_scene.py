@@ -46,9 +46,9 @@ class Built:
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
     """The scene's vehicle with its effects; it has gravity if its operating point is the loaded one.
 
-    InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
-    that their moments about z would pull it back or push it on; and for a tyre that may lift where small motion is
-    asked for.
+    InputError for a loaded vehicle that may yaw, since its preloaded springs keep their directions in space and not in
+    the vehicle, so that their moments about z would turn it back or further. InputError also for a tyre that may lift
+    where small motion is requested.
     """
     vehicle = _built(scene).vehicle
     if vehicle.lifts and scene.vehicle.small_motion:

@@ -60,9 +60,10 @@ class ReducedScene:
 class Effect:
     """Something that may be left out: its name, what leaving it out means, and its relation to other effects.
 
-    needs : effects that must be left out, too, and go with it; excludes : effects that may not be left out beside it;
-    ``why``, a phrase for both. singular : no small change in any respect, so that it is solved and not screened.
-    has_table : it is a table [effects.NAME], which goes before all others, for without it the vehicle is another one.
+    needs : effects that must be left out as well; excludes : effects that may not be left out together with this one;
+    ``why`` : the reason for both. singular : leaving it out is no small change in any respect, so that it is solved and
+    not screened. has_table : it is a table [effects.NAME], which is removed before all other effects, since it changes
+    the vehicle.
     """
 
     name: str

@@ -55,12 +55,12 @@ def run(
 ) -> Result:
     """Run a scene with the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
 
-    vehicle, points : in place of the scene's own. sampling : asks for a run in time, as springs do that are bent and
-    tyres that may lift; the reference then answers by statistical linearisation with copies beside, an engine by one
-    path of the road. progress : of it. error : whether errors are estimated, by further solutions or runs. What a run
-    assumes is judged always.
+    vehicle, points : replace the scene's own. sampling : requests a run in time, which nonlinear springs and tyres that
+    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one path of the
+    road. progress : called during such a run. error : whether errors are estimated, by further solutions or runs. The
+    assumptions of a run are always judged.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
+    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
     """
     engine = engine or "reference"
     with scene_errors(scene):

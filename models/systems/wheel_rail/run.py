@@ -75,10 +75,10 @@ def run(
 ) -> Result:
     """Compute a case, by default the first, at every position of the wheelset; the detail is its ``Contacts``.
 
-    Channels of positions lie over the shift, those of patches over shift, wheel and patch, the one that carries most
-    first; not a number where there is no further patch. Positions that fail are doubts. progress : called before each
-    shift with it (mm) and the share that is done; error : whether every other position is computed on half the cells,
-    too, which tells the error of cells. Raises InputError for profiles that are none.
+    Channels of positions lie over the shift, those of patches over shift, wheel and patch, the patch with the largest
+    load first; not a number where there is no further patch. Positions that fail are doubts. progress : called before
+    each shift with the shift (mm) and the completed share; error : whether every other position is computed on half the
+    cells, too, from which the error of the cells is estimated. Raises InputError for files that are no profiles.
     """
     name = case or next(iter(scene.cases))
     held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
@@ -104,7 +104,8 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
     """The result with the error that the finite cells cause, as the root mean square over both wheels and every other
     position.
 
-    Half the cells are of first order: what they change is what the cells leave. Shares are of the root mean square.
+    The error of the cells is of first order, so that it is as large as the change on half the cells. Relative errors
+    refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
     for placed in run.detail.placed[::EVERY]:

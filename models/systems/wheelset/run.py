@@ -122,7 +122,7 @@ class Linear:
 def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
     """Eigenvalues over the scene's speeds with linear creep; the result's detail is ``Linear``.
 
-    error : whether that of the differences that linearise is told, at the last speed.
+    error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
     """
     kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
     linear = Linear(
