@@ -56,13 +56,13 @@ class Choice:
     """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
     relative changes (quantities,).
 
-    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run; chance
-    : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of both is.
-    calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene. rounds :
-    runs of the whole scene for confirmation; spent : calls of all runs. more : factor, roughly, by which more samples
-    would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether the search ended
-    before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps and that would be
-    broken without them.
+    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run;
+    chance : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of
+    both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene.
+    rounds : runs of the whole scene for confirmation; spent : calls of all runs. more : factor, roughly, by which more
+    samples would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether the search
+    ended before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps and that
+    would be broken without them.
     """
 
     candidates: tuple[str, ...]

@@ -59,9 +59,9 @@ class Variants:
     """Runs of a ``scene`` by one implementation. A variant is given by the effects that are left out and by the factor
     of the step.
 
-    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``. ``calls``
-    : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never requested
-    do not count, so that no choice depends on the executor.
+    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``.
+    ``calls`` : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never
+    requested do not count, so that no choice depends on the executor.
     """
 
     scene: Any

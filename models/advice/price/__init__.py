@@ -15,10 +15,11 @@ from models.advice.price.problem import Setting
 class SettingLadder:
     """Settings of one method of an engine, ordered from coarse to fine; each is a rung.
 
-    values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``; order
-    : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not
-    its default; sure : a reference is known where a finer rung changes it by less than the tolerance divided by this;
-    said : text on what that rung is, before the change, where it is not half the step, or cells and steps together
+    values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``;
+    order : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is
+    not its default; sure : a reference is known where a finer rung changes it by less than the tolerance divided by
+    this; said : text on what that rung is, before the change, where it is not half the step, or cells and steps
+    together
     """
 
     engine: str

@@ -89,8 +89,8 @@ def truth(
     second_method: bool = True,
     executor: Executor | None = None,
 ) -> ReferenceTruth:
-    """The truth of a scene's quantity over ``duration`` (s), to within a twentieth of ``tolerance``; ``second_method``
-    : whether another family of methods must confirm it.
+    """The truth of a scene's quantity over ``duration`` (s), to within a twentieth of ``tolerance``;
+    ``second_method`` : whether another family of methods must confirm it.
 
     executor : computes the first two settings of the reference at the same time, since fewer are never enough.
 

@@ -46,10 +46,10 @@ class RideChoice:
     """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
     standard deviations that result.
 
-    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range; off
-    : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are. before,
-    after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy. rounds :
-    choices that were confirmed. said : reasons why promising effects were not left out.
+    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
+    off : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are.
+    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy.
+    rounds : choices that were confirmed. said : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
