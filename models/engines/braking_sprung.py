@@ -128,7 +128,7 @@ class OnSprings:
         )
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
-        """``AtWheels`` on the wheel quantities at the end of a table, as views that share its memory."""
+        """``AtWheels`` for the wheel quantities at the end of a table; these share the table's memory."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
         return AtWheels(
             WheelForces(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels)

@@ -54,8 +54,8 @@ class Tilt:
 @dataclass
 class FilterState:
     """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; surprise : sum and count
-    of the normalised innovations squared; rates (2, 2) : sums of squares of the unexplained and of all rates of roll
-    and pitch; sums (5, 4) : of innovations, as ``tilt_march.march`` keeps them.
+    of the normalised innovations squared; rates (2, 2) : sums of the variances of the unexplained and of the measured
+    rates of roll and pitch; sums (5, 4) : of innovations, as ``tilt_march.march`` keeps them.
     """
 
     x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))

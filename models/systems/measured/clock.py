@@ -195,8 +195,8 @@ def _of_group(group: ClockGroup) -> Iterator[Finding]:
 
 
 def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
-    """Sample times of the recording; InputError for settings of [clock] that the samples of the wheel forces do not
-    allow.
+    """Sample times of the recording. InputError where the wheel forces do not overlap in time, or do not allow the
+    settings of [clock].
     """
     settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
     fastest = min(timings, key=lambda timing: timing.period)

@@ -192,8 +192,8 @@ def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
 
 
 def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
-    """Highest frequency (Hz) of motions that deform mostly the tyres, and lowest frequency of all oscillations; 0 where
-    there are none.
+    """Highest frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest frequency of all
+    oscillations, infinite if there are none.
     """
     still = replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS, gravity=0.0)
     linear, motion = linearise(still), Kinematics(still)

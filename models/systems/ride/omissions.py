@@ -96,8 +96,8 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
 
 def bushings(scene: ReducedScene) -> list[Effect]:
-    """Making bushings rigid: one effect per sort of springs that are stiffer than the softest between the same two
-    bodies.
+    """Making bushings at wheels rigid: one effect per group of similar stiffness, for springs that are stiffer than the
+    softest one between the same two bodies.
     """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:
