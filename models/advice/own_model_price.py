@@ -41,7 +41,9 @@ USUAL_STEP = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class PricedModel:
-    """See ``models.advice.price.OwnScene``: 1 s from a random state, as the paths of the certificate."""
+    """The user's own model as a priced scene, see ``models.advice.price.OwnScene``: 1 s from a random state, as in the
+    paths of the certificate.
+    """
 
     twin: TwinModel
     quantity: str
@@ -57,23 +59,23 @@ class PricedModel:
 
     @cached_property
     def columns(self) -> list[int]:
-        """Coordinates that the quantity is."""
+        """Indices of the coordinates that make up the quantity."""
         places = named_coordinates(self.twin)
         return [i for name, i in places.items() if self.quantity in (ALL_COORDINATES, name)]
 
     @property
     def unit(self) -> str:
-        """rad, m, or both."""
+        """Unit of the quantity: rad, m, or both."""
         kinds = {unit_of(self.twin, i) for i in self.columns}
         return kinds.pop() if len(kinds) == 1 else "rad or m"
 
     @property
     def note(self) -> str:
-        """What the run is."""
+        """Text that describes the run."""
         return "from the random state of the paths; MuJoCo marches the file's own model, Exudyn the description"
 
     def ladders(self) -> list[SettingLadder]:
-        """Every method; MuJoCo's default step is the file's."""
+        """Ladders of settings for every method; MuJoCo's default step is that of the model's file."""
         return [
             SettingLadder(engine, method, STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method))
             for engine, methods in METHODS.items()
@@ -89,15 +91,17 @@ class PricedModel:
         return min(STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
     def reference(self) -> SettingLadder:
-        """MuJoCo's RK4, which is the fastest, with halved steps."""
+        """Ladder of the reference: halved steps of MuJoCo's RK4, which is the fastest method."""
         return SettingLadder("mujoco", "RK4", tuple(0.01 / 2**k for k in range(14)), 4)
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """A Runge-Kutta method of order 8 about the plain equations."""
+        """Setting that must agree with the reference: a Runge-Kutta method of order 8 with the plain equations."""
         return Setting("reference", REFERENCE_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times, the quantity's coordinates, force calls; RunFailed where a method stops or blows up."""
+        """Times, coordinates of the quantity, and number of force calls of a run; RunFailed where a method stops or the
+        motion blows up.
+        """
         steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
         if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
@@ -106,7 +110,7 @@ class PricedModel:
         return setting.value * np.arange(steps + 1), path, calls
 
     def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
-        """Values (steps + 1, k) of the quantity."""
+        """Values (steps + 1, k) of the quantity along a run."""
         twin, step = self.twin, setting.value
         if setting.engine == "mujoco":
             states = file_path(twin, start, (steps, step), setting.method)
@@ -142,19 +146,21 @@ class PricedModel:
         return states[:, self.columns]
 
     def answer(self, solution: Any) -> PricedRun:
-        """The quantity with the force calls that it took."""
+        """The quantity along a run, with the number of force calls."""
         times, values, calls = solution
         return PricedRun(times, values, {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as an engine is told it."""
+        """The setting in the syntax of the engine."""
         if setting.engine == "mujoco":
             return [f'<option integrator="{setting.method}" timestep="{setting.value:g}"/>']
         return [f"exudyn.DynamicSolverType.{setting.method}, steps of {setting.value:g} s"]
 
 
 def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommendation:
-    """The cheapest settings of a model; InputError for what cannot be asked."""
+    """The cheapest settings of a model that meet a tolerance; InputError for an unknown quantity or an impossible
+    tolerance.
+    """
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in rad or m")
     if twin.driven.tied or twin.driven.frictions:
@@ -169,17 +175,17 @@ def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommend
 
 
 def named_coordinates(twin: TwinModel) -> dict[str, int]:
-    """Coordinates that MuJoCo has, too, by the names of their joints."""
+    """Indices of the coordinates that MuJoCo has as well, by the names of their joints."""
     names, angles = twin.names, {turning.first + i for turning in twin.coordinates.turnings for i in range(3)}
     return {_bare(name): i for i, name in enumerate(names) if i not in angles}
 
 
 def _bare(name: str) -> str:
-    """Name of a joint without its type, as a user types it."""
+    """Name of a joint as a user types it, without its type."""
     return name.removeprefix("joint ").replace("'", "")
 
 
 def unit_of(twin: TwinModel, coordinate: int) -> str:
-    """ "rad" or "m"."""
+    """Unit of a coordinate: "rad" or "m"."""
     _, freedom = twin.driven.vehicle.coordinates()[coordinate]
     return "rad" if freedom.startswith("r") else "m"

@@ -20,7 +20,7 @@ Channels = dict[str, tuple[str, str, np.ndarray]]
 
 @dataclass(frozen=True)
 class Assembly:
-    """A pitch-plane system to compute: effects extend it, engines read it.
+    """A pitch-plane system to be computed. Effects extend it, and engines build models from it.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Assembly:
 
     @property
     def guided(self) -> tuple[int, ...]:
-        """Coordinates that the input prescribes; empty for most modes."""
+        """Indices of the coordinates that the input prescribes; empty for most modes."""
         return GUIDED.get(self.mode, ())
 
     def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
@@ -59,8 +59,9 @@ class Assembly:
         return replace(self, mode=mode, input=signal)
 
     def with_moment(self, signal: Signal) -> "Assembly":
-        """A copy of the assembly with a pitch moment added on the chassis; it stands beside any forces, held ones
-        too."""
+        """A copy of the assembly with a pitch moment added on the chassis; it acts together with any forces, held ones
+        as well.
+        """
         assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
         return replace(self, moment=signal)
 
@@ -70,7 +71,7 @@ class Assembly:
         return replace(self, vehicle=replace(self.vehicle, pitch_springs=springs))
 
     def without_tyres(self) -> "Assembly":
-        """A copy of the assembly that is cut off the road."""
+        """A copy of the assembly without tyres, so that the road does not act on it."""
         struts = tuple(strut for strut in self.vehicle.struts if strut.lower.body is not None)
         return replace(self, vehicle=replace(self.vehicle, struts=struts))
 

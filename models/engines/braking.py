@@ -26,9 +26,10 @@ HEADER, HELD = 2, 6
 
 
 class WheelForces(NamedTuple):
-    """Wheel quantities that are constant over a step, each (W,): unit, place (m) in its axes and steer angle (rad)
-    of the wheel, and the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the
-    units."""
+    """Wheel quantities, each (W,), that are constant over a step: the unit, the position (m) in the unit's axes, the
+    steer angle (rad), and the mean forces (N) in the wheel's own axes. They are the rows at the end of the table,
+    behind the units' reach.
+    """
 
     unit: np.ndarray
     x: np.ndarray
@@ -40,7 +41,9 @@ class WheelForces(NamedTuple):
 
 @lean
 def held(numbers, time, q, v, f):
-    """Add the wheels' forces, held in their own axes, to those of the engine's coordinates; pointers to doubles."""
+    """Add the forces of the wheels to those of the engine's coordinates. The forces are constant in the wheels' own
+    axes; arguments are pointers to doubles.
+    """
     head = array(numbers, (HEADER,))
     units, wheels = int(head[0]), int(head[1])
     reach = array(beyond(numbers, HEADER), (units, units))
@@ -68,15 +71,16 @@ def held(numbers, time, q, v, f):
 
 @lean
 def set_held(block, t, n):
-    """Write the state that is constant over a step into a block of doubles at an address: forces f (set to zero), q and
-    v (n,), and the table."""
+    """Compute the wheels' forces for a state. The block of doubles at an address holds forces f (set to zero first), q
+    and v (n,), and the table.
+    """
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 def bodies(plane: Plane) -> SpatialVehicle:
-    """Units of a plane vehicle as bodies of an engine; each one after the first turns about its hinge.
+    """The units of a plane vehicle as bodies of an engine. Each unit after the first turns about its hinge.
 
     The hinge of unit k lies at reach[k, j] ahead of the units j < k and reach[k, k] behind its own centre.
     """
@@ -94,7 +98,7 @@ def bodies(plane: Plane) -> SpatialVehicle:
 
 
 class CarriedChassis:
-    """The chassis of a plane vehicle in an engine; ``advance`` replaces the compiled function of that name."""
+    """The chassis of a plane vehicle in an engine. Its ``advance`` replaces the compiled function of that name."""
 
     def __init__(self, engine: str, plane: Plane) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
@@ -107,8 +111,9 @@ class CarriedChassis:
     def advance(
         self, motion: PlaneMotion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
-        """Advance a braked vehicle as ``models.brake.advance.advance`` (with a ``Lag``, ``advance_lagging``) does, each
-        step moved by the engine."""
+        """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
+        engine computes the motion in each step.
+        """
         time, report, go = 0.0, Report(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
@@ -124,7 +129,9 @@ class CarriedChassis:
         return FINE, time
 
     def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
-        """March a braked vehicle as ``models.brake.samples.samples`` does, each step moved by the engine."""
+        """March a braked vehicle as ``models.brake.samples.samples`` does; the engine computes the motion in each
+        step.
+        """
         return moved(self.advance)(*given)
 
     def _moved(self, state_before: np.ndarray, step: float) -> np.ndarray:

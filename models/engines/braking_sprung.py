@@ -52,7 +52,9 @@ BLINK = 1e-5
 
 
 def driven(vehicle: Sprung, engine: str) -> Driven:
-    """The vehicle for "exudyn" or "mujoco": what the engine has of springs, and the table of all other forces."""
+    """The vehicle for "exudyn" or "mujoco": springs as far as the engine has them, and the table of all other
+    forces.
+    """
     handling = vehicle.handling
     division = divided(handling, engine)
     wheels = np.zeros(HELD * len(handling.vehicle.tyres))
@@ -62,7 +64,9 @@ def driven(vehicle: Sprung, engine: str) -> Driven:
 
 
 class OnSprings:
-    """The vehicle in an engine; ``advance`` replaces the compiled function of that name, with all coordinates."""
+    """A vehicle on its suspension in an engine. Its ``advance`` replaces the compiled function of that name, with all
+    coordinates.
+    """
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
@@ -73,7 +77,8 @@ class OnSprings:
 
     @cached_property
     def liveliness(self) -> float:
-        """Largest rate (m/s^2) at which side forces of slope 1 at a speed of 1 m/s damp a motion; g of a point mass.
+        """Largest rate (m/s^2) at which side forces of slope 1 damp a motion at a speed of 1 m/s; for a point mass it
+        is g.
 
         A body that rolls lets its contacts go sideways more easily than its mass would.
         """
@@ -88,12 +93,13 @@ class OnSprings:
 
     @cached_property
     def _model(self) -> FreeModel:
-        """Built with the first step."""
+        """The engine's model, built when the first step needs it."""
         return free_model(self.engine, self._driven)
 
     def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
-        """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called
-        so."""
+        """Functions that advance the vehicle and that generate samples, with or without lag of the tyres; compiled
+        where compiled code can call the engine.
+        """
         if self._model.compiled() is not None:
             from models.engines import braking_sprung_mujoco as native
 
@@ -107,7 +113,7 @@ class OnSprings:
 
     @cached_property
     def _on_engine(self) -> OnEngine:
-        """Data for time steps of a vehicle whose tyres answer without lag."""
+        """Data that time steps need for a vehicle whose tyres respond without lag."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,
@@ -122,7 +128,7 @@ class OnSprings:
         )
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
-        """``AtWheels`` of the wheel quantities at the end of a table."""
+        """``AtWheels`` for the wheel quantities at the end of a table; these share the table's memory."""
         wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
         return AtWheels(
             WheelForces(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels)
@@ -137,8 +143,8 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
-        """Advance the vehicle as ``models.brake.advance.advance`` does, the state (2, n) having all coordinates and
-        their rates.
+        """Advance the vehicle as ``models.brake.advance.advance`` does; the state (2, n) has all coordinates and their
+        rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
@@ -158,8 +164,9 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """March the vehicle as ``models.brake.samples.samples`` does, lag being of tyres that lag; Refused for a step
-        that is too long, RunFailed as ``advance``."""
+        """March the vehicle as ``models.brake.samples.samples`` does; ``lag`` : of tyres that lag. Refused for a step
+        that is too long, RunFailed as in ``advance``.
+        """
         _, by_steps = self._go(lag is not None)
         step, on_engine = sample / (braking.torques.shape[0] - 1), self._on_engine
         self.check_step(step)
@@ -174,7 +181,7 @@ class OnSprings:
             yield self._sound(status, time), time, speed, supply
 
     def check_step(self, step: float) -> None:
-        """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
+        """Refuse a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
         if step in self._allowed:
             return
         check_modes(
@@ -194,7 +201,9 @@ class OnSprings:
         return status
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' speeds of
+        turning (W,).
+        """
         on_engine, none = self._on_engine, np.zeros(steer.size)
         known = self._at_wheels(on_engine.numbers)
         for part in known.held:
@@ -212,5 +221,7 @@ class OnSprings:
 
 
 def _alike(vehicle: OnRoad) -> OnRoad:
-    """The vehicle in the one type for which steps are compiled, whatever it tows: they do not count its units."""
+    """The vehicle in the single type for which steps are compiled, whatever it tows: the steps do not count its
+    units.
+    """
     return vehicle._replace(plane=vehicle.plane._replace(units=(0,)))

@@ -14,7 +14,7 @@ by_steps = samples.compiled(advance, "by_steps_in_mujoco")
 
 @cache
 def lagging() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """The compiled functions for tyres that lag."""
+    """The compiled functions that advance, and that generate samples, with tyres that lag."""
     from models.brake.sprung_relaxation import relax
 
     go = compiled("lagging_in_mujoco", accelerate=accelerate, march=march, relax=relax)

@@ -32,7 +32,7 @@ NAME = "reference"
 
 
 class PlainOnSprings:
-    """The vehicle by plain code; ``advance`` and ``moving`` as those of ``OnSprings``."""
+    """A vehicle on its suspension in plain code, with ``advance`` and ``moving`` as in ``OnSprings``."""
 
     def __init__(self, vehicle: Sprung) -> None:
         self.vehicle, self.size, self.suspension = vehicle, vehicle.size, Suspension(vehicle)
@@ -48,7 +48,7 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "LaggingTyres | None" = None,
     ) -> tuple[int, float]:
-        """Advance the vehicle in plain code as ``models.brake.advance.advance`` does, the state (2, n) having all
+        """Advance the vehicle in plain code as ``models.brake.advance.advance`` does; the state (2, n) has all
         coordinates and their rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
@@ -70,7 +70,7 @@ class PlainOnSprings:
         return FINE, time
 
     def _moving(self, motion: PlaneMotion, lag: "LaggingTyres | None") -> Moving:
-        """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
+        """The arrays of the compiled motion in the form of the plain code: the report has a row for each wheel."""
         return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations, lag)
 
     def moving(
@@ -83,8 +83,9 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """March the vehicle in plain code as ``models.brake.samples.samples`` does, lag being of tyres that lag;
-        Refused for a step that is too long, RunFailed as ``advance``."""
+        """March the vehicle in plain code as ``models.brake.samples.samples`` does; ``lag`` : of tyres that lag.
+        Refused for a step that is too long, RunFailed as in ``advance``.
+        """
         torques, time, status, lagging = braking.torques, 0.0, FINE, None
         if lag is not None:
             from models.brake.plain.relaxation import LaggingTyres
@@ -109,10 +110,12 @@ class PlainOnSprings:
                     break
 
     def check_step(self, step: float) -> None:
-        """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
+        """Refuse a step (s) with which a mode of the vehicle on its springs and tyres would be unstable."""
         settings = Settings(INTEGRATORS["mujoco"], step, LONG_RUN * step)
         check_modes(NAME, linearise(self.vehicle.handling.vehicle), settings)
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' speeds of
+        turning (W,).
+        """
         return Steps(self.suspension, Course(vehicle, steer, 0.0), BLINK).rolling(state)

@@ -55,7 +55,8 @@ OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5,
 
 @dataclass(frozen=True)
 class Wheels:
-    """Wheels that roll side by side, each on springs and dampers to a frame that moves on at ``speed``.
+    """Wheels that roll side by side. Springs and dampers connect each to a frame that moves along the track at
+    ``speed``.
 
     count : of wheels; theory : of the contact, as scenes name it, or "none"; cells : per strip, where strips are;
     speed : V (m/s), negative backwards, also zero; load : N, on each wheel at rest; mu : coefficient of friction;
@@ -105,7 +106,7 @@ class Wheels:
 
     @cached_property
     def numbers(self) -> Array:
-        """The table that ``forces`` reads: head and net."""
+        """The table that ``forces`` reads: general numbers, then those of the theory."""
         if self.theory == "simplified":
             law = table(self.bodies, self.cells)
         else:
@@ -115,23 +116,23 @@ class Wheels:
 
     @cached_property
     def sunk(self) -> float:
-        """Approach (m) of a wheel at rest to its rail."""
+        """Approach (m) of a wheel to its rail under the load at rest."""
         if self.theory == "simplified":
             return press(self.bodies, self.pair, load=self.load).approach
         return float(by_load(*self.curvatures, self.load, self.pair).approach)
 
     @cached_property
     def bodies(self) -> Distance:
-        """Undeformed distance of a wheel on its rail."""
+        """Undeformed distance between a wheel and its rail."""
         return self.distance if self.distance is not None else quadratic(*self.curvatures, HALF_WIDTH, HALF_WIDTH)
 
     @property
     def sticking(self) -> Array:
-        """The table of the linear theory, the steepest of all."""
+        """The table of numbers for the linear theory, whose forces rise most steeply with creepage."""
         return replace(self, theory="linear").numbers
 
     def state(self, seed: int = 8) -> tuple[Array, Array]:
-        """Positions and rates (size,) with creepages about those at which the wheels begin to slide."""
+        """Random positions and rates (size,) whose creepages are about those at which the wheels begin to slide."""
         draw = np.random.default_rng(seed)
         q = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [1e-4, 1e-4, 5e-6, 1e-3]
         v = draw.normal(0.0, 1.0, (self.count, FREEDOMS)) * [0.02, 0.02, 1e-3, 0.5]
@@ -140,7 +141,8 @@ class Wheels:
 
 @njit(cache=True, error_model="numpy")
 def forces(numbers, t, q, v, f):
-    """Add the forces (N, N m) on all wheels to ``f``, for callbacks: all but the time are pointers to doubles.
+    """Add the forces (N, N m) on all wheels to ``f``, for callbacks; all arguments but the time are pointers to
+    doubles.
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
@@ -172,13 +174,13 @@ def forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def add_forces(numbers, q, v, f):
-    """``forces`` of arrays, for a callback that a Python function makes."""
+    """``forces`` with arrays as arguments, for a callback from Python."""
     forces(start(numbers), 0.0, start(q), start(v), start(f))
 
 
 @njit(cache=True, error_model="numpy")
 def set_forces(block, t, size):
-    """``forces`` in one block of doubles at an address, the least that Python can hand over.
+    """``forces`` with one block of doubles at an address, the least that Python can pass to compiled code.
 
     It holds f, q and v (size,) and the numbers; f is cleared before.
     """
@@ -189,7 +191,7 @@ def set_forces(block, t, size):
 
 @njit(cache=True, error_model="numpy")
 def slopes(numbers, q, v, by_q, by_v, sensitivity):
-    """Fill ``sensitivity`` (size, size) with by_q dF/dq + by_v dF/dv, central differences; for implicit integrators.
+    """Fill ``sensitivity`` (size, size) with by_q dF/dq + by_v dF/dv by central differences, for implicit integrators.
 
     No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
     wheels there are.
@@ -212,7 +214,9 @@ def slopes(numbers, q, v, by_q, by_v, sensitivity):
 
 
 def linear(wheels: Wheels) -> Linear:
-    """The wheels about rest with the forces of the linear theory, the steepest of all; see ``stability``."""
+    """Matrices of the wheels linearised about rest, with the linear theory, whose forces are the steepest; see
+    ``stability``.
+    """
     n, zeros = wheels.size, np.zeros(wheels.size)
     by_place, by_rate = np.zeros((n, n)), np.zeros((n, n))
     if wheels.theory != "none":
@@ -224,7 +228,7 @@ def linear(wheels: Wheels) -> Linear:
 
 
 def check_step(engine: str, wheels: Wheels, method: str, step: float, steps: int = LONG_RUN) -> None:
-    """Refuse a step (s) at which a motion of the wheels would grow over the run, naming the limit.
+    """Refuse a step (s) with which a motion of the wheels would grow over the run; the message gives the limit.
 
     MuJoCo's ``discrete`` is implicit in its own springs and dampers, not in forces of a callback: it goes by the limit
     of ``Euler``.

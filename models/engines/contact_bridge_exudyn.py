@@ -25,13 +25,16 @@ ROUTES = ("generic object", "loads", "before each step")
 
 
 def listed(size: int, numbers: Array, write_forces: Callable[[int, float, int], Any]) -> Listed:
-    """``packed_forces`` of a compiled law that knows no time, behind a block with a table of numbers."""
+    """``packed_forces`` of a compiled force law that does not depend on time; the block ends with the table
+    ``numbers``.
+    """
     packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), write_forces)
     return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
 class Forces:
-    """Forces of lists of positions and rates, as a list; the compiled kernel by addresses, or a Python ``law``.
+    """Function that returns a list of forces for lists of positions and rates, by the compiled kernel or by a Python
+    ``law``.
 
     ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor: those
     of the linear theory, the steepest that there are. With the slopes of a wheel that slides, next to none, Newton's
@@ -56,7 +59,7 @@ class Forces:
 
 
 class Rolling:
-    """Wheels in one Exudyn system.
+    """Wheels on springs in one Exudyn system.
 
     of : forces of positions and rates, None for no contact; route : one of ROUTES; slopes : as those of ``Forces``,
     for implicit solvers by the generic object; without them Exudyn differentiates by 2 size calls of ``of``.
@@ -107,7 +110,7 @@ class Rolling:
         ]
 
     def _loads(self, listed: Listed) -> None:
-        """The first load computes the forces of all."""
+        """Attach a load to every coordinate; the first load's callback computes the forces of all."""
         data, loads = self.mbs.systemData, [0.0] * self.wheels.size
 
         def first(mbs: Any, t: float, load: float) -> float:
@@ -119,7 +122,7 @@ class Rolling:
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
     def _before(self, listed: Listed) -> None:
-        """Compute the forces at the step's start, which are constant over the step."""
+        """Attach loads that are constant over a step; their forces are computed at its start."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
         def hold(mbs: Any, t: float) -> bool:
@@ -133,7 +136,7 @@ class Rolling:
     def run(
         self, q: Array, v: Array, steps: int, step: float = 1e-4, solver: str = "ExplicitEuler", tolerance: float = 0.0
     ) -> Array:
-        """State (2 size,) after some steps from positions and rates (size,); RunFailed unless it is finite.
+        """State (2 size,) after ``steps`` steps from positions and rates (size,); RunFailed unless it is finite.
 
         tolerance : relative, of a solver that picks its own steps, at most ``step`` long; 0 for steps as they are.
         Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.

@@ -16,7 +16,8 @@ JOINTS = ((SLIDE, (1.0, 0.0, 0.0)), (SLIDE, (0.0, 1.0, 0.0)), (SLIDE, (0.0, 0.0,
 
 
 def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
-    """Wheels on springs; the callback's numbers lie in the model, so that it serves every model of the process.
+    """MuJoCo model of the wheels on springs. The callback's numbers are stored in the model, so that one callback
+    serves all models of the process.
 
     Refused is raised for a step that the integrator cannot take.
     """
@@ -48,5 +49,5 @@ def empty_law() -> Any:
 
 
 def python_law(add: Callable[[Array, Array, Array, Array], Any]) -> Callable[[Any, Any], None]:
-    """Callback by a Python function of numbers, positions, rates and the forces it adds to, all arrays."""
+    """Callback that calls a Python function with arrays: numbers, positions, rates, and the forces to which it adds."""
     return lambda model, data: add(model.numeric_data, data.qpos, data.qvel, data.qfrc_passive)

@@ -49,7 +49,7 @@ UPRIGHT = 1.4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HubRun(Trajectory):
-    """A run, the chassis' six coordinates first, and its forces.
+    """A run and its forces; the chassis' six coordinates are the first ones of the states.
 
     elements (m, e): forces of springs, mounts and bars in the chassis' axes, compression positive, N or N m
     wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the frame of the hub inputs
@@ -62,7 +62,7 @@ class HubRun(Trajectory):
 
 
 class Written(FreeModel):
-    """The written-out equations."""
+    """Written-out equations of a vehicle, without an engine."""
 
     ENGINE = "reference"
 
@@ -70,7 +70,7 @@ class Written(FreeModel):
         self.driven, self.size, self.settings = driven, driven.size, None
 
     def plan(self) -> dict[str, int]:
-        """What was built: equations alone."""
+        """Counts of what was built: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -80,7 +80,7 @@ class Written(FreeModel):
         return rates
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
+        """Coordinates and rates (steps + 1, 2 n) at every step of the classical Runge-Kutta method."""
         states = np.empty((steps + 1, 2 * len(q)))
         states[0] = np.concatenate((q, v))
         march(self.numbers, states, step)
@@ -88,8 +88,8 @@ class Written(FreeModel):
 
 
 class HubModel:
-    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4, or by an
-    integrator that picks its own steps, from row to row of as many.
+    """A driven cut vehicle in one engine. It is marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4, or from
+    row to row of the same spacing by an integrator that picks its own steps.
 
     ``model`` is the free vehicle there.
     """
@@ -97,7 +97,8 @@ class HubModel:
     def __init__(
         self, engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, settings: Settings, forces: Route = "compiled"
     ) -> None:
-        """Refused where the step does not divide the duration or the inputs are not one row per half step.
+        """Build the model. Refused where the step does not divide the duration, or where the inputs do not have one row
+        per half step.
 
         settings : "RK4", or an integrator of the engine that picks its own steps.
         forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
@@ -133,11 +134,11 @@ class HubModel:
         return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
+        """Accelerations (n,) at a time (s), from coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
-        """From coordinates and rates (n,), unguarded; RunFailed where it stops."""
+        """March from coordinates and rates (n,) without a check of the attitude; RunFailed where the engine stops."""
         if not self.hub_inputs.held:
             return self._march(q, v, self.steps)
         states, counts = np.empty((self.steps + 1, 2 * self.size)), Counter[str]()
@@ -154,7 +155,7 @@ class HubModel:
         return Trajectory(self._times(self.steps), states, counts=dict(counts))
 
     def _march(self, q: np.ndarray, v: np.ndarray, steps: int) -> Trajectory:
-        """So many steps from time 0 on."""
+        """March ``steps`` steps from time 0 on."""
         if self.adaptive:
             from models.engines.free_vehicle_adaptive import march_adaptively
 
@@ -166,7 +167,7 @@ class HubModel:
         return self.step * np.arange(steps + 1)
 
     def _hold_forces(self, first: int, last_step: int) -> None:
-        """Let the model's time begin with a span of steps, over which the hubs' forces are held."""
+        """Restart the model's time at a span of steps over which the hub forces are constant."""
         hub_inputs = self.hub_inputs.during(first, last_step)
         if self.plain:
             self.plain.hub_inputs = hub_inputs
@@ -175,7 +176,7 @@ class HubModel:
             parts(self.model.numbers)[-1][: len(rows)] = rows
 
     def plan(self) -> dict[str, int]:
-        """Contents of the built model: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         return self.model.plan()
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:
@@ -191,21 +192,23 @@ class HubModel:
         return replace(self.reported(times, states), counts=path.counts)
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
-        """A run with the forces of its states."""
+        """The run of given states, with the forces that act in them."""
         if self.plain:
             inside, wrenches, moments = self.plain.report(times, states)
             return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
         return reported(self.vehicle, self.numbers, times, states)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
-        """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""
+        """Generalised forces (n,) on all joints (N, N m) that the compiled forces exert at time 0, at coordinates (n,)
+        with zero rates.
+        """
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()
 
 
 def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states: np.ndarray) -> HubRun:
-    """A run with the compiled forces of its states, by the vehicle's table of numbers."""
+    """The run of given states, with the compiled forces that act in them; ``numbers`` : the vehicle's table."""
     rows = len(times)
     inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
     wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
@@ -216,8 +219,9 @@ def reported(vehicle: CutVehicle, numbers: np.ndarray, times: np.ndarray, states
 def build(
     engine: str, vehicle: CutVehicle, hub_inputs: HubInputs, step: float, duration: float, forces: Route = "compiled"
 ) -> HubModel:
-    """A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco" for steps (s) of Runge-Kutta 4 over a duration
-    (s), as ``HubModel``; raises Refused."""
+    """A driven cut vehicle as ``HubModel`` in "reference", "plain", "exudyn" or "mujoco", for steps (s) of Runge-Kutta
+    4 over a duration (s); raises Refused.
+    """
     return HubModel(engine, vehicle, hub_inputs, Settings(FIXED, step, duration), forces)
 
 
@@ -229,8 +233,9 @@ def _plain(vehicle: CutVehicle, hub_inputs: HubInputs, step: float, any_time: bo
 
 @dataclass(frozen=True)
 class NativeShare:
-    """Native elements of a built model: names of the elements that are the engine's own, count of its joints; why
-    others are not."""
+    """Native elements of a built model: names of elements that the engine itself computes, number of its joints, and
+    reasons why other elements are not native.
+    """
 
     elements: tuple[str, ...]
     joints: int
@@ -238,8 +243,9 @@ class NativeShare:
 
 
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
-    """Parts of a vehicle that "exudyn" or "mujoco" computes by native elements, counted in a model that is built
-    without a callback."""
+    """Elements of a vehicle that "exudyn" or "mujoco" computes natively, counted in a model that is built without a
+    callback.
+    """
     division = divide(vehicle.tree, vehicle.elements, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
     elements, joints = built_share(engine, driven)
@@ -247,7 +253,9 @@ def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
-    """Refused where a mode of the vehicle on its tyres, which are stiffer than none, would grow at a step (s)."""
+    """Refuse a step (s) with which a mode of the vehicle on its tyres would grow; without tyres the vehicle is
+    softer.
+    """
     check_modes(engine, linearise(replace(vehicle.uncut, side_forces=())), Settings("RK4", step, duration))
 
 

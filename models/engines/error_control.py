@@ -20,7 +20,7 @@ class Adaptive(Strict):
 
 
 def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
-    """InputError for an engine, or an integrator, that does not pick its own steps."""
+    """InputError for an engine, or an integrator of it, that cannot pick its own steps."""
     for engine, adaptive in engines.items():
         if engine not in ADAPTIVE:
             allowed = "no engine with integrators that pick their own steps"
@@ -31,7 +31,7 @@ def check_engines(file: str, engines: Mapping[str, Adaptive]) -> None:
 
 
 def plan_lines(engines: Mapping[str, Adaptive], step: float) -> list[tuple[str, str]]:
-    """Heads and texts of a plan: what marches in place of Runge-Kutta 4, with rows every ``step`` (s)."""
+    """Lines of a plan, head and text, on the integrators that replace Runge-Kutta 4, with rows every ``step`` (s)."""
     return [
         (
             engine,

@@ -23,7 +23,9 @@ LIGHTEST_SHOWN_BODY = 1e-6
 
 @dataclass(frozen=True)
 class Exported:
-    """text : of the file; has : counts of what it holds, in words; left_out : what it does not hold, in words."""
+    """An exported model. text : of the file; has : texts with counts of what the file holds; left_out : texts on what
+    it does not hold.
+    """
 
     text: str
     has: tuple[str, ...]
@@ -60,7 +62,7 @@ def of_mujoco(
     export_subject: ExportSubject,
     omissions: Sequence[str],
 ) -> Exported:
-    """A model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
+    """Export a MuJoCo model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
     from models.engines.mujoco_export import counts, mjcf
 
     has, missing = tuple(counts(model)), tuple(omissions)
@@ -70,7 +72,7 @@ def of_mujoco(
 def of_exudyn(
     mbs: Any, coordinates: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
-    """An assembled system; coordinates : their places in Exudyn's vectors by their names."""
+    """Export an assembled Exudyn system; coordinates : their indices in Exudyn's vectors, by name."""
     from models.engines.exudyn_export import counts, script
 
     has, missing = tuple(counts(mbs)), tuple(omissions)
@@ -80,7 +82,7 @@ def of_exudyn(
 def export_free_vehicle(
     engine: str, driven: Driven, export_subject: ExportSubject, omissions: Sequence[str]
 ) -> Exported:
-    """A free vehicle without what its kernel does."""
+    """Export a free vehicle without the forces that its kernel computes."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
 
@@ -98,14 +100,14 @@ def export_free_vehicle(
 
 
 def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
-    """Names of bodies and joints in a file by those in a specification of ``mujoco_tree``."""
+    """Names of bodies and joints in the exported file, by their names in a specification of ``mujoco_tree``."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     bodies = {number: name if name != "world" else "world of the vehicle" for name, number in numbers.items()}
     return bodies | {f"{numbers[name]} {freedom}": f"{name} {freedom}" for name, freedom in vehicle.coordinates()}
 
 
 def masses_of_shown_bodies(vehicle: SpatialVehicle, shown_bodies: Iterable[str]) -> dict[str, float]:
-    """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
+    """Masses (kg) of those bodies that are shown, by their names in a specification of ``mujoco_tree``."""
     return {
         str(i): body.mass
         for i, body in enumerate(vehicle.bodies)
@@ -119,7 +121,7 @@ def coordinate_names(vehicle: SpatialVehicle) -> list[str]:
 
 
 def parts_left_out(vehicle: SpatialVehicle, native: Iterable[str] = ()) -> list[str]:
-    """Springs, bars and tyres of a vehicle that are not among the native ones, in words."""
+    """Texts that name the springs, bars and tyres of a vehicle, except those in ``native``."""
     kept = set(native)
     return [
         *(f"spring {spring.name!r}" for spring in vehicle.springs if spring.name not in kept),

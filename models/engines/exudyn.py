@@ -34,7 +34,7 @@ Reader = Callable[[Any, float, float], float]
 
 @dataclass
 class Build:
-    """Handles of what was put into Exudyn's system.
+    """Exudyn's system while it is being built, with handles of its items.
 
     places maps (body, "z" or "pitch") to a coordinate marker, nodes a body's name to its node.
     """
@@ -47,7 +47,7 @@ class Build:
 
 
 def _exact_bodies(assembly: Assembly) -> Build:
-    """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
+    """The vehicle as point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     built = Build(container, mbs)
@@ -85,7 +85,7 @@ def _exact_bodies(assembly: Assembly) -> Build:
 
 
 def ground_marker(mbs: Any) -> Any:
-    """A new coordinate that stands still."""
+    """Marker of a new coordinate that is fixed to the ground."""
     return _marker(mbs, mbs.AddNode(items.NodePointGround()), 0)
 
 
@@ -94,7 +94,7 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
 
 
 def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
-    """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
+    """Add a spring and damper between a coordinate and the ground; ``law`` replaces their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
     build.callbacks += len(keywords)
     build.mbs.AddObject(
@@ -108,9 +108,9 @@ def _to_ground(build: Build, place: tuple[str, str], element: Strut | PitchSprin
 
 
 def _pitch_spring(build: Build, spring: PitchSpring) -> None:
-    """A spring to the ground, with a law of its own where it has a dead band.
+    """Add a pitch spring to the ground; one with a dead band gets a force law as a callback.
 
-    Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
+    Exudyn has limit stops, but checks only once per step whether one is touched, not at every stage.
     """
 
     def moment(mbs: Any, t: float, item: int, angle: float, rate: float, *law: float) -> float:
@@ -121,8 +121,9 @@ def _pitch_spring(build: Build, spring: PitchSpring) -> None:
 
 
 def _pushing_tyre(build: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
-    """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
-    within a step."""
+    """Add a tyre that can lift, on a road of given height (m, down) and rate, with a callback: Exudyn has no item that
+    switches within a step.
+    """
 
     def force(mbs: Any, t: float, item: int, position: float, speed: float, *law: float) -> float:
         k, d, _ = law
@@ -133,7 +134,7 @@ def _pushing_tyre(build: Build, tyre: Strut, height: Reader, rate: Reader) -> No
 
 
 def _linear(assembly: Assembly) -> Build:
-    """One object with constant M, D, K: the vehicle linearised about zero pitch."""
+    """The vehicle linearised about zero pitch, as one object with constant mass, damping and stiffness matrices."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     linear = tuple(strut for strut in assembly.vehicle.struts if not strut.pushes_only)
@@ -159,12 +160,12 @@ def _linear(assembly: Assembly) -> Build:
 
 
 def native(assembly: Assembly) -> Build:
-    """Bodies, weights, springs and dampers without any input, in a system that is not assembled yet."""
+    """Bodies, weights, springs and dampers without any input, in an Exudyn system that is not yet assembled."""
     return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
 
 
 def columns(build: Build, vehicle: Vehicle) -> list[int]:
-    """Place of each of the four coordinates within Exudyn's vector, once the system is assembled."""
+    """Index of each of the four coordinates in Exudyn's vector, once the system is assembled."""
     if vehicle.geometry == "linear":
         return [0, 1, 2, 3]
     start = {name: build.mbs.GetNodeODE2Index(node) for name, node in build.nodes.items()}
@@ -172,7 +173,7 @@ def columns(build: Build, vehicle: Vehicle) -> list[int]:
 
 
 def _drive(build: Build, assembly: Assembly, clock: SignalClock) -> None:
-    """Put the input onto the wheels (and the chassis, for forces along its own axis)."""
+    """Apply the input to the wheels, and to the chassis as well if forces act along its own axis."""
     if clock.held:
         build.mbs.SetPreStepUserFunction(clock.advance)
         build.callbacks += 1
@@ -191,7 +192,7 @@ def _drive(build: Build, assembly: Assembly, clock: SignalClock) -> None:
 
 
 def _flat_road(mbs: Any, t: float, load: float) -> float:
-    """Height and rate of the road where there is no other."""
+    """Height and rate of a flat road, for a vehicle without road input."""
     return 0.0
 
 
@@ -201,7 +202,7 @@ def _load(build: Build, place: tuple[str, str], function: Any) -> None:
 
 
 def _body_fixed(build: Build, wheel: str, x: float, force: Reader) -> None:
-    """A force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
+    """Apply a force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
     node = build.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:
@@ -212,7 +213,7 @@ def _body_fixed(build: Build, wheel: str, x: float, force: Reader) -> None:
 
 
 def _prescribe(build: Build, assembly: Assembly, settings: Settings) -> list[Any]:
-    """Prescribed coordinates as constraints with their Lagrange multipliers; returns the constraints."""
+    """Add constraints, which have Lagrange multipliers, for the prescribed coordinates; returns the constraints."""
     if not assembly.guided or assembly.input is None:
         return []
     table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
@@ -222,7 +223,7 @@ def _prescribe(build: Build, assembly: Assembly, settings: Settings) -> list[Any
 
 
 def _constraint(build: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
-    """A coordinate that follows a path given at half steps."""
+    """Add a constraint by which a coordinate follows a path given at half steps."""
     build.callbacks += 2
     return build.mbs.AddObject(
         items.CoordinateConstraint(
@@ -234,7 +235,7 @@ def _constraint(build: Build, place: tuple[str, str], path: list[float], rate: l
 
 
 class ExudynModel:
-    """One assembly in one Exudyn system."""
+    """Model of one assembly in an Exudyn system."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
@@ -269,7 +270,9 @@ class ExudynModel:
         set_start(self.built.mbs, *whole)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
+        """Accelerations (4,) at a time (s), from coordinates and rates (4,) by Exudyn's own residual and mass
+        matrix.
+        """
         accelerations = self._free_acceleration(time, q, v)
         accelerations[list(self.assembly.guided)] = self._prescribed_accelerations(time)
         return accelerations
@@ -280,7 +283,7 @@ class ExudynModel:
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations with nothing enforced on the prescribed coordinates."""
+        """Accelerations of the vehicle if nothing enforced the prescribed coordinates."""
         self._set_state(q, v)
         if self.assembly.input is not None:
             self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
@@ -289,7 +292,7 @@ class ExudynModel:
         return np.linalg.solve(*mass_force)[self._columns]
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         data = self.built.mbs.systemData
         return {
             "degrees of freedom": 4,
@@ -315,7 +318,9 @@ class ExudynModel:
         return Trajectory(times, states, enforced, counts)
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces that enforce the prescribed coordinates at one row of a run, and their inertia terms (N, N m)."""
+        """Forces and moments that enforce the prescribed coordinates at one row of a run, and the inertia terms of
+        these (N, N m).
+        """
         wanted, free = (
             self._prescribed_accelerations(time),
             self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],
@@ -323,7 +328,7 @@ class ExudynModel:
         return self._inertia * (wanted - free), self._inertia * wanted
 
     def _consistent_start(self, options: Any) -> None:
-        """Begin with the accelerations that belong to the prescribed coordinates.
+        """Start with accelerations that are consistent with the prescribed coordinates.
 
         Exudyn leaves the constraint's own acceleration out of its initial values; the multiplier then
         rings, or never forgets the error.
@@ -337,7 +342,7 @@ class ExudynModel:
         options.timeIntegration.generalizedAlpha.resetAccelerations = False
 
     def _recorded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (n,) and states (n, 8) from the sensors; heave is y, pitch the rotation."""
+        """Times (n,) and states (n, 8) as the sensors stored them; Exudyn's y is the heave, its rotation the pitch."""
         read = self.built.mbs.GetSensorStoredData
         halves = [[read(sensor) for sensor in sensors] for sensors in self._sensors]
         times = halves[0][0][:, 0]
@@ -349,7 +354,7 @@ class ExudynModel:
         return grid if fixed else times, np.column_stack(states)
 
     def _enforced(self) -> np.ndarray | None:
-        """Enforced force and moment (n, constraints): the multipliers, with the sign of loads on the chassis.
+        """Enforced force and moment (n, constraints): the Lagrange multipliers, with the sign of loads on the chassis.
 
         Exudyn has no multipliers at t = 0 yet; those follow from the accelerations of the start.
         """

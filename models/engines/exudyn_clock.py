@@ -11,7 +11,7 @@ from models.engines.catalogue import CATALOGUE
 
 
 class SignalClock:
-    """A signal as Exudyn's callbacks read it: by step, by half step or at any time."""
+    """A signal in the form that Exudyn's callbacks read: by step, by half step or at any time."""
 
     def __init__(self, signal: Signal, settings: Settings) -> None:
         h, n = settings.step, settings.steps
@@ -29,7 +29,7 @@ class SignalClock:
         self.latest = (-1.0, np.empty(0))
 
     def reader(self, column: int, scale: float) -> Callable[[Any, float, float], float]:
-        """Callback (mbs, t, load) -> scale times one channel."""
+        """Callback (mbs, t, load) that returns ``scale`` times one channel of the signal."""
         if self.held:
             values = [scale * value for value in self.steps[column]]
             return lambda mbs, t, load: values[self.step]
@@ -39,12 +39,12 @@ class SignalClock:
         return lambda mbs, t, load: scale * self.at(t)[column]
 
     def at(self, t: float) -> np.ndarray:
-        """All channels at one time; the loads of one stage ask for the same time one after another."""
+        """All channels at one time. The last answer is kept, since all loads of a stage ask for the same time."""
         if t != self.latest[0]:
             self.latest = (t, self.signal.at(t))
         return self.latest[1]
 
     def advance(self, mbs: Any, t: float) -> bool:
-        """Called before each step: t is the step's end, so the step is the one before it."""
+        """Set the current step. Exudyn calls this before each step with the time t of the step's end."""
         self.step = min(round(t * self.per_time / 2) - 1, len(self.steps[0]) - 1)
         return True

@@ -66,7 +66,7 @@ if __name__ == "__main__":
 
 
 def script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
-    """Text of a script that builds an assembled system.
+    """Text of a Python script that builds an assembled Exudyn system.
 
     coordinates : place of every coordinate in Exudyn's vectors, by its name; comment : for people, at its head.
     """
@@ -76,14 +76,16 @@ def script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
 
 
 def counts(mbs: Any) -> Sequence[str]:
-    """Numbers of items that the exported script of a system builds, in words."""
+    """Texts with the numbers of items that the exported script of a system builds."""
     writer = _Writer(mbs)
     writer.system()
     return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
 
 
 def functions(mbs: Any) -> tuple[str, ...]:
-    """Items that an exported script lacks, by name: those whose law is a function, and what one adds."""
+    """Names of the items that an exported script lacks because their law is a function, or because a function adds to
+    it.
+    """
     writer, data = _Writer(mbs), mbs.systemData
     places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
     acting = ((kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _acts(item))
@@ -97,7 +99,7 @@ def _acts(item: dict[str, Any]) -> bool:
 
 @dataclass
 class _Writer:
-    """Lines that build a system again; an item is written before the first that needs it, and once."""
+    """Writer of the lines that rebuild a system. Each item is written once, before the first item that refers to it."""
 
     mbs: Any
     lines: list[str] = field(default_factory=list)
@@ -105,7 +107,7 @@ class _Writer:
     counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
 
     def system(self) -> list[str]:
-        """All lines: nodes first, so that coordinates keep their order."""
+        """All lines of the script; nodes come first, so that coordinates keep their order."""
         data = self.mbs.systemData
         for kind, count in (
             ("node", data.NumberOfNodes()),
@@ -118,17 +120,17 @@ class _Writer:
         return self.lines
 
     def item(self, kind: str, number: int) -> dict[str, Any]:
-        """Exudyn's dictionary of an item."""
+        """Exudyn's dictionary that describes an item."""
         item: dict[str, Any] = getattr(self.mbs, f"Get{kind.capitalize()}")(number)
         return item
 
     def _by_function(self, kind: str, number: int) -> bool:
-        """Whether a function is an item's law."""
+        """Whether the law of an item is given by a function, so that it cannot be exported."""
         item = self.item(kind, number)
         return _acts(item) and _class(kind, item) not in ADDING
 
     def need(self, kind: str, number: int) -> str:
-        """The variable of an item, which is written now if it was not."""
+        """Name of the variable of an item in the script; the item is written now if it has not been."""
         variable = f"{kind}{number}"
         if variable not in self.written:
             self.written.add(variable)
@@ -142,7 +144,7 @@ class _Writer:
         return variable
 
     def _arguments(self, kind: str, item: dict[str, Any]) -> Iterator[tuple[str, str]]:
-        """Names and texts of the values that differ from Exudyn's defaults."""
+        """Names and texts of an item's arguments that differ from Exudyn's defaults."""
         usual = dict(getattr(items, _class(kind, item))())
         for key, value in item.items():
             referred = REFERENCES.get(key.removesuffix("s"))
@@ -163,7 +165,7 @@ def _class(kind: str, item: dict[str, Any]) -> str:
 
 
 def _python_text(value: Any) -> str:
-    """A value as the script has it; matrices as arrays, Exudyn's own lists by their constructors."""
+    """Text of a value in the script: matrices as arrays, Exudyn's own lists by their constructors."""
     if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
         entries: Any = value  # Exudyn's type hints do not know that these are lists
         inner = ", ".join(_python_text(np.asarray(entries[i]).tolist()) for i in range(len(entries)))

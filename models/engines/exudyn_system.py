@@ -23,7 +23,8 @@ UserFunction = Callable[[Any, float, int, Any, Any], Any]
 
 
 def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, float, int], Any]) -> UserFunction:
-    """``fill(address, time, size)`` of a block of doubles: forces, positions, rates (size,), then a table.
+    """User function of Exudyn that packs its lists into one block of doubles for ``write_forces(address, time, size)``.
+    The block holds forces, positions and rates (size,), then a table.
 
     Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
     compiled kernel work on its address and to return a list costs least.
@@ -40,7 +41,7 @@ def packed_forces(size: int, block: np.ndarray, write_forces: Callable[[int, flo
 
 
 def add_node(mbs: Any, size: int) -> Any:
-    """A node of so many coordinates, all zero."""
+    """Add a node with ``size`` coordinates, all zero."""
     zero = [0.0] * size
     return mbs.AddNode(
         items.NodeGenericODE2(
@@ -50,14 +51,14 @@ def add_node(mbs: Any, size: int) -> Any:
 
 
 def quiet_settings() -> Any:
-    """Simulation settings that write no file and store nothing."""
+    """Simulation settings with which Exudyn writes no files and stores no sensor values."""
     options = exu.SimulationSettings()
     options.solution.file.write = options.solution.sensors.active = False
     return options
 
 
 def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
-    """Sensors that store the coordinates of every node, and those that store their rates."""
+    """Add sensors that store the coordinates of every node, and sensors that store their rates."""
     return [
         [
             mbs.AddSensor(
@@ -70,7 +71,7 @@ def recorders(mbs: Any, nodes: Collection[Any]) -> list[list[Any]]:
 
 
 def set_start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
-    """Let a system begin with coordinates and rates (n,), in Exudyn's own order."""
+    """Set the coordinates and rates (n,) with which a system begins, in Exudyn's order."""
     initial = exu.ConfigurationType.Initial
     mbs.systemData.SetODE2Coordinates(q, initial)
     mbs.systemData.SetODE2Coordinates_t(v, initial)
@@ -91,7 +92,7 @@ def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]
 
 
 def ties(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """(c, n) at each of some coordinates (n,): derivatives by them of Exudyn's own constraints."""
+    """Jacobians (c, n) of Exudyn's own constraints with respect to the coordinates, one for each of ``places`` (n,)."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     solver.InitializeSolver(mbs, options)
@@ -107,7 +108,7 @@ def ties(mbs: Any, places: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def tie_gaps(mbs: Any, q: np.ndarray) -> np.ndarray:
-    """(c,): how far coordinates (n,) are from satisfying Exudyn's own constraints."""
+    """Residuals (c,) of Exudyn's own constraints at coordinates (n,)."""
     mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Initial)
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
@@ -119,7 +120,7 @@ def tie_gaps(mbs: Any, q: np.ndarray) -> np.ndarray:
 
 
 def march_settings(settings: Settings) -> Any:
-    """Exudyn's settings of a march all of whose steps the sensors store."""
+    """Exudyn's settings for a march in which sensors store every step."""
     options = quiet_settings()
     options.solution.sensors.active, options.solution.sensors.writePeriod = True, settings.step
     ti = options.timeIntegration
@@ -131,8 +132,9 @@ def march_settings(settings: Settings) -> Any:
 
 
 def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
-    """March by an integrator, with Exudyn's ``options`` or those of ``march_settings``; returns the solver's message,
-    empty if there is none."""
+    """March with an integrator and Exudyn's ``options``, by default those of ``march_settings``. Returns the solver's
+    message, empty if there is none.
+    """
     options = options or march_settings(settings)
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
@@ -142,7 +144,7 @@ def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
 
 
 def solver_failure(mbs: Any, integrator: str, options: Any) -> str:
-    """How Exudyn's solver ended, as a phrase; empty if well."""
+    """Run Exudyn's solver; returns a phrase on how it failed, empty if it did not."""
     try:
         done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, integrator))
     except (exu.ExudynError, RuntimeError, ValueError) as error:

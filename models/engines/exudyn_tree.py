@@ -31,7 +31,7 @@ SLIDES = {
 
 @dataclass
 class Build:
-    """Exudyn's system while it is put together.
+    """Exudyn's system while it is being built.
 
     links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
     coordinate; markers by body and point; frames: axes (3, 3) of the last link of every body as columns.
@@ -48,7 +48,7 @@ class Build:
     callbacks: int = 0
 
     def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
-        """Marker of a point, made once; ``turning``: it is asked for its axes or its turning, too."""
+        """Marker of a body's point, made once. ``turning`` : whether its axes or its rotation are needed as well."""
         apart = turning and body is not None and self.links[body][1] is None
         key = (body, point, apart or (body, point, True) in self.markers)
         if key not in self.markers:
@@ -66,7 +66,7 @@ class Build:
         return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
 
     def frame_marker(self, body: str | None, point: Vector, axes: np.ndarray) -> Any:
-        """Marker of a point with axes (3, 3) as columns, as they lie in the design position; for bodies of trees."""
+        """Marker of a point with axes (3, 3), its columns, given in the design position; only for bodies in trees."""
         if body is None:
             frame = lists.HT(rotation=axes.tolist(), translation=list(point))
             return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.ground, localHT=frame))
@@ -76,7 +76,9 @@ class Build:
         return self.mbs.AddMarker(items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localHT=frame))
 
     def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
-        """Function that reads a coordinate, or its rate, at the stage; 0 where the body does not have it."""
+        """Function that reads a coordinate, or its rate, at the current stage; it returns 0 if the body does not have
+        the coordinate.
+        """
         if (body, freedom) not in self.places:
             return lambda: 0.0
         read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
@@ -85,11 +87,11 @@ class Build:
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
-        """Number of coordinates of a node."""
+        """Number of coordinates that a node has."""
         return sum(node == each for each, _ in self.places.values())
 
     def in_body_axes(self, body: str | None, vector: np.ndarray) -> np.ndarray:
-        """A vector (3,) of the design position in the axes that Exudyn gives a body."""
+        """A vector (3,) that is given in the design position, in the axes that Exudyn uses for a body."""
         if body is None:
             return vector
         if self.links[body][1] is not None:
@@ -101,12 +103,16 @@ class Build:
         return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
 
     def spring(self, first: Any, second: Any, **law: Any) -> None:
-        """A native spring-damper between two points along the space's axes, or a function of its place and speed."""
+        """Add a native spring-damper between two points along the axes of space, or one whose force is a function of
+        place and speed.
+        """
         self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first, second], **law))
         self.callbacks += "springForceUserFunction" in law
 
     def connect(self, name: str, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
-        """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
+        """Connect two points by a force law. The force on the first (N, axes of space) depends on the second's position
+        and rate relative to the first.
+        """
         self.spring(
             first,
             second,
@@ -117,14 +123,14 @@ class Build:
 
 @dataclass
 class Link:
-    """The mass behind a joint; ``centre`` counts from the joint, ``inertia`` about the centre."""
+    """Mass that a joint carries. ``centre`` is measured from the joint, ``inertia`` is about the centre."""
 
     mass: float = 0.0
     centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
 
     def load(self, body: Body, mass_centre: np.ndarray) -> None:
-        """Add a body's mass with its centre there."""
+        """Add a body's mass and inertia, with its centre at ``mass_centre``."""
         mass = self.mass + body.mass
         centre = (self.mass * self.centre + body.mass * mass_centre) / mass if mass else mass_centre
         self.inertia = (
@@ -137,7 +143,7 @@ class Link:
 
 
 def add_tree(build: Build, bodies: list[Body]) -> None:
-    """A body without parent and its riders: a link per coordinate, mass on the last one of each body.
+    """Add a body without parent and its riders: a link per coordinate, the mass of each body on its last link.
 
     A rider without freedoms adds its mass to the last link of what it rides on.
     """
@@ -176,7 +182,9 @@ def add_tree(build: Build, bodies: list[Body]) -> None:
 
 
 def add_slider(build: Build, body: Body) -> None:
-    """A body of one slide on the ground that carries nothing: with trees of one link a car takes 1.6 times as long."""
+    """Add a body on the ground that has one sliding coordinate and carries nothing. As trees of one link, a car would
+    take 1.6 times as long.
+    """
     still, (freedom,) = [0.0], body.freedoms
     node = build.mbs.AddNode(
         items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)

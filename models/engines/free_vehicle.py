@@ -40,15 +40,16 @@ ENGINES = ("exudyn", "mujoco")
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """vehicle : its bodies right before those that ride on them ; gravity (3,) in m/s^2.
+    """A free vehicle with the forces on it, as an engine builds it. vehicle : each body directly before those that ride
+    on it; gravity (3,) in m/s^2.
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces, None where the
-    engine has all of them as its own, and calls nothing back; block :
-    compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
-    parts, ground_springs, line_springs, turning_springs : springs, dampers, mounts and bars that the engine has as its
-    own beside the kernel's forces; frictions, couplings, connections : along its coordinates, between them, and between
-    points of bodies, as the engine has them: explicit integrators of Exudyn ignore the latter two; body_loads : forces
-    that turn with bodies.
+    engine computes all forces itself and calls nothing back; block : compiled function of (address, time, n) that
+    clears and fills the forces of a block f, q, v (n,) and numbers; parts, ground_springs, line_springs,
+    turning_springs : springs, dampers, mounts and bars that the engine itself computes, in addition to the kernel's
+    forces; frictions, couplings, connections : along its coordinates, between them, and between points of bodies, as
+    the engine has them: explicit integrators of Exudyn ignore the latter two; body_loads : forces that turn with
+    bodies.
     """
 
     vehicle: SpatialVehicle
@@ -72,17 +73,17 @@ class Driven:
 
     @property
     def tied(self) -> bool:
-        """Whether constraints tie coordinates or bodies."""
+        """Whether the vehicle has constraints between coordinates or bodies."""
         return bool(self.couplings or self.connections)
 
     @property
     def has_kernel(self) -> bool:
-        """Whether compiled forces act beside the engine's own."""
+        """Whether a compiled kernel adds forces to those that the engine itself computes."""
         return self.kernel is not None
 
 
 class FreeModel(ABC):
-    """A free vehicle built in one engine; ``settings`` are those of ``run``."""
+    """A free vehicle built in one engine; ``settings`` are needed for ``run`` only."""
 
     ENGINE: ClassVar[str]
 
@@ -93,30 +94,32 @@ class FreeModel(ABC):
 
     @property
     def numbers(self) -> np.ndarray:
-        """The table that the kernel reads: what is written there holds from then on."""
+        """The table that the kernel reads; values written into it hold from then on."""
         return self.driven.numbers
 
     @contextmanager
     def at_step(self, step: float) -> Iterator[None]:
-        """Context in which the engine is ready to be marched from outside by steps (s)."""
+        """Context in which the engine is ready for a march by its caller, in steps of ``step`` (s)."""
         self.step = step
         yield
 
     def compiled(self) -> Any:
-        """The handle by which compiled code calls the engine; None where the engine has none."""
+        """The handle with which compiled code can call the engine, None where the engine has none."""
         return None
 
     @abstractmethod
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        """Accelerations (n,) at a time (s), from positions and rates (n,)."""
 
     @abstractmethod
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
 
     @abstractmethod
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where the engine stops."""
+        """Positions and rates (steps + 1, 2 n) at every step, from initial ones (n,) each; RunFailed where the engine
+        stops.
+        """
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
         """March from positions and rates (n,), or from rest in the design position; states at every step.
@@ -132,29 +135,35 @@ class FreeModel(ABC):
 
 
 class Plain(FreeModel):
-    """The independent reference: plain equations of a vehicle, marched in plain numpy; it has no table."""
+    """The independent reference: plain equations of a vehicle, integrated in plain numpy; it has no table of
+    numbers.
+    """
 
     def __init__(self, engine: str, equations: "Acceleration", size: int, settings: Settings | None = None) -> None:
-        """equations : accelerations (n,) at a time (s), positions and rates (n,); engine : what a run is called."""
+        """equations : function that gives accelerations (n,) at a time (s), positions and rates (n,); engine : name of
+        a run.
+        """
         self.ENGINE, self.equations, self.size, self.settings = engine, equations, size, settings  # type: ignore[misc]
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        """Accelerations (n,) at a time (s), from positions and rates (n,)."""
         return self.equations(time, q, v)
 
     def plan(self) -> dict[str, int]:
-        """What was built: equations alone."""
+        """Counts of what was built: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; not finite from where it fails."""
+        """Positions and rates (steps + 1, 2 n) at every step, from initial ones (n,) each; not finite after a
+        failure.
+        """
         from models.multibody.plain.march import march
 
         return march(self.equations, q, v, steps, step)
 
 
 def free_model(engine: str, driven: Driven, settings: Settings | None = None) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco"; settings : wanted for runs, not for single steps."""
+    """The vehicle in "exudyn" or "mujoco"; settings : needed for runs, not for single steps."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
     model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven, settings)
@@ -162,7 +171,7 @@ def free_model(engine: str, driven: Driven, settings: Settings | None = None) ->
 
 
 def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
-    """Names of the springs, mounts and bars that a built model has as its own, and how many joints it has.
+    """Names of the springs, mounts and bars that a built model itself computes, and the number of its joints.
 
     Counted in the model; it is built without its callback, for which numba would compile.
     """
@@ -173,11 +182,12 @@ def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
 def native_share(
     vehicle: SpatialVehicle, native: Mapping[str, tuple[NativePart, ...]] | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Native joints and springs of each engine for a vehicle whose springs keep to the heading of its carrier, and why
-    no more: heads and texts of a plan. They are counted in built models.
+    """Lines of a plan, head and text, on the joints and springs that each engine computes natively, and on why others
+    are not native, for a vehicle whose springs keep to the heading of its carrier. They are counted in built models.
 
-    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it. What
-    acts along coordinates is native. native : further parts of each engine, of springs that keep to other bodies.
+    Such springs act along axes that turn with the carrier only, while both their ends roll and pitch relative to it.
+    Elements along coordinates are native. native : further parts of each engine, of springs that keep to other
+    bodies.
     """
     along, bars, lines = joint_parts(vehicle), len(vehicle.bars), []
     count = len(vehicle.springs) + len(along)

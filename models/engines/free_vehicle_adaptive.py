@@ -21,7 +21,8 @@ FINEST_TOLERANCE = 3e-14
 
 
 def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: Settings) -> Trajectory:
-    """From positions and rates (n,), rows every ``settings.step``; RunFailed unless all of it is finite and sane.
+    """March from positions and rates (n,) with rows every ``settings.step``; RunFailed unless all values are finite and
+    sane.
 
     model : of an engine that ``models.engines.catalogue.ADAPTIVE`` names, with one of its integrators there.
     """
@@ -33,7 +34,7 @@ def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: S
 
 
 def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
-    """States (steps + 1, 2 n), a row at a time, and what it took."""
+    """States (steps + 1, 2 n), marched in Exudyn one row at a time, and counts of steps and force calls."""
     from models.engines.exudyn_system import set_start, solver_counts, solver_failure
 
     mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
@@ -49,7 +50,7 @@ def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.nd
 
 
 def _options(begin: float, settings: Settings) -> Any:
-    """Exudyn's settings of one row from a time (s) on."""
+    """Exudyn's settings for the march from a time (s) to the next row."""
     from models.engines.exudyn_system import quiet_settings
 
     options = quiet_settings()
@@ -61,7 +62,7 @@ def _options(begin: float, settings: Settings) -> Any:
 
 
 def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
-    """States (steps + 1, 2 n) of plain equations by an adaptive scipy solver, and its counts."""
+    """States (steps + 1, 2 n) of plain equations, integrated by an adaptive scipy solver, and its counts."""
     from scipy.integrate import solve_ivp
 
     tolerance = max(settings.tolerance, FINEST_TOLERANCE)

@@ -36,14 +36,14 @@ from models.vehicles.spatial_linear import Preloads
 
 
 def share(driven: Driven) -> tuple[tuple[str, ...], int]:
-    """Names of the elements that have an object in the system, and the joints of its first tree."""
+    """Names of the elements that have an object in the built system, and the number of joints in its first tree."""
     model = FreeExudyn(driven)
     names = built_elements(model.mbs, [part.element.name for part in driven.parts])
     return names, len(model.mbs.GetObject(model.tree)["jointTypes"])
 
 
 class FreeExudyn(FreeModel):
-    """One free vehicle in one Exudyn system; the numbers of its user function lie behind a block of its own."""
+    """One free vehicle in one Exudyn system. The numbers for its user function are in a block of the model's own."""
 
     ENGINE = "exudyn"
 
@@ -82,11 +82,11 @@ class FreeExudyn(FreeModel):
 
     @property
     def numbers(self) -> np.ndarray:
-        """The table behind the block that the user function works on."""
+        """The table of numbers, which follows forces, positions and rates in the user function's block."""
         return self._block[3 * self.size :]
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         data = self.mbs.systemData
         native = data.NumberOfObjects() + data.NumberOfLoads()
         return {"degrees of freedom": self.size, "native items": native, "callbacks": int(self.driven.has_kernel)}
@@ -101,15 +101,17 @@ class FreeExudyn(FreeModel):
         return mass_and_force(self.mbs, time)
 
     def ties(self, places: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """(c, n) at each of some coordinates (n,): derivatives of Exudyn's own constraints by them."""
+        """Jacobians (c, n) of Exudyn's own constraints with respect to the coordinates, one for each of ``places``
+        (n,).
+        """
         return ties(self.mbs, places)
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
-        """(c,): how far coordinates (n,) are from satisfying Exudyn's own constraints."""
+        """Residuals (c,) of Exudyn's own constraints at coordinates (n,)."""
         return tie_gaps(self.mbs, q)
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float, integrator: str = "RK44") -> np.ndarray:
-        """Positions and rates (steps + 1, 2 n) by one of Exudyn's integrators; RunFailed where it stops."""
+        """Positions and rates (steps + 1, 2 n) with one of Exudyn's integrators; RunFailed where it stops."""
         set_start(self.mbs, q, v)
         if note := solve(self.mbs, Settings(integrator, step, steps * step)):
             raise RunFailed("exudyn", note.lstrip("; "))

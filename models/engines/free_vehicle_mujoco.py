@@ -35,7 +35,7 @@ from models.vehicles.spatial import SpatialVehicle
 
 
 def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
-    """Bodies that MuJoCo need not know apart from the only body that rides on each, by that one's name.
+    """Bodies that MuJoCo can merge with the only body that rides on them: name of the carrier to name of the rider.
 
     They have no mass, or are points about which the other does no more than turn: either way the other's mass and
     inertia, with the point's mass, move as both do.
@@ -53,7 +53,7 @@ def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
 
 
 def specified(driven: Driven) -> mujoco.MjSpec:
-    """Bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills."""
+    """Specification with bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills in."""
     spec = spec_of(driven.vehicle, 1e-3, _merged(driven))
     add_parts(spec, driven.vehicle, driven.parts)
     add_rotors(spec, driven.vehicle, rotors(driven.vehicle))
@@ -74,7 +74,7 @@ def specified(driven: Driven) -> mujoco.MjSpec:
 
 
 def _merged(driven: Driven) -> dict[str, str]:
-    """Bodies that are one with the only one that rides on each, and bear no end of a spring or a constraint."""
+    """Bodies that are merged with their only rider: those of ``carriers`` at which no spring or constraint ends."""
     held = [body for line in driven.line_springs for body, _ in line.ends]
     held += [body for connection in driven.connections for body, _ in connection.ends]
     held += [body for each in driven.turning_springs for body in each.bodies]
@@ -84,7 +84,7 @@ def _merged(driven: Driven) -> dict[str, str]:
 
 
 def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
-    """The model of ``specified`` with all its numbers, without the callback."""
+    """Model compiled from the specification of ``specified``, with all its numbers but without the callback."""
     model = spec.compile()
     model.numeric_data[:] = driven.numbers
     places = MujocoIndices(driven.vehicle, model, _merged(driven))
@@ -101,18 +101,18 @@ def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
 
 
 def compiled_model(driven: Driven) -> mujoco.MjModel:
-    """Bodies, joints, springs and the callback's numbers, without the callback."""
+    """Compiled model with bodies, joints, springs and the callback's numbers, but without the callback."""
     return compiled(specified(driven), driven)
 
 
 def share(driven: Driven) -> tuple[tuple[str, ...], int]:
-    """Names of the elements that have a tendon or an actuator in the model, and its joints."""
+    """Names of the elements that have a tendon or an actuator in the built model, and the number of its joints."""
     model = compiled_model(driven)
     return built_elements(model), int(model.njnt)
 
 
 class FreeMujoco(FreeModel):
-    """One free vehicle in one MuJoCo model; the callback's numbers lie in the model."""
+    """One free vehicle in one MuJoCo model; the callback's numbers are stored in the model."""
 
     ENGINE = "mujoco"
 
@@ -126,42 +126,42 @@ class FreeMujoco(FreeModel):
 
     @property
     def numbers(self) -> np.ndarray:
-        """The table in the model."""
+        """The table of the callback's numbers in the model."""
         return self.model.numeric_data
 
     @contextmanager
     def at_step(self, step: float) -> Iterator[None]:
-        """The callback is installed for the block, too."""
+        """Context for a march in steps of ``step`` (s), in which the callback is installed."""
         self.model.opt.timestep = step
         with installed(self.law):
             yield
 
     def compiled(self) -> Native:
-        """MuJoCo's own functions and arrays."""
+        """MuJoCo's functions and arrays for compiled code."""
         return native(self.model, self.data)
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         m = self.model
         native = m.nbody - 1 + m.njnt + m.ntendon + m.nu
         return {"degrees of freedom": m.nv, "native items": native, "callbacks": int(self.driven.has_kernel)}
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) by ``mj_forward``."""
+        """Accelerations (n,) from MuJoCo's ``mj_forward``."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q, v
         with installed(self.law):
             mujoco.mj_forward(self.model, self.data)
         return self.data.qacc.copy()
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """MuJoCo's own mass matrix (n, n), and the forces (n,) that it holds to move it, constraints included."""
+        """MuJoCo's own mass matrix (n, n) and generalised forces (n,), constraint forces included."""
         self.acceleration(time, q, v)
         mass = np.empty((self.size, self.size))
         mujoco.mj_fullM(self.model, self.data, mass)
         return mass, self.data.qfrc_smooth + self.data.qfrc_constraint
 
     def gaps(self, q: np.ndarray) -> np.ndarray:
-        """(c,): how far coordinates (n,) are from satisfying MuJoCo's own equality constraints."""
+        """Residuals (c,) of MuJoCo's own equality constraints at coordinates (n,)."""
         self.acceleration(0.0, q, np.zeros(self.size))
         gaps: np.ndarray = self.data.efc_pos[self.data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
         return gaps.copy()
@@ -175,7 +175,7 @@ class FreeMujoco(FreeModel):
             return np.vstack((start, self._marcher.run(start[None], steps)[0]))
 
     def _stepped(self, q: np.ndarray, v: np.ndarray, step: float) -> np.ndarray:
-        """One step without the costs of a loop; RunFailed where MuJoCo starts again at time zero."""
+        """State after one step, without the overhead of a loop; RunFailed where MuJoCo resets itself to time zero."""
         data = self.data
         data.time, data.qpos[:], data.qvel[:] = 0.0, q, v
         with installed(self.law):

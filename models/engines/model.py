@@ -8,16 +8,16 @@ from models.core.trajectory import Trajectory
 
 
 class Model(Protocol):
-    """A vehicle in an engine, or as written equations, with what drives it and how it is marched.
+    """A vehicle in an engine, or as written equations, together with its input and its time integration.
 
-    Ride asks beside that for a linear vehicle (``spatial_protocol``), and a braked vehicle, whose wheels take smaller
-    steps than its chassis, for single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is
-    not its coordinates and their rates, and marches of many lengths about one linearisation: it is
-    ``rail.equations.Equations``, of which an engine gives accelerations and marches by a ``FreeModel``.
+    Ride also needs a linear vehicle (``spatial_protocol``). A braked vehicle, whose wheels take smaller steps than its
+    chassis, also needs single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is not its
+    coordinates and their rates, and marches of many lengths about one linearisation: it is
+    ``rail.equations.Equations``, for which an engine gives accelerations and marches by a ``FreeModel``.
     """
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (n,)."""
+        """Accelerations (n,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (n,)."""
         ...
 
     def run(self) -> Trajectory:
@@ -25,5 +25,5 @@ class Model(Protocol):
         ...
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         ...

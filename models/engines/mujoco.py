@@ -32,7 +32,7 @@ INTEGRATORS = {
 
 
 def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
-    """Bodies and joints without those of ``guided`` coordinates, which stand still at zero."""
+    """Bodies and joints of the vehicle, without joints for the ``guided`` coordinates, which stay at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = [0, 0, vehicle.gravity]
@@ -94,7 +94,8 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
 
 @dataclass
 class ModelInput:
-    """How a model's input acts: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
+    """Input of a MuJoCo model: a table (rows, columns) of generalised forces per half step, controls (n, 2), and lever
+    arms.
 
     Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
     """
@@ -107,7 +108,9 @@ class ModelInput:
 
 
 def _drive(assembly: Assembly, settings: Settings) -> ModelInput:
-    """The input, and a law where the model's own items cannot do it: tables, turning forces, what goes slack."""
+    """The model's input, with a callback where native items cannot apply it: for tables, forces that turn, and springs
+    or tyres that lose contact.
+    """
     signal, h, n = assembly.input, settings.step, settings.steps
     slack = any(spring.dead_band for spring in assembly.vehicle.pitch_springs)
     slack = slack or any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
@@ -137,7 +140,9 @@ def _drive(assembly: Assembly, settings: Settings) -> ModelInput:
 
 
 def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Forces (rows, 2 or 3) on the free heave coordinates that the input stands for; motors apply held ones."""
+    """Generalised forces (rows, 2 or 3) on the free heave coordinates that the input causes; motors apply held
+    forces.
+    """
     if assembly.mode == "road":
         tyres = assembly.vehicle.tyres
         pushes = [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
@@ -152,8 +157,9 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 
 def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """Generalised forces that prescribed coordinates add to those of the struts on the free heave coordinates, shape
-    (rows, 2 or 3)."""
+    """Generalised forces (rows, 2 or 3) on the free heave coordinates that result from the prescribed coordinates
+    through the struts.
+    """
     count = len(assembly.guided)
     path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
     z, pitch, dz, turn = (
@@ -173,7 +179,7 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 def _compiled(
     assembly: Assembly, settings: Settings, drive: ModelInput, guided: Collection[int] = ()
 ) -> mujoco.MjModel:
-    """The model with its input table in its numeric data, behind what ``mujoco_callback`` reads before it."""
+    """The compiled model. Its numeric data hold the input table, after the numbers that ``mujoco_callback`` reads."""
     spec = specification(assembly.vehicle, settings, guided)
     gear = 0.0 if drive.arms is not None else -1.0
     for axle in assembly.vehicle.axles if drive.controls is not None else ():  # motors for forces held over a step
@@ -200,7 +206,7 @@ def _compiled(
 
 
 class MujocoModel:
-    """One assembly in one MuJoCo model (two, where the pitch is prescribed)."""
+    """Model of one assembly in MuJoCo; there is a second model where the pitch is prescribed."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
@@ -236,8 +242,9 @@ class MujocoModel:
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
     def controls(self) -> np.ndarray:
-        """Controls (steps, nu) of all actuators, the wheels' motors last; (steps, 0) where only springs act, which take
-        none."""
+        """Controls (steps, nu) of all actuators, the wheels' motors last; (steps, 0) where there are no motors, as
+        springs need no controls.
+        """
         if self.drive.controls is None:
             return np.zeros((self.settings.steps, 0))
         padded = np.zeros((self.settings.steps, self.model.nu))
@@ -245,7 +252,7 @@ class MujocoModel:
         return padded
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
         out = np.empty(4)
         with installed(self.drive.law):
             out[self.free] = self._free_acceleration(time, q, v, round(time / self.settings.step))
@@ -254,7 +261,7 @@ class MujocoModel:
         return out
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
-        """Accelerations of the coordinates that are not prescribed, within a step of the run."""
+        """Accelerations of the coordinates that are not prescribed, at a time within a given step of the run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]
@@ -262,7 +269,8 @@ class MujocoModel:
         return self.data.qacc
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Force and moment (n, guided) that the prescribed motion takes: inverse dynamics with all joints.
+        """Force and moment (n, guided) that enforce the prescribed motion, by inverse dynamics of a model with all
+        joints.
 
         Wheel forces and motors act on the wheels' heave only, so the rows of the chassis need neither.
         """
@@ -282,7 +290,7 @@ class MujocoModel:
         return enforced
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
+        """Counts of what was built: degrees of freedom, native items, callbacks."""
         native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
         law = int(self.drive.law is not None)
         return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": law}

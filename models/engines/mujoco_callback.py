@@ -28,7 +28,7 @@ FIELDS = ("numeric_data", "qfrc_passive", "time", "qpos", "qvel")
 
 @cache
 def kernel_law(kernel: Any) -> Any:
-    """Callback: a shell about a compiled kernel of (numbers, time, positions, rates, forces).
+    """Callback that passes MuJoCo's data to a compiled kernel of (numbers, time, positions, rates, forces).
 
     All but the time (s) are pointers to doubles, the numbers those of the model.
     """
@@ -49,7 +49,7 @@ def kernel_law(kernel: Any) -> Any:
 
 @register_jitable
 def _springs(header, force, pitch, rate):
-    """Add the moments of the springs whose dead band the pitch has left."""
+    """Add the moments of those pitch springs whose dead band the pitch exceeds."""
     for i in range(HEADER, HEADER + int(header[6]), 3):
         beyond = abs(pitch[3]) - header[i + 2]
         if beyond >= 0.0:
@@ -58,7 +58,9 @@ def _springs(header, force, pitch, rate):
 
 @cache
 def table_law() -> Any:
-    """Callback that adds the table's row at the stage's time to the first passive forces, and the springs."""
+    """Callback that adds the table's row at the time of the stage to the first passive forces, and the springs'
+    moments.
+    """
     numeric, passive, time, position, velocity = offsets(*FIELDS)
 
     @cfunc(CALLBACK, cache=True)
@@ -76,7 +78,7 @@ def table_law() -> Any:
 
 @cache
 def pushing_law() -> Any:
-    """Callback for tyres that only push, and the springs.
+    """Callback for tyres that only push, and for springs with a dead band.
 
     The road under the tyres is the table's or, where that has one row, of this height for ever.
     """
@@ -100,7 +102,8 @@ def pushing_law() -> Any:
 
 @cache
 def body_fixed_law() -> Any:
-    """Callback for wheel forces along the chassis' vertical axis: from the table or, where held, from the controls.
+    """Callback for wheel forces along the chassis' vertical axis, read from the table or, if they are held, from the
+    controls.
 
     A column of the table beyond those of the forces is a moment on the chassis.
     """

@@ -30,8 +30,7 @@ DIGITS = 17
 
 
 def add_shapes(spec: mujoco.MjSpec, masses: Mapping[str, float]) -> None:
-    """A box at every body of a specification that touches nothing and weighs nothing; masses (kg) by body, for its
-    size."""
+    """Add to bodies of a specification a box without contact and mass, to be seen; masses (kg) by body set its size."""
     spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [0.5, 0.5, 0.5]
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for i, (name, mass) in enumerate(masses.items()):
@@ -69,7 +68,7 @@ def mjcf(spec: mujoco.MjSpec, model: mujoco.MjModel, names: Mapping[str, str], t
 
 
 def _readable(model: mujoco.MjModel) -> None:
-    """Numbers that MuJoCo's compiler reads as they are meant."""
+    """Change those numbers of a model that MuJoCo's compiler would refuse or read with another meaning."""
     model.body_mass[1:] = np.maximum(model.body_mass[1:], SPECK)
     model.body_inertia[1:] = np.maximum(model.body_inertia[1:], SPECK)
     idle = (model.actuator_gainprm[:, 0] == 0.0) & (model.actuator_biasprm[:, 1] == 0.0)
@@ -80,7 +79,9 @@ def _readable(model: mujoco.MjModel) -> None:
 
 @contextmanager
 def _all_digits() -> Iterator[None]:
-    """MuJoCo writes files with all digits in the block: six else, which no header lets one change."""
+    """Within the block, let MuJoCo write files with all digits; its default is six, which no public header can
+    change.
+    """
     library = ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))))
     before = library._mjPRIVATE__get_xml_precision()
     library._mjPRIVATE__set_xml_precision(DIGITS)
@@ -91,6 +92,6 @@ def _all_digits() -> Iterator[None]:
 
 
 def counts(model: mujoco.MjModel) -> Sequence[str]:
-    """Numbers of the elements of a MuJoCo model, in words."""
+    """Texts with the numbers of bodies, joints, tendons and actuators in a MuJoCo model."""
     kinds = (("bodies", model.nbody - 1), ("joints", model.njnt), ("tendons", model.ntendon), ("actuators", model.nu))
     return [f"{count} {kind}" for kind, count in kinds if count]

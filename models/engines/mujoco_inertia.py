@@ -19,7 +19,9 @@ TOLD_SHARE = 1e-9
 
 
 def realisable(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
-    """The vehicle with tensors that MuJoCo's compiler takes, and sentences on what they leave out of its own."""
+    """The vehicle with inertia tensors that MuJoCo's compiler accepts, and sentences on the inertia that is lost
+    thereby.
+    """
     tensors = {body.name: np.array(body.inertia, float) for body in vehicle.bodies}
     for body in vehicle.bodies:
         if not _fits(tensors[body.name]):
@@ -30,13 +32,14 @@ def realisable(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
 
 
 def _fits(tensor: np.ndarray) -> bool:
-    """Whether some distribution of mass has the tensor (3, 3), or nothing has an inertia."""
+    """Whether a distribution of mass can have this inertia tensor (3, 3); zero inertia counts, too."""
     least, middle, largest = np.linalg.eigvalsh(tensor)
     return bool(least >= 0.0 and least + middle >= (1.0 + MARGIN) * largest)
 
 
 def _move_alike(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarray]) -> None:
-    """Replace a tensor where only a part of it counts: of what turns about one axis at most, and of a rotor.
+    """Replace a tensor by one that moves in the same way, possible for bodies that turn about one axis at most, and for
+    rotors.
 
     A rotor is as heavy about every axis across its axle: what is added there is constant in the axes of its carrier,
     and is taken from the heaviest body that always lies parallel to these.
@@ -53,12 +56,12 @@ def _move_alike(vehicle: SpatialVehicle, body: Body, tensors: dict[str, np.ndarr
 
 
 def _turning_freedoms(body: Body) -> list[str]:
-    """Freedoms by which a body turns beside what it rides on."""
+    """Rotational freedoms of a body relative to its carrier."""
     return [freedom for freedom in body.freedoms if freedom.startswith("r")]
 
 
 def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
-    """Bodies whose axes are always parallel to those of a body."""
+    """Names of the bodies whose axes always remain parallel to those of ``name``."""
 
     def leader(name: str) -> str:
         body = vehicle.body(name)
@@ -68,8 +71,9 @@ def _parallel(vehicle: SpatialVehicle, name: str) -> Sequence[str]:
 
 
 def _lower(name: str, tensors: dict[str, np.ndarray]) -> str:
-    """Lower the largest principal moment of a body to what a distribution of mass has; a sentence that says so, or
-    nothing where only rounding was in the way."""
+    """Lower the largest principal moment of a body to one that a distribution of mass can have. Returns a sentence that
+    says so, empty where the change is only rounding.
+    """
     moments, axes = np.linalg.eigh(tensors[name])
     largest, axis = float(moments[2]), axes[:, 2]
     moments = np.maximum(moments, 0.0)

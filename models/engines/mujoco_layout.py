@@ -65,7 +65,7 @@ def offsets(*fields: str) -> list[int]:
 
 
 def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Compare offsets with the addresses of the bound arrays; raises RuntimeError on a mismatch."""
+    """Compare offsets with the addresses of MuJoCo's arrays in Python; raises RuntimeError on a mismatch."""
     arrays = (("mjModel", model, ("numeric_data", "qpos0")), ("mjData", data, ("qfrc_passive", "qvel", "qpos")))
     for structure, owner, fields in arrays:
         for field in fields:

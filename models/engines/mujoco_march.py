@@ -18,14 +18,14 @@ FORCE_CALLS = {"RK4": 4}
 
 
 def warnings(data: mujoco.MjData) -> str:
-    """MuJoCo's own warnings as a phrase; empty if there are none."""
+    """Text with MuJoCo's own warnings; empty if there are none."""
     names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
     return f"; MuJoCo warned {', '.join(names)}" if names else ""
 
 
 def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step,
-    or none (steps, 0).
+    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step, or
+    without controls (steps, 0).
 
     In chunks, so that a run that has failed is not carried to its end. RunFailed where MuJoCo stops, starts again at
     time zero or warns; the guard names a worse reason if there is one.
@@ -48,19 +48,19 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
 
 
 def _chunks(steps: int) -> Iterator[tuple[int, int]]:
-    """First and last row of each part into which a run is cut."""
+    """First and last row of each chunk of a run."""
     for first in range(0, steps, CHUNK):
         yield first, min(first + CHUNK, steps)
 
 
 class Marcher:
-    """Runs of one model in one thread or more."""
+    """Runs of one MuJoCo model, in one thread or several."""
 
     def __init__(self, compiled_model: mujoco.MjModel, threads: int = 1) -> None:
         self.model, self._data = compiled_model, [mujoco.MjData(compiled_model) for _ in range(threads)]
 
     def run(self, states: np.ndarray, steps: int) -> np.ndarray:
-        """States (n, steps, 2 m) of n runs from ``states`` (n, 2 m); RunFailed unless all of it is finite."""
+        """States (n, steps, 2 m) of n runs that start at ``states`` (n, 2 m); RunFailed unless all are finite."""
         whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
         with marching(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
             path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]

@@ -18,7 +18,7 @@ _intrinsic: Any = intrinsic
 
 
 class Native(NamedTuple):
-    """A model for compiled functions: arrays that are MuJoCo's own, and addresses as whole numbers.
+    """A MuJoCo model for compiled functions: views of MuJoCo's own arrays, and addresses as integers.
 
     place, rate, acceleration (n,) : of the coordinates; time (1,) : s; forward, step, model, data : addresses.
     """
@@ -35,7 +35,7 @@ class Native(NamedTuple):
 
 @_intrinsic
 def _call(typing_context, function, model, data):
-    """The function void(mjModel*, mjData*) at an address."""
+    """Call the function void(mjModel*, mjData*) at an address."""
 
     def generate(context, builder, signature, arguments):
         pointer = ir.IntType(8).as_pointer()
@@ -54,7 +54,7 @@ def _library() -> ctypes.CDLL:
 
 
 def native(model: mujoco.MjModel, data: mujoco.MjData) -> Native:
-    """A model with its data, both of which must outlive it."""
+    """The model and its data for compiled functions; both must outlive the result."""
     time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
     forward, step = (
         ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0 for name in ("mj_forward", "mj_step")
@@ -83,7 +83,9 @@ def accelerate(native, q, v, out):
 
 @lean
 def march(native, q, v):
-    """Move positions and rates (n,) on by a step of the model's; False where MuJoCo starts again at time zero."""
+    """Advance positions and rates (n,), in place, by one step of the model; False where MuJoCo resets itself to time
+    zero.
+    """
     for i in range(q.size):
         native.place[i], native.rate[i] = q[i], v[i]
     native.time[0] = 1.0

@@ -22,7 +22,7 @@ def without_warnings() -> Iterator[None]:
 
 @contextmanager
 def installed(law: Any) -> Iterator[None]:
-    """Install a compiled callback, or none, for the block only: MuJoCo's callbacks are global to the process.
+    """Install a compiled callback, or none, within the block only: MuJoCo's callbacks are global to the process.
 
     Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.
     """

@@ -19,7 +19,7 @@ NO_CARRIERS: Mapping[str, str] = {}
 
 
 def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NO_CARRIERS) -> mujoco.MjSpec:
-    """Bodies and joints, with masses and inertias of 1 for the moment (see ``weigh``).
+    """Specification with the vehicle's bodies and joints; masses and inertias are 1 until ``set_masses`` sets them.
 
     Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
     rides on them, whose frame and name they get.
@@ -55,14 +55,16 @@ def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = 
 
 
 def _merged(carriers: Mapping[str, str], name: str) -> str:
-    """The body that a body is one with in MuJoCo."""
+    """The body with which a body is merged in MuJoCo, itself if with none."""
     while name in carriers:
         name = carriers[name]
     return name
 
 
 def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Principal inertias (3,) and the quaternion of their axes; nothing turns where there are no products."""
+    """Principal inertias (3,) and the quaternion of their axes, which is the identity if there are no products of
+    inertia.
+    """
     tensor, quaternion = np.array(body.inertia, float), np.array([1.0, 0.0, 0.0, 0.0])
     if np.array_equal(tensor, np.diag(tensor.diagonal())):
         return tensor.diagonal(), quaternion
@@ -73,7 +75,8 @@ def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 class MujocoIndices:
-    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order.
+    """Indices of a vehicle's bodies and coordinates in MuJoCo: ids of bodies by name, columns (n,) in the vehicle's
+    order.
 
     carriers : bodies that are one there with the only one that rides on them, by its name.
     """
@@ -90,7 +93,7 @@ class MujocoIndices:
 
 
 def set_masses(model: mujoco.MjModel, numbers: MujocoIndices, bodies: Iterable[Body]) -> None:
-    """Give the bodies their masses and principal inertias, summed where they are one."""
+    """Set masses and principal inertias in a model; bodies that are merged get the sum."""
     model.body_mass[1:] = model.body_inertia[1:] = 0.0
     for body in bodies:
         number = numbers.bodies[body.name]

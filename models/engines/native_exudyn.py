@@ -40,7 +40,7 @@ LAW, ROTORS, NEXT = "native law: ", "rotors: ", "; "
 
 
 def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
-    """All parts into a system whose one tree has its coordinates in ``node``."""
+    """Add all parts to a system with one tree, whose coordinates are in ``node``."""
     coordinates, trees, axial = Coordinates(build, node), _Trees(build, node), list[Axial]()
     for part in parts:
         if isinstance(part.travel, CoordinateTravel):
@@ -52,7 +52,7 @@ def add_parts(build: Build, node: Any, parts: Sequence[NativePart]) -> None:
 
 
 def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
-    """Inertias of what turns with a sum of coordinates alone, as one mass matrix beside the tree's."""
+    """Add inertias that move with sums of coordinates, as one mass matrix in addition to the tree's."""
     size = build.size(node)
     mass = np.zeros((size, size))
     for _, travel, inertia in rotors:
@@ -69,7 +69,7 @@ def add_rotors(build: Build, node: Any, rotors: Sequence[tuple[str, CoordinateTr
 
 
 def add_ground_spring(build: Build, spring: GroundSpring) -> None:
-    """A connector along the axes of space, and a load."""
+    """Add a spring-damper along the axes of space, and the spring's load."""
     foot, tip = build.marker(None, spring.anchor), build.marker(spring.body, spring.point)
     if any(spring.stiffness + spring.damping):
         build.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
@@ -78,7 +78,9 @@ def add_ground_spring(build: Build, spring: GroundSpring) -> None:
 
 
 def add_line_spring(build: Build, spring: LineSpring) -> None:
-    """A connector along the line between two points; Exudyn wants a length above 0, and has a constant force beside."""
+    """Add a spring-damper along the line between two points. Exudyn needs a length above 0; a constant force corrects
+    for it.
+    """
     length = spring.length if spring.length > 0.0 else 1.0
     build.mbs.AddObject(
         items.SpringDamper(
@@ -92,7 +94,7 @@ def add_line_spring(build: Build, spring: LineSpring) -> None:
 
 
 def add_body_load(build: Build, load: BodyLoad) -> None:
-    """A force and a moment along the axes of a body."""
+    """Add a force and a moment that turn with a body."""
     marker, axes = build.marker(load.body, load.point, True), {"bodyFixed": True}
     force, moment = (build.in_body_axes(load.body, vector) for vector in (load.force, load.moment))
     if force.any():
@@ -102,7 +104,9 @@ def add_body_load(build: Build, load: BodyLoad) -> None:
 
 
 def add_turning_spring(build: Build, spring: TurningSpring) -> None:
-    """A connector between frames of both bodies, of rotations alone, whose rotation is a vector and no angles."""
+    """Add a connector for rotations alone between frames of both bodies; it measures the rotation as a vector, not by
+    angles.
+    """
     ends = zip(spring.bodies, spring.axes, strict=True)
     places = {body: (0.0, 0.0, 0.0) if body is None else build.vehicle.body(body).position for body in spring.bodies}
     turning = np.diag((0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
@@ -117,7 +121,7 @@ def add_turning_spring(build: Build, spring: TurningSpring) -> None:
 
 
 def add_connection(build: Build, connection: Connection) -> None:
-    """A spherical joint, or one that leaves no freedom between frames of both bodies."""
+    """Add a spherical joint, or a rigid one between frames of both bodies."""
     if connection.axes is None:
         markers = [build.marker(*end) for end in connection.ends]
         build.mbs.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
@@ -128,24 +132,26 @@ def add_connection(build: Build, connection: Connection) -> None:
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
-    """The element names for which an assembled system has an object."""
+    """Those of the elements' names for which an assembled system has an object."""
     objects = [mbs.GetObject(i)["name"] for i in range(mbs.systemData.NumberOfObjects())]
     listed = {name for each in objects if each.startswith(LAW) for name in each.removeprefix(LAW).split(NEXT)}
     return tuple(name for name in elements if _plain(name) in listed)
 
 
 def _name(*elements: Element) -> str:
-    """Name of the Exudyn object that stands for these elements."""
+    """Name of the Exudyn object that represents these elements."""
     return LAW + NEXT.join(_plain(element.name) for element in elements)
 
 
 def _plain(name: str) -> str:
-    """An element's name without what stands between names."""
+    """An element's name without the separator that is put between names."""
     return name.replace(NEXT, " ")
 
 
 def _at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
-    """Parts along x, y and z at the same places together, no two along the same axis; every other one alone."""
+    """Groups of parts that one connector can represent: along different ones of x, y and z at the same places. Every
+    other part is a group by itself.
+    """
     groups = dict[object, list[Axial]]()
     for i, (element, travel) in enumerate(parts):
         places = (travel.frame, travel.body, *travel.foot, *travel.tip)
@@ -161,12 +167,12 @@ def _gains(element: Element) -> dict[str, float]:
 
 
 def _sunk(element: Element) -> float:
-    """Travel at which a spring has its preload."""
+    """Travel of a spring at which its force equals its preload."""
     return element.held / element.stiffness if element.stiffness else 0.0
 
 
 def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
-    """Law of one connector for parts along different axes; an axis may count backwards."""
+    """Law of one connector for parts along different axes; a part's axis may point backwards."""
     stiffness, damping, offset = np.zeros((3, 3))
     for element, travel in group:
         stiffness += element.stiffness * travel.axis**2
@@ -177,13 +183,13 @@ def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
 
 
 class Coordinates:
-    """Connectors and constraints between coordinates of one node."""
+    """Builder of connectors and constraints between coordinates of one node."""
 
     def __init__(self, build: Build, node: Any) -> None:
         self.built, self.node, self.markers = build, node, dict[int, Any]()
 
     def add(self, element: Element, travel: CoordinateTravel) -> None:
-        """One connector, or a matrix where more than two coordinates count."""
+        """Add one connector for an element, or a matrix where more than two coordinates take part."""
         if len(travel.coordinates) > 2:
             return self._add_matrix(element, travel)
         if not travel.coordinates:
@@ -205,14 +211,14 @@ class Coordinates:
         )
 
     def rub(self, friction: DryFriction) -> None:
-        """Dry friction of a coordinate against the ground."""
+        """Add dry friction of a coordinate against the ground."""
         markers, law = [self._still(), self._marker(friction.coordinate)], {"frictionProportionalZone": SLIDES}
         self.built.mbs.AddObject(
             items.CoordinateSpringDamperExt(markerNumbers=markers, dynamicFrictionForce=friction.force, **law)
         )
 
     def couple(self, coupling: Coupling) -> None:
-        """A rigid constraint; Exudyn's is factor1 q1 - q0 - offset = 0."""
+        """Add a rigid constraint between coordinates; Exudyn's form is factor1 q1 - q0 - offset = 0."""
         driver = self._still() if coupling.driver is None else self._marker(coupling.driver)
         markers = [self._marker(coupling.driven), driver]
         self.built.mbs.AddObject(
@@ -220,7 +226,7 @@ class Coordinates:
         )
 
     def _add_loads(self, element: Element, travel: CoordinateTravel) -> None:
-        """A constant force, which no spring has."""
+        """Add the constant force of an element as loads, since a spring without stiffness has none."""
         for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
             load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.held)
             self.built.mbs.AddLoad(load)
@@ -251,13 +257,15 @@ class Coordinates:
 
 
 class _Trees:
-    """Second trees, one for each body in which axes are fixed, and connectors from the ground to them."""
+    """Additional trees of links, one for each body that carries axes of connectors, and connectors from the ground to
+    them.
+    """
 
     def __init__(self, build: Build, node: Any) -> None:
         self.built, self.node, self.trees = build, node, dict[str, Any]()
 
     def add(self, group: Sequence[Axial]) -> None:
-        """One connector, from the place of the foot on the ground to the tip."""
+        """Add one connector, from the foot's position on the ground to the tip."""
         (element, travel), *others = group
         mbs, (link, origin) = self.built.mbs, anchor(self.built.vehicle, travel.body)
         foot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.built.ground, localPosition=travel.foot.tolist()))
@@ -282,8 +290,9 @@ class _Trees:
         )
 
     def _tree(self, frame: str) -> Any:
-        """The tree of links that a body carries, hung on the ground where the body lies in the design position; no
-        other link carries any."""
+        """The tree of links that a body carries, attached to the ground where the body is in the design position; made
+        once per body.
+        """
         if frame not in self.trees:
             self.trees[frame] = self.built.mbs.AddObject(self._new_tree(frame))
         return self.trees[frame]

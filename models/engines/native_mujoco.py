@@ -41,7 +41,7 @@ BREAK = ": "
 
 
 class Affine(NamedTuple):
-    """A force constant + slope L + damping L' of a length L (m) and its rate, within a range: N, N/m, N s/m."""
+    """A force constant + slope L + damping L' of a length L (m) and its rate, limited to a range; N, N/m, N s/m."""
 
     constant: float = 0.0
     slope: float = 0.0
@@ -51,13 +51,15 @@ class Affine(NamedTuple):
 
 
 def end_bodies(parts: Sequence[NativePart]) -> set[str]:
-    """Bodies on which parts have sites: MuJoCo must know them apart from what rides on them."""
+    """Bodies that carry sites of parts, so that MuJoCo must not merge them with their riders."""
     axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
     return {name for travel in axial for name in (travel.frame, travel.body)}
 
 
 def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[NativePart]) -> None:
-    """Tendons, sites and actuators into a specification of ``mujoco_tree.spec_of``; ``set_laws`` fills them."""
+    """Add tendons, sites and actuators for the parts to a specification of ``mujoco_tree.spec_of``; ``set_laws`` sets
+    their values.
+    """
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, part in enumerate(parts):
@@ -80,7 +82,7 @@ def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[Nati
 def add_rotors(
     spec: mujoco.MjSpec, vehicle: SpatialVehicle, rotors: Sequence[tuple[str, CoordinateTravel, float]]
 ) -> None:
-    """Tendons for inertias along sums of coordinates; ``set_rotors`` fills them."""
+    """Add tendons for inertias along sums of coordinates; ``set_rotors`` sets their values."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, (name, travel, _) in enumerate(rotors):
@@ -90,13 +92,15 @@ def add_rotors(
 
 
 def set_rotors(model: mujoco.MjModel, rotors: Sequence[tuple[str, CoordinateTravel, float]]) -> None:
-    """Write the inertias into the compiled model."""
+    """Write the inertias along sums of coordinates into the compiled model."""
     for i, (name, _, inertia) in enumerate(rotors):
         model.tendon_armature[model.tendon(f"{ROTOR}{i}{BREAK}{name}").id] = inertia
 
 
 def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
-    """An actuator along each axis of space on which something acts, between sites on the body and on the ground."""
+    """Add an actuator along each axis of space in which a ground spring acts, between sites on the body and on the
+    ground.
+    """
     number = len(spec.sites)
     tip, foot = f"ground spring {number}", f"ground {number}"
     _add_site(spec, vehicle, tip, spring.body, spring.point)
@@ -109,7 +113,7 @@ def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: Grou
 
 
 def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSpring) -> None:
-    """A spatial tendon between two sites; ``set_line_springs`` gives it its law."""
+    """Add a spatial tendon between two sites; ``set_line_springs`` sets its law."""
     number, tendon = len(spec.sites), spec.add_tendon(name=f"{LINE}{spring.name}")
     for i, end in enumerate(spring.ends):
         site = f"end {number + i}"
@@ -120,7 +124,7 @@ def add_line_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: LineSp
 def add_constraints(
     spec: mujoco.MjSpec, vehicle: SpatialVehicle, frictions: Sequence[DryFriction], couplings: Sequence[Coupling]
 ) -> None:
-    """Dry friction of joints and equality constraints between them; both are soft in MuJoCo."""
+    """Add dry friction of joints, and equality constraints between joints; MuJoCo makes both soft."""
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for friction in frictions:
@@ -140,7 +144,7 @@ def _allow_constraints(spec: mujoco.MjSpec) -> None:
 
 
 def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Connection) -> None:
-    """A soft equality constraint between two sites: of their places, or of their axes, too."""
+    """Add a soft equality constraint between two sites: of their positions alone, or of their axes as well."""
     axes = connection.axes or (np.eye(3), np.eye(3))
     first = len(spec.sites)
     for i, ((body, point), columns) in enumerate(zip(connection.ends, axes, strict=True)):
@@ -158,7 +162,7 @@ def add_connection(spec: mujoco.MjSpec, vehicle: SpatialVehicle, connection: Con
 
 
 def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) -> None:
-    """An actuator of constant force on a site."""
+    """Add an actuator that applies a constant force and moment at a site of a body."""
     site = f"load {len(spec.sites)}"
     _add_site(spec, vehicle, site, load.body, load.point)
     push = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=site)
@@ -167,7 +171,9 @@ def add_body_load(spec: mujoco.MjSpec, vehicle: SpatialVehicle, load: BodyLoad) 
 
 
 def add_turning_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: TurningSpring) -> None:
-    """An actuator about each axis of a site on the first body, whose length is that of the rotation vector along it."""
+    """Add an actuator about each axis of a site on the first body; its length is the rotation vector's component along
+    this axis.
+    """
     number = len(spec.sites)
     foot, tip = f"turn {number}", f"turn {number + 1}"
     for name, body, axes in zip((foot, tip), spring.bodies, spring.axes, strict=True):
@@ -186,7 +192,7 @@ def _quaternion(axes: np.ndarray) -> np.ndarray:
 
 
 def _add_site(spec: mujoco.MjSpec, vehicle: SpatialVehicle, name: str, body: str | None, point: Vector) -> Any:
-    """A site on a body (None: the ground), its place (m) in the design position."""
+    """Add a site to a body (None: the ground) at a point (m) of the design position."""
     if body is None:
         return spec.worldbody.add_site(name=name, pos=point)
     number = [each.name for each in vehicle.bodies].index(body)
@@ -194,7 +200,7 @@ def _add_site(spec: mujoco.MjSpec, vehicle: SpatialVehicle, name: str, body: str
 
 
 def set_line_springs(model: mujoco.MjModel, springs: Sequence[LineSpring]) -> None:
-    """Write stiffness, damping and length into the compiled model."""
+    """Write stiffness, damping and free length of the line springs into the compiled model."""
     for spring in springs:
         tendon = model.tendon(f"{LINE}{spring.name}").id
         model.tendon_stiffness[tendon], model.tendon_damping[tendon] = spring.stiffness, spring.damping
@@ -225,7 +231,7 @@ def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def affine_forces(element: NativePart) -> list[Affine]:
-    """Forces on the length L of a part, d = L less its design value, that a tendon's own spring does not have.
+    """Forces on the length L of a part, beyond the force of the tendon's own spring; d = L less its design value.
 
     They draw it together: where the element presses with F, they are -F.
     """
@@ -240,7 +246,7 @@ def affine_forces(element: NativePart) -> list[Affine]:
 
 
 def _lines(e: Element) -> Iterator[np.ndarray]:
-    """Constant, slope and damping (3,) of the first pieces of both curves."""
+    """Constant, slope and damping (3,) of the first straight piece of each of an element's two curves."""
     for curve, place in ((e.travel_force, 1), (e.rate_force, 2)):
         if curve is not None:
             line = np.zeros(3)
@@ -249,7 +255,7 @@ def _lines(e: Element) -> Iterator[np.ndarray]:
 
 
 def _corners(curve: Curve | None, place: int) -> Iterator[Affine]:
-    """-bend max(x - corner, 0) of every corner of a curve; x is the travel where ``place`` is 1, its rate where 2."""
+    """Force -bend max(x - corner, 0) for every corner of a curve; x is the travel if ``place`` is 1, its rate if 2."""
     _, _, corners, bends = curve.hinges() if curve else (0.0, 0.0, (), ())
     for corner, bend in zip(corners, bends, strict=True):
         low, high = (-ENDLESS, 0.0) if bend > 0.0 else (0.0, ENDLESS)

@@ -28,7 +28,9 @@ NO_FRICTION = {
 
 @dataclass(frozen=True)
 class CoordinateTravel:
-    """d = sum of factor q over some ``coordinates``, numbers in the order of the tree's."""
+    """Travel along coordinates: d = sum of factor times q over ``coordinates``, which are numbered in the order of the
+    tree.
+    """
 
     coordinates: tuple[int, ...]
     factors: tuple[float, ...]
@@ -36,7 +38,7 @@ class CoordinateTravel:
 
 @dataclass(frozen=True)
 class AxialTravel:
-    """d = axis . (tip - foot) less its design value: the axis (3,) is fixed in ``frame``, as the foot is.
+    """Travel along an axis: d = axis . (tip - foot) less its design value. Axis (3,) and foot are fixed in ``frame``.
 
     foot, tip : places (3,) in the design position, m; the tip is on ``body``, which ``frame`` carries.
     """
@@ -49,13 +51,13 @@ class AxialTravel:
 
     @property
     def design(self) -> float:
-        """axis . (tip - foot) in the design position."""
+        """Design value of the travel: axis . (tip - foot) in the design position."""
         return float(self.axis @ (self.tip - self.foot))
 
 
 @dataclass(frozen=True)
 class NativePart:
-    """An element, of whose law only what the engine's own has is left, and its travel."""
+    """An element, reduced to that part of its law which the engine itself computes, and its travel."""
 
     element: Element
     travel: CoordinateTravel | AxialTravel
@@ -63,7 +65,7 @@ class NativePart:
 
 @dataclass(frozen=True)
 class GroundSpring:
-    """Springs and dampers from the ground to a point of a body along the axes of space, and a load on that point.
+    """Springs and dampers between the ground and a point of a body along the axes of space, and a load at this point.
 
     point, anchor : places (m) of the body's point and of the ground's in the design position; stiffness (N/m), damping
     (N s/m), load (N) : along x, y, z; what is 0 is not built.
@@ -79,7 +81,7 @@ class GroundSpring:
 
 @dataclass(frozen=True)
 class LineSpring:
-    """A spring and damper along the straight line between points of two bodies, None for the ground.
+    """A spring and damper along the straight line between points of two bodies; None means the ground.
 
     Both are drawn together by F = stiffness (l - length) + damping l', l their distance (m); first_point, second_point
     in the design position, m; length in m, stiffness in N/m, damping in N s/m.
@@ -96,13 +98,15 @@ class LineSpring:
 
     @property
     def ends(self) -> tuple[tuple[str | None, Vector], ...]:
-        """Both bodies with their points."""
+        """Both bodies, each with its point."""
         return (self.first_body, self.first_point), (self.second_body, self.second_point)
 
 
 @dataclass(frozen=True)
 class DryFriction:
-    """Coulomb friction against the motion of a coordinate (its number in the tree's order), force in N or N m."""
+    """Coulomb friction against the motion of a coordinate, which is given by its number in the tree's order; force in N
+    or N m.
+    """
 
     name: str
     coordinate: int
@@ -128,7 +132,7 @@ class Coupling:
 
 @dataclass(frozen=True, eq=False)
 class BodyLoad:
-    """A force (3,) in N on a point (m) of a body and a moment (3,) in N m, which turn with it.
+    """A force (3,) in N at a point (m) of a body, and a moment (3,) in N m; both turn with the body.
 
     All three as they are in the design position, along the axes of space.
     """
@@ -142,7 +146,7 @@ class BodyLoad:
 
 @dataclass(frozen=True, eq=False)
 class TurningSpring:
-    """A spring and damper between the turning of two bodies (None: the ground), the same about all axes.
+    """A rotational spring and damper between two bodies (None: the ground), with the same stiffness about all axes.
 
     The moment is -stiffness r - damping w: r the rotation vector from the first body's axes to the second's, w the
     angular velocity of the second against the first; axes : (3, 3) of each as columns in the design position, parallel
@@ -158,7 +162,8 @@ class TurningSpring:
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A constraint that keeps a point of a body at one of another (None: the ground), and with axes their turning, too.
+    """A constraint that keeps a point of a body at a point of another (None: the ground) and, if ``axes`` are given,
+    the bodies parallel.
 
     ends : both bodies with their points (m) in the design position, where they need not meet; axes : (3, 3) of each as
     columns in the design position, which must be parallel, None where the bodies turn freely about the point; solref,
@@ -175,10 +180,10 @@ class Connection:
 
 @dataclass(frozen=True)
 class Division:
-    """How the elements of a vehicle are divided between an engine and the compiled forces.
+    """Division of a vehicle's elements between an engine and the compiled forces.
 
-    native : elements that the engine itself computes; shared : the rest of each law, which the compiled forces add;
-    reasons : why an element is shared, by its name.
+    native : elements that the engine itself computes; shared : the remainder of each law, which the compiled forces
+    add; reasons : why an element is shared, by its name.
     """
 
     native: tuple[NativePart, ...]
@@ -206,8 +211,9 @@ def divide(tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Di
 
 
 def _divided(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
-    """The native part of an element, the part left to a callback, and the reasons; a preload goes with the part that
-    bears it."""
+    """The part of an element that the engine computes, the part left to a callback, and the reasons. A preload goes
+    with the part that carries it.
+    """
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
     left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
     if curved and engine not in CURVES:
@@ -225,7 +231,7 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 
 def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
-    """Joint elements with a spring, damper or friction, as native parts; each engine adds their inertia itself."""
+    """Joint elements with a spring, damper or preload, as native parts; each engine adds their inertia itself."""
     return tuple(
         NativePart(_joint_force(element), CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors))
         for element in vehicle.joint_elements
@@ -234,7 +240,7 @@ def joint_parts(vehicle: SpatialVehicle) -> tuple[NativePart, ...]:
 
 
 def rotors(vehicle: SpatialVehicle) -> list[tuple[str, CoordinateTravel, float]]:
-    """Name, travel and inertia (kg, kg m^2) of the joint elements that have one."""
+    """Name, travel and inertia (kg, kg m^2) of those joint elements that have inertia."""
     return [
         (element.name, CoordinateTravel(_coordinate_numbers(vehicle, element), element.factors), element.inertia)
         for element in vehicle.joint_elements
@@ -248,13 +254,15 @@ def _coordinate_numbers(vehicle: SpatialVehicle, element: JointElement) -> tuple
 
 
 def _joint_force(element: JointElement) -> Element:
-    """The law of a joint element; it has no points."""
+    """The force law of a joint element, as an element without points."""
     still, gains = np.zeros(3), (element.stiffness, element.damping, element.held)
     return Element(element.name, "", "", still, still, still, *gains, frame="")
 
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
-    """The travel of an element as an engine may have it; None where it is neither."""
+    """The travel of an element in a form that an engine may have: along coordinates or along an axis; None where it has
+    neither.
+    """
     first, two = (_bodies_up_to_frame(tree, end, element.frame) for end in (element.first_body, element.second_body))
     if first is not None and two is not None and not any(_turns_on_carrier(tree, body) for body in (*first, *two)):
         return _along_coordinates(tree, element, first, two)
@@ -270,12 +278,14 @@ def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | Axia
 
 
 def _turns_on_carrier(tree: SpatialVehicle, body: str) -> bool:
-    """Whether a body turns against the body that carries it."""
+    """Whether a body can turn relative to the body that carries it."""
     return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
 
 
 def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
-    """The bodies from one up to that which rides on the frame; None where the frame does not carry it."""
+    """The bodies in the chain from ``body`` to the one that rides on ``frame``; None where the frame does not carry
+    it.
+    """
     chain = tree.chain(body)
     return chain[: chain.index(frame)] if frame in chain else None
 
@@ -283,7 +293,7 @@ def _bodies_up_to_frame(tree: SpatialVehicle, body: str, frame: str) -> tuple[st
 def _along_coordinates(
     tree: SpatialVehicle, element: Element, first: tuple[str, ...], second: tuple[str, ...]
 ) -> CoordinateTravel:
-    """Slides of the bodies behind the frame to either end, along its axes; those that move both ends drop out."""
+    """Travel along the slides of the bodies between the frame and either end; slides that move both ends cancel."""
     factors = dict[int, float]()
     for number, (body, freedom) in enumerate(tree.coordinates()):
         ends = int(body in second) - int(body in first)

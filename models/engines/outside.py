@@ -96,7 +96,7 @@ def _error_text(error: BaseException) -> str:
 
 
 def build(name: str, assembly: Assembly, settings: Settings) -> Model:
-    """The class on an assembly: as an engine of its own, or as an integrator of the reference's equations."""
+    """The outside class with an assembly: as an engine, or as an integrator of the reference's equations."""
     outside_class = OUTSIDE[name]
     if callable(getattr(outside_class, "integrate", None)):
         return Integrated(assembly, settings, name, _call_engine(name, "building it", outside_class).integrate)
@@ -104,8 +104,7 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
 
 
 def _call_engine(name: str, question: str, function: Callable, *arguments: Any) -> Any:
-    """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
-    errors."""
+    """The value that a function of an outside engine returns; RunFailed for any exception but the project's own."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
@@ -115,7 +114,7 @@ def _call_engine(name: str, question: str, function: Callable, *arguments: Any) 
 
 
 def _answer_as_array(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """An answer as an array of this shape; RunFailed if it is none."""
+    """A value that an outside engine returned, as an array of this shape; RunFailed if it is none."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
@@ -127,13 +126,13 @@ def _answer_as_array(name: str, question: str, value: Any, shape: tuple[int, ...
 
 @dataclass
 class Integrated(Reference):
-    """The reference's equations under an integrator from outside; a prescribed pitch is an input of them."""
+    """The reference's equations with an integrator from outside; a prescribed pitch is one of their inputs."""
 
     name: str
     integrate: Callable
 
     def run(self) -> Trajectory:
-        """Stretch by stretch between the knots of the input; raises RunFailed as every engine does."""
+        """Integrate stretch by stretch between the knots of the input; raises RunFailed as every engine does."""
         times = self.settings.step * np.arange(self.settings.steps + 1)
         states, calls = self._march(times)
         guard(self.name, times, states, self.settings.duration)
@@ -143,7 +142,7 @@ class Integrated(Reference):
         return Trajectory(times, states, enforced, {"steps": self.settings.steps, "force calls": calls})
 
     def _march(self, times: np.ndarray) -> tuple[np.ndarray, int]:
-        """States (n, 8) at the times, and how often the right-hand side was asked for."""
+        """States (n, 8) at the times, and the number of calls of the right-hand side."""
         states, calls = np.empty((len(times), 8)), [0]
         y = states[0] = self.assembly.initial
         for start, end, inside in self._stretches(times, times[-1]):
@@ -173,7 +172,7 @@ class Integrated(Reference):
 
 @dataclass
 class Guarded:
-    """An engine from outside behind the guard that every run passes."""
+    """An engine from outside, whose runs are checked as those of every engine."""
 
     name: str
     model: Any
@@ -181,7 +180,7 @@ class Guarded:
     settings: Settings
 
     def run(self) -> Trajectory:
-        """The trajectory of the outside engine's run, checked."""
+        """The trajectory that the outside engine's run returns, after checks."""
         answer = _call_engine(self.name, "run", self.model.run)
         if not (hasattr(answer, "times") and hasattr(answer, "states")):
             raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
@@ -195,7 +194,9 @@ class Guarded:
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) at a time (s), coordinates and rates (4,), which the class gets as one state (8,)."""
+        """Accelerations (4,) at a time (s), from coordinates and rates (4,), which the outside class receives as one
+        state (8,).
+        """
         answer = _call_engine(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
         return _answer_as_array(self.name, "acceleration", answer, (4,))
 
@@ -213,7 +214,9 @@ that motion (between their own steps, methods interpolate to 3e-6), and always b
 
 
 def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
-    """Say how far a run is from the reference; raises RunFailed where its order and step cannot explain that."""
+    """Text on the difference of a run from the reference; RunFailed where the run's order and step cannot explain
+    it.
+    """
     try:
         truth = _of_reference(assembly, replace(settings, integrator="DOP853", tolerance=REFERENCE_TOLERANCE))
     except (InputError, RunFailed) as error:
@@ -231,7 +234,8 @@ def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: T
 
 
 def relative_gap(run: Trajectory, truth: Trajectory) -> tuple[float, float]:
-    """Largest distance of the states (n, 8) by the largest motion in truth of the same kind, and its time in s.
+    """Largest difference of the states (n, 8) between two runs, divided by the largest motion in ``truth`` of the same
+    kind, and the time (s) at which it occurs.
 
     Kinds are heights, pitch, and the rates of each; where nothing moves, a millimetre or milliradian counts.
     """
@@ -248,7 +252,7 @@ def _of_reference(assembly: Assembly, settings: Settings) -> Trajectory:
 
 
 def _expected(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
-    """Relative error that the stated order and step make likely; of an adaptive method, its tolerance."""
+    """Relative error that the stated order and step make likely; for an adaptive method its tolerance."""
     if getattr(OUTSIDE[engine], "adaptive", False):
         return settings.tolerance
     try:

@@ -34,14 +34,14 @@ def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
 
 
 def unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
-    """Build it without asking whether the engine would answer rightly."""
+    """Build an assembly in an engine, without a check that the engine would answer rightly."""
     if engine in OUTSIDE:
         return import_module("models.engines.outside").build(engine, assembly, settings)
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
 
 def check(engine: str, assembly: Assembly, settings: Settings) -> None:
-    """Refuse combinations that no integrator treats correctly."""
+    """Refuse combinations of input, integrator and step with which the engine would answer wrongly."""
     integrator = CATALOGUE[engine][settings.integrator]
     if (engine, settings.integrator) in MISSING:
         raise Refused(engine, MISSING[engine, settings.integrator])
@@ -104,7 +104,7 @@ def _refuse_uneven_step(engine: str, step: float, multiple: str, length: float) 
 
 
 def settings_of(engine: str, settings: Settings | None) -> Settings:
-    """Settings of a run; RunFailed where the model was built without."""
+    """The settings of a run; RunFailed where the model was built without settings."""
     if settings is None:
         raise RunFailed(engine, "the model was built without settings: it knows no step and no duration")
     return settings
@@ -134,14 +134,16 @@ def guard(
 
 
 def _sound(times: np.ndarray, states: np.ndarray, enforced: np.ndarray | None) -> bool:
-    """Whether nothing is wrong, quickly: a run may be one of ten thousand. What is no number passes no comparison."""
+    """Whether times, states and enforced forces are all finite and sane. Written to be fast, for ten thousand runs; NaN
+    fails every comparison.
+    """
     sane = states.max() < SIZE_BOUND and states.min() > -SIZE_BOUND
     forward = np.isfinite(times).all() and (np.diff(times) > 0).all()
     return bool(sane and forward and (enforced is None or np.isfinite(enforced).all()))
 
 
 def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforced: np.ndarray | None) -> None:
-    """Raise RunFailed with the last state before the first one that is wrong."""
+    """Raise RunFailed, with the state before the first wrong one."""
     finite = np.isfinite(states).all(axis=1) & (True if enforced is None else np.isfinite(enforced).all(axis=1))
     sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
@@ -154,8 +156,8 @@ def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforce
 def landings_followed(
     engine: str, assembly: Assembly, settings: Settings, times: np.ndarray, states: np.ndarray
 ) -> None:
-    """Raise RunFailed where fixed steps were too long for what tyres that only push met: a step that is stable on the
-    road may still jump over a landing.
+    """Raise RunFailed where fixed steps were too long for the landings of tyres that only push. A step that is stable
+    on the road may still jump over a landing.
 
     times (n,) in s, states (n, 8); nothing is looked at where tyres cannot lift.
     """
@@ -171,11 +173,11 @@ def landings_followed(
 def balanced(
     engine: str, times: np.ndarray, enforced: np.ndarray, balance: Callable[[int], tuple[np.ndarray, np.ndarray]]
 ) -> None:
-    """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments (the last) and of forces.
+    """Raise RunFailed unless multipliers (n, 1 or 2) agree with the balance of moments, the last column, and of forces.
 
-    ``balance`` gives, for a row, what is needed and the inertia terms m3 z3'' and I beta'' (N, N m), beside which
-    the error is judged where little is needed. A solver can follow a prescribed motion perfectly with a
-    multiplier that is wrong for ever.
+    ``balance`` gives, for a row, the required force and moment and the inertia terms m3 z3'' and I beta'' (N, N m),
+    which are the scale of the error where little is required. A solver can follow a prescribed motion perfectly with a
+    multiplier that stays wrong.
     """
     rows = np.unique(np.linspace(min(BALANCE_START, len(times) - 1), len(times) - 1, BALANCE_ROWS).astype(int))
     wanted, inertia = (np.array(part) for part in zip(*(balance(int(row)) for row in rows), strict=True))

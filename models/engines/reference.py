@@ -24,14 +24,16 @@ NO_INPUT = np.zeros((1, 4))
 
 
 def compiled(function: Any, key: tuple) -> Any:
-    """Compile a closure with an index of its own: those of one factory would share numba's."""
+    """Compile a closure under a cache index of its own; closures of one factory would otherwise share numba's."""
     function = named_closure(function, *key)
     return njit(cache=True, nogil=True, error_model="numpy")(function)  # no check for masses of zero: there are none
 
 
 def _compile_fixed(rhs, key):
     def march(y, step, count, inputs, rows, p, states):
-        """Classical Runge-Kutta; ``rows`` says where the middle, the end and the next step's input lie."""
+        """March with classical Runge-Kutta steps. ``rows`` gives the distances to the rows of the input at the middle,
+        at the end and at the next step.
+        """
         k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
         stage = np.empty(8)
         for j in range(8):  # a row assigned at once takes seconds to compile
@@ -76,7 +78,7 @@ def _sum(rhs, added):
 
 @dataclass
 class Reference:
-    """The vehicle as compiled equations."""
+    """The vehicle as compiled equations of motion, marched by fixed steps or an adaptive solver."""
 
     assembly: Assembly
     settings: Settings
@@ -107,18 +109,20 @@ class Reference:
         return Trajectory(times, states, enforced, counts)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
         return derivative_of(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:
-        """Counts of what the reference built: equations alone."""
+        """Counts of what was built: coordinates, and no native items or callbacks."""
         return {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
 
     def _input_at(self, time: float) -> np.ndarray:
         return NO_INPUT[0] if self._input is None else self._input.at(time)
 
     def _inputs(self) -> tuple[np.ndarray, tuple[int, int, int]]:
-        """Input table, and how many rows lie from a step's start to its middle, its end and the next step."""
+        """The input table, and the numbers of rows from a step's start to its middle, to its end and to the next
+        step.
+        """
         signal, h, n = self._input, self.settings.step, self.settings.steps
         if signal is None:
             return NO_INPUT, (0, 0, 0)
@@ -141,14 +145,14 @@ class Reference:
         return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
 
     def _guide(self, states: np.ndarray) -> None:
-        """Put the prescribed coordinates and their rates, if any, into the states."""
+        """Write the prescribed coordinates and their rates, if any, into the states."""
         guided = self.assembly.guided
         if guided and self.assembly.input is not None:
             inputs = self.assembly.input.sample(0.0, self.settings.step, len(states))
             states[:, [*guided, *(4 + i for i in guided)]] = inputs[:, 2 : 2 + 2 * len(guided)]
 
     def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-        """Piecewise between the knots of the input, so that each piece is smooth."""
+        """Integrate adaptively from knot to knot of the input, since it is smooth between knots."""
         h, n = self.settings.step, self.settings.steps
         times, states = h * np.arange(n + 1), np.empty((n + 1, 8))
         y = states[0] = self.assembly.initial
@@ -166,7 +170,7 @@ class Reference:
         return times, states, {"steps": steps, "force calls": calls}
 
     def _stretches(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
-        """Start and end (s) of each stretch between knots of the input, and the rows of ``times`` (n,) within."""
+        """Start and end (s) of each stretch between knots of the input, and the slice of ``times`` (n,) within it."""
         knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
         small = 1e-9 * self.settings.step
         for start, end in pairwise((0.0, *knots, last)):
@@ -200,7 +204,9 @@ class Reference:
         return solution
 
     def _reader(self, start: float, end: float) -> Callable[[float], np.ndarray]:
-        """The input within one piece: held forces stay what they are in its middle, all beside them moves on."""
+        """Function that reads the input within one stretch. Held forces keep their value in its middle; other inputs
+        vary.
+        """
         middle = self._input_at(0.5 * (start + end))
         if self._input is None or (self._input.held and self._input.channels == 2):
             return lambda t: middle
@@ -229,7 +235,9 @@ def _right_hand_side(mode: str, geometry: str, *added: str):
 
 
 def march_of(mode: str, geometry: str, *added: str):
-    """The compiled fixed-step solver of one mode with the terms that are ADDED to it, made when first asked for."""
+    """The compiled fixed-step march for one mode and geometry with the terms ``added``, compiled when it is first
+    requested.
+    """
     key = (mode, geometry, *added)
     if key not in _FIXED:
         _FIXED[key] = _compile_fixed(_right_hand_side(*key), key)
@@ -237,7 +245,9 @@ def march_of(mode: str, geometry: str, *added: str):
 
 
 def derivative_of(mode: str, geometry: str, *added: str):
-    """The compiled right-hand side of one mode, made when first asked for: (y, u, p) -> dy (8,)."""
+    """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry, compiled when it is first
+    requested.
+    """
     key = (mode, geometry, *added)
     if key not in _SINGLE:
         _SINGLE[key] = _compile_single(_right_hand_side(*key), key)

@@ -49,14 +49,15 @@ class SpatialExudyn:
         self._columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
 
     def _values_in_exudyn_order(self, values: np.ndarray) -> np.ndarray:
-        """Values (n,) in Exudyn's own order, tree by tree."""
+        """Values (n,) of the coordinates in Exudyn's order, tree by tree."""
         out = np.empty(self.size)
         out[self._columns] = values
         return out
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) from Exudyn's own residual and mass matrix at a time (s), positions and rates (n,); on
-        this row (2 w,) of a road, if one is given."""
+        """Accelerations (n,) from Exudyn's own residual and mass matrix at a time (s), positions and rates (n,);
+        ``road`` (2 w,) : row of the road that replaces the one at this time.
+        """
         if road is None:
             return np.linalg.solve(*self._mass_and_force(q, v, time))
         with self.road.still(road):
@@ -68,7 +69,7 @@ class SpatialExudyn:
         return mass[np.ix_(self._columns, self._columns)], force[self._columns]
 
     def linearise(self) -> LinearVehicle:
-        """Exudyn's own linearised system about the design position, on a flat road.
+        """The system as Exudyn itself linearises it about the design position, on a flat road.
 
         Of a tree Exudyn differentiates by one forward difference, which loses half of the digits. Asked at several
         steps to both sides, its answers combine to central differences of order six.
@@ -84,7 +85,7 @@ class SpatialExudyn:
         return linear_vehicle("exudyn", self.vehicle, motion, parts[1][0], damping, stiffness, self._road_columns())
 
     def _linearised(self, step: float) -> list[np.ndarray]:
-        """[M, K, D] of Exudyn with forward differences of this step; it may be negative."""
+        """Exudyn's matrices [M, K, D] from forward differences with this step, which may be negative."""
         options, exceptions = quiet_settings(), exu.special.exceptions
         numerical, checks = options.staticSolver.newton.numericalDifferentiation, exceptions.parameterRangeChecks
         numerical.forODE2 = numerical.doSystemWideDifferentiation = True
@@ -95,7 +96,7 @@ class SpatialExudyn:
         return [np.asarray(part)[rows] for part in self.mbs.ComputeLinearizedSystem(simulationSettings=options)]
 
     def _road_columns(self) -> np.ndarray:
-        """Generalised forces (n, 2 w) per metre and per m/s of the road under each tyre: loads are linear in it."""
+        """Generalised forces (n, 2 w) per metre and per m/s of the road under each tyre, in which they are linear."""
         zero, forces = np.zeros(self.size), list[np.ndarray]()
         for row in (*self._flat, *np.eye(2 * len(self.vehicle.tyres))):
             with self.road.still(row):
@@ -110,7 +111,7 @@ class SpatialExudyn:
         return self._jacobian(self.built.marker(body, self.vehicle.body(body).position, True), KINDS.AngularVelocity)
 
     def _jacobian(self, marker: Any, kind: Any) -> np.ndarray:
-        """(3, n) of a marker in the design position: its velocity by each rate of 1."""
+        """Jacobian (3, n) of a marker in the design position: its velocity for a unit rate of each coordinate."""
         data, columns = self.mbs.systemData, []
         data.SetODE2Coordinates(np.zeros(self.size))
         for unit in np.eye(self.size):
@@ -130,7 +131,9 @@ class SpatialExudyn:
         return sound("exudyn", settings, *self._recorded(settings), note, solver_counts(self.mbs))
 
     def _recorded(self, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-        """Times (m,) and states (m, 2 n) from the sensors. Steps are counted: Exudyn's sum of them ends 1e-13 early."""
+        """Times (m,) and states (m, 2 n) from the sensors. Times are multiples of the step, as Exudyn's own sum ends
+        1e-13 early.
+        """
         read = self.mbs.GetSensorStoredData
         halves = [np.hstack([read(sensor)[:, 1:] for sensor in sensors])[:, self._columns] for sensors in self._sensors]
         stored, times = read(self._sensors[0][0])[:, 0], settings.step * np.arange(len(halves[0]))
@@ -138,7 +141,7 @@ class SpatialExudyn:
         return times, np.hstack(halves)
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks, and curves among these."""
+        """Counts of what was built: degrees of freedom, native items, callbacks, and the curves among these."""
         return {
             "degrees of freedom": self.size,
             "native items": self.mbs.systemData.NumberOfObjects(),

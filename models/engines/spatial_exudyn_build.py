@@ -30,7 +30,9 @@ from models.vehicles.spatial_linear import preloads
 
 @dataclass
 class RoadForces:
-    """Road forces for callbacks: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
+    """Road forces for a callback. by_road (2 w, k) : factors of heights and rates; rows : the k forces at every half
+    step.
+    """
 
     by_road: np.ndarray
     rows: list[list[float]]
@@ -38,20 +40,22 @@ class RoadForces:
 
 @dataclass
 class RoadRows:
-    """Heights (m) under the tyres, then their rates (m/s), ``per_time`` rows in a second, and all forces of them."""
+    """The road under the tyres. rows : heights (m), then rates (m/s), ``per_time`` rows in a second; read : forces
+    computed from them.
+    """
 
     rows: np.ndarray
     per_time: float
     read: list[RoadForces] = field(default_factory=list)
 
     def forces(self, by_road: np.ndarray) -> RoadForces:
-        """Forces by the road, for one callback."""
+        """Forces at all rows of the road for one callback, with the factors ``by_road``."""
         self.read.append(RoadForces(by_road, (self.rows @ by_road).tolist()))
         return self.read[-1]
 
     @contextmanager
     def still(self, row: np.ndarray) -> Iterator[None]:
-        """One row of the road at every time."""
+        """Within the block, use one row of the road at all times."""
         before, per_time, self.per_time = [each.rows for each in self.read], self.per_time, 0.0
         for each in self.read:
             each.rows = [(row @ each.by_road).tolist()]
@@ -64,7 +68,9 @@ class RoadRows:
 
 
 def _spring(build: Build, spring: SpringDamper) -> None:
-    """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
+    """Add a spring-damper, native where Exudyn has an item for it: along a global axis, or along any axis of a body
+    that never turns.
+    """
     axis, ends, held = np.array(spring.axis), [spring.first_body, spring.second_body], build.held.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
     first, two = (
@@ -96,7 +102,7 @@ def _spring(build: Build, spring: SpringDamper) -> None:
 def _law(
     spring: SpringDamper, axis: np.ndarray, length_at_rest: np.ndarray, preload: float
 ) -> Callable[[Any, Any], list[float]]:
-    """All terms of a spring-damper's force."""
+    """Force law of a spring-damper with all its terms, for a callback."""
     (ax, ay, az), design = axis.tolist(), float(axis @ length_at_rest)
     k, c, dry, dry_rate = spring.stiffness, spring.damping, spring.friction, spring.friction_rate
     travel_force, rate_force = spring.travel_force, spring.rate_force
@@ -117,14 +123,14 @@ def _law(
 
 
 def _bar(build: Build, bar: AntiRollBar) -> None:
-    """Vertical forces between the two points, and the moment on the body's roll coordinate."""
+    """Add an anti-roll bar: vertical forces at its two points, and the moment on the body's roll coordinate."""
     left, right = build.marker(bar.left, bar.point_left), build.marker(bar.right, bar.point_right)
     roll, turning = build.reader(bar.body, "rx"), build.reader(bar.body, "rx", KINDS.Coordinates_t)
     rest, held, track, read = bar.point_right[2] - bar.point_left[2], build.held.parts[bar.name], bar.track, build.mbs
     k, c = bar.stiffness, bar.damping
 
     def moment(height_difference: float, rate: float) -> float:
-        """Moment of a bar by the height of its right point above the left, and the rate of that."""
+        """Moment of the bar for the height of its right point above the left one, and the rate of this height."""
         twisting = c * (rate / track + turning()) if c else 0.0
         return held + k * ((height_difference - rest) / track + roll()) + twisting
 
@@ -148,7 +154,9 @@ def _bar(build: Build, bar: AntiRollBar) -> None:
 
 
 def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """A spring-damper to the flat ground, and what the road adds as a load; ``by_road`` (2 w,): what it adds (N)."""
+    """Add a tyre of a body that turns: a spring-damper to flat ground, and the road's force as a load; ``by_road`` (2
+    w,) : factors of this force (N).
+    """
     marker, held = build.marker(tyre.body, tyre.point), build.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
@@ -165,7 +173,7 @@ def _turning_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
 
 
 def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: RoadRows) -> None:
-    """All tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
+    """Add all tyres of bodies that never turn: matrices over the coordinates that lift them, and one callback.
 
     by_road : (2 w, tyres), what the road adds to each (N).
     """
@@ -199,7 +207,9 @@ def _steady_tyres(build: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
 
 
 def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows) -> None:
-    """A tyre that may leave the road: one law of all of it; ``by_road`` (2 w, 2): the height and the rate under it."""
+    """Add a tyre that may leave the road, its whole law as a callback; ``by_road`` (2 w, 2) : columns of height and
+    rate under it.
+    """
     k, c, held, rest = tyre.stiffness, tyre.damping, build.held.tyres[tyre.name], tyre.point[2]
     under = road.forces(by_road)
 
@@ -214,7 +224,7 @@ def _pushing_tyre(build: Build, tyre: Tyre, by_road: np.ndarray, road: RoadRows)
 
 
 def _tyres(build: Build, road: RoadRows) -> None:
-    """All tyres."""
+    """Add all tyres of the vehicle."""
     tyres, turns, count = build.vehicle.tyres, build.vehicle.turns, len(build.vehicle.tyres)
     by_road = np.vstack([np.diag([tyre.stiffness for tyre in tyres]), np.diag([tyre.damping for tyre in tyres])])
     steady = [i for i, tyre in enumerate(tyres) if not (tyre.pushes_only or turns(tyre.body))]
@@ -239,7 +249,7 @@ def _side_force(build: Build, force: SideForce, speed: float) -> None:
 
 
 def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
-    """Bodies without parent, each with all that ride on it, parents first."""
+    """Each body without parent together with all bodies that ride on it, parents first."""
     trees: dict[str, list[Body]] = {}
     for body in vehicle.bodies:
         trees.setdefault(vehicle.chain(body.name)[-1], []).append(body)
@@ -247,7 +257,7 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
 
 
 def assemble(vehicle: SpatialVehicle, speed: float | None, road: RoadRows) -> Build:
-    """The vehicle in a system of its own, which is not assembled yet: sensors may follow."""
+    """Build the vehicle in a new Exudyn system, which is not assembled yet, so that sensors can be added."""
     mbs = exu.SystemContainer().AddSystem()
     built = Build(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
     for bodies in _trees(vehicle):

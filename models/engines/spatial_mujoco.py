@@ -24,7 +24,7 @@ from models.vehicles.spatial import SpatialVehicle, Vector
 def _compiled(
     vehicle: SpatialVehicle, step: float, integrator: str, speed: float | None, road: np.ndarray, per_time: float
 ) -> mujoco.MjModel:
-    """The model with all numbers of the callback in its numeric data."""
+    """The compiled model; its numeric data hold all numbers that the callback reads."""
     spec = spec_of(vehicle, step)
     spec.option.integrator = INTEGRATORS[integrator]
     plain = spec.compile()
@@ -39,7 +39,7 @@ def _compiled(
 
 
 class SpatialMujoco:
-    """One vehicle in one MuJoCo model."""
+    """One vehicle in space in one MuJoCo model."""
 
     def __init__(
         self, vehicle: SpatialVehicle, settings: Settings | None, speed: float | None, road: np.ndarray | None
@@ -56,7 +56,9 @@ class SpatialMujoco:
 
     @contextmanager
     def _hold_road(self) -> Iterator[np.ndarray]:
-        """The callback reads the row (2 w,) of the road that is given here, at every time."""
+        """Within the block, let the callback read one row (2 w,) of the road at all times; this row is yielded and can
+        be changed.
+        """
         numbers = self.model.numeric_data
         first = int(numbers[ROAD])
         row = numbers[first : first + len(self._flat)]
@@ -69,7 +71,9 @@ class SpatialMujoco:
             numbers[PER_TIME], row[:] = before
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at a time (s), positions and rates (n,); on this row (2 w,) of a road, if one is given."""
+        """Accelerations (n,) at a time (s), positions and rates (n,); ``road`` (2 w,) : row of the road that replaces
+        the one at this time.
+        """
         if road is None:
             with installed(self.law):
                 return self._acceleration(q, v, time)
@@ -84,7 +88,9 @@ class SpatialMujoco:
         return self.data.qacc[columns]
 
     def linearise(self) -> LinearVehicle:
-        """M from MuJoCo; D, K and the road's columns by central differences of the acceleration, callback included."""
+        """The linear vehicle. M comes from MuJoCo; D, K and the road's columns from central differences of the
+        accelerations, which include the callback.
+        """
         n, zero, h = self.model.nv, np.zeros(self.model.nv), difference_step(self.vehicle)
         with self._hold_road() as row:
 
@@ -110,7 +116,7 @@ class SpatialMujoco:
         return self._jacobians(body, np.zeros(3))[1]
 
     def _jacobians(self, body: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(3, n) of a point and of its body's turning, in the design position."""
+        """Jacobians (3, n) of a point's displacement and of its body's rotation, in the design position."""
         shift, turn = np.empty((2, 3, self.model.nv))
         self.data.qpos[:] = 0.0
         mujoco.mj_kinematics(self.model, self.data)
@@ -131,7 +137,7 @@ class SpatialMujoco:
         return sound("mujoco", settings, times, states, "", counts)
 
     def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks, and curves within them."""
+        """Counts of what was built: degrees of freedom, native items, callbacks, and the curves within these."""
         return {
             "degrees of freedom": self.model.nv,
             "native items": self.model.nbody - 1 + self.model.njnt,

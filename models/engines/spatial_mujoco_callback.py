@@ -54,7 +54,9 @@ Acting = tuple[str | None, Vector, Vector]
 
 
 class Parts(NamedTuple):
-    """Where a callback reads a vehicle's parts in MuJoCo's numeric data: counts, and pointers to doubles."""
+    """Layout of a vehicle's bodies, points and elements in MuJoCo's numeric data: their counts, and pointers to
+    doubles.
+    """
 
     body_count: int
     bodies: Any
@@ -76,8 +78,9 @@ class MujocoState(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Pointers to what is worked out in a call: twist and wrench of each body (OF_BODY); travel and rate, then force,
-    of each element (OF_ELEMENT); lever of each point (OF_POINT)."""
+    """Pointers to arrays for results within a call. bodies : twist and wrench of each body (OF_BODY); elements : travel
+    and rate, then force, of each element (OF_ELEMENT); levers : lever of each point (OF_POINT).
+    """
 
     bodies: Any
     elements: Any
@@ -111,7 +114,9 @@ def _along(a, b):
 
 @register_jitable
 def _move(parts, motion, work):
-    """Twists of the bodies, with no wrench on any, and what their points move the elements by."""
+    """Compute the twists of the bodies, clear their wrenches, and add what the motion of the points contributes to the
+    travels and rates of the elements.
+    """
     for b in range(parts.body_count):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
         turn, shift = _twist(body, motion, work.bodies)
@@ -135,7 +140,9 @@ def _move(parts, motion, work):
 
 @register_jitable
 def _twist(body, motion, states):
-    """Turning of a body and the velocity that it gives the origin of space: its parent's and what its joints add."""
+    """Angular velocity of a body, and the velocity of its point at the origin of space: those of its parent plus what
+    its joints add.
+    """
     turn, shift, parent, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(body[PARENT]), int(body[TURNING])
     if parent >= 0:
         turn, shift = _three(states, OF_BODY * parent + TURNS), _three(states, OF_BODY * parent + SHIFTS)
@@ -149,7 +156,7 @@ def _twist(body, motion, states):
 
 @register_jitable
 def _press(parts, motion, work, forces):
-    """Bring the elements' forces onto the bodies' joints, riders first."""
+    """Transfer the elements' forces from the bodies to the joints, riders first."""
     for b in range(parts.body_count - 1, -1, -1):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
         moment, force, parent = _three(state, MOMENTS), _three(state, FORCES), int(body[PARENT])
@@ -172,7 +179,7 @@ def _press(parts, motion, work, forces):
 
 @register_jitable
 def _on_curve(pairs, size, argument):
-    """Force on a curve given as (argument, force, ...); the outer pieces go on."""
+    """Force on a curve given as (argument, force, ...); beyond its ends the outer straight pieces continue."""
     i = 0
     while i < size - 4 and argument >= pairs[i + 2]:
         i += 2
@@ -181,7 +188,7 @@ def _on_curve(pairs, size, argument):
 
 @register_jitable
 def _more(law, travel, rate, q):
-    """The nonlinear rest of a force law: its value less that of the law's straight line."""
+    """Nonlinear part of a force law: its value less that of the law's straight line."""
     force = 0.0
     if law[FRICTION] != 0.0:
         force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])
@@ -199,9 +206,10 @@ def _more(law, travel, rate, q):
 
 @register_jitable
 def _act(parts, road, tyres, motion, moved, forces):
-    """Forces of the elements, in place of their travels, and on the joints that move their steady points.
+    """Compute the forces of the elements, write them in place of the travels, and add them to the joints that move
+    points of bodies which never turn.
 
-    road : pointer to the heights (m) under so many tyres, and then their rates (m/s).
+    road : pointer to the heights (m) under ``tyres`` tyres, followed by their rates (m/s).
     """
     e, q, v = parts.elements, motion.positions, motion.rates
     for i in range(parts.element_count):
@@ -228,7 +236,7 @@ def _act(parts, road, tyres, motion, moved, forces):
 
 @cache
 def spatial_law() -> Any:
-    """The callback, compiled when first asked for."""
+    """The callback, compiled when it is first requested."""
     numeric, passive, time, position, velocity, xpos, xmat, xanchor, xaxis = offsets(
         "numeric_data", "qfrc_passive", "time", "qpos", "qvel", "xpos", "xmat", "xanchor", "xaxis"
     )
@@ -265,7 +273,8 @@ def spatial_law() -> Any:
 
 @dataclass(frozen=True)
 class Element:
-    """A force F against the travel s = added coordinate + sum of axis . point - value at rest, less the tyre's road.
+    """A force F along a travel s = added coordinate + sum of axis . point - value at rest, less the road's height under
+    its tyre.
 
     F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
     every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
@@ -285,7 +294,7 @@ class Element:
 
 
 def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
-    """Everything that acts in a vehicle besides weights and inertia."""
+    """Every element that acts in a vehicle, besides weights and inertia."""
     held, v, acting = preloads(vehicle), float(speed or 0.0), list[Element]()
     for s in vehicle.springs:
         points = ((s.second_body, s.second_point, s.axis), (s.first_body, s.first_point, _scaled(s.axis, -1.0)))
@@ -316,7 +325,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 def packed(
     vehicle: SpatialVehicle, elements: list[Element], model: mujoco.MjModel, numbers: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
-    """Counts of bodies, elements and points, and all their numbers for the callback."""
+    """Counts of bodies, elements and points, and the list of all their numbers for the callback."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
     moving = [body.name for body in vehicle.bodies if body.name in carrying]
     bodies, points = list[list[float]](), list[list[float]]()
@@ -331,7 +340,7 @@ def packed(
 def _body(
     vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: MujocoIndices
 ) -> list[float]:
-    """A body that may turn, or carries one that may."""
+    """Numbers of a body that may turn, or that carries one that may."""
     body, number = vehicle.body(name), numbers.bodies[name]
     first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
@@ -340,7 +349,7 @@ def _body(
 
 
 def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
-    """Where the elements act on a body that may turn."""
+    """Numbers of the points at which elements act on a body that may turn."""
     centre = vehicle.body(name).position
     return [
         [i, *np.subtract(point, centre), *axis]
@@ -351,7 +360,7 @@ def _points_of(elements: list[Element], vehicle: SpatialVehicle, name: str) -> l
 
 
 def _element(element: Element, vehicle: SpatialVehicle, numbers: MujocoIndices) -> list[float]:
-    """An element: its law, the shares of coordinates in its travel, and what of its law is no line."""
+    """Numbers of an element: its law, the factors of coordinates in its travel, and the nonlinear part of its law."""
     shares, rest = dict[int, float](), 0.0
     if element.added_coordinate in numbers.joints:
         shares[numbers.joints[element.added_coordinate]] = 1.0
@@ -370,7 +379,7 @@ def _element(element: Element, vehicle: SpatialVehicle, numbers: MujocoIndices) 
 
 
 def _rest_of_law(element: Element, numbers: MujocoIndices) -> list[float]:
-    """Numbers of the nonlinear rest of an element's law; none where the law is a straight line."""
+    """Numbers of the nonlinear part of an element's law; none where the law is a straight line."""
     steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):

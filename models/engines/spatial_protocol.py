@@ -39,10 +39,12 @@ curves with corners and friction need the second, which rounding keeps to 1e-11.
 
 
 class SpatialModel(Model, Protocol):
-    """A vehicle in space, which ride asks for its linear vehicle, too."""
+    """A vehicle in space in an engine, which also gives the linear vehicle that ride needs."""
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,); on a row (2 w,) of road heights (m), then their rates, in place of the road's own."""
+        """Accelerations (n,); ``road`` (2 w,) : heights (m), then their rates (m/s), which replace the model's own
+        road.
+        """
         ...
 
     def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
@@ -50,7 +52,7 @@ class SpatialModel(Model, Protocol):
         ...
 
     def linearise(self) -> LinearVehicle:
-        """The engine's own linear vehicle about the design position."""
+        """The vehicle as the engine itself linearises it about the design position."""
         ...
 
 
@@ -61,7 +63,7 @@ def build(
     speed: float | None = None,
     road: np.ndarray | None = None,
 ) -> SpatialModel:
-    """Build a vehicle in "exudyn" or "mujoco".
+    """Build a vehicle in space in "exudyn" or "mujoco".
 
     settings : wanted for runs in time; Refused where the step does not fit or a mode would grow.
     speed : m/s, for side forces and drag; InputError where they miss it.
@@ -79,8 +81,9 @@ def build(
 
 
 def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
-    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, axes that turn with a body,
-    and springs along coordinates."""
+    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, one with axes that turn with a body, or
+    one with springs along coordinates.
+    """
     if vehicle.limits:
         raise Refused(
             engine,
@@ -102,7 +105,7 @@ def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
 
 
 def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
-    """Refuse what would run and be wrong."""
+    """Refuse integrators, roads and steps with which a run would give wrong answers."""
     if settings.integrator not in METHODS[engine]:
         raise Refused(
             engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with {settings.integrator}"
@@ -130,7 +133,7 @@ def check_divides(engine: str, settings: Settings) -> None:
 
 
 def check_modes(engine: str, linear: LinearVehicle, settings: Settings) -> None:
-    """Refuse a step at which a mode of the linear vehicle grows that does not grow by itself."""
+    """Refuse a step with which a mode of the linear vehicle grows, although the mode itself does not."""
     n = len(linear.mass)
     damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
     parts = (np.eye(n), damping, stiffness, *np.zeros((2, n, n)))  # no engine knows its callback's damping
@@ -145,17 +148,19 @@ def check_modes(engine: str, linear: LinearVehicle, settings: Settings) -> None:
 
 
 def difference_step(vehicle: SpatialVehicle) -> float:
-    """Step of central differences that fits the vehicle's laws."""
+    """Step of central differences that suits the vehicle's laws: one size for laws with corners, another for smooth
+    laws.
+    """
     return CORNERED_STEP if curves(vehicle) else SMOOTH_STEP
 
 
 def curves(vehicle: SpatialVehicle) -> int:
-    """Number of curves and dry frictions of a vehicle."""
+    """Number of nonlinear curves and dry frictions in the springs of a vehicle."""
     return sum((s.travel_force is not None) + (s.rate_force is not None) + (s.friction != 0) for s in vehicle.springs)
 
 
 def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: float) -> np.ndarray:
-    """Jacobian (outputs, size) at 0 of a function of (size,), by the central differences in DIFFERENCES."""
+    """Jacobian (outputs, size) of a function at 0, by the central differences in DIFFERENCES."""
     columns = [
         sum(weight * (function(i * step * unit) - function(-i * step * unit)) for i, weight in DIFFERENCES.items())
         / step
@@ -165,7 +170,7 @@ def jacobian(function: Callable[[np.ndarray], np.ndarray], size: int, step: floa
 
 
 class EngineKinematics(Kinematics):
-    """Motion of points and bodies as an engine gives it: its Jacobians in the design position."""
+    """Kinematics of points and bodies from an engine's Jacobians in the design position."""
 
     def __init__(
         self, vehicle: SpatialVehicle, shift: Callable[[str, Vector], np.ndarray], turn: Callable[[str], np.ndarray]
@@ -174,11 +179,11 @@ class EngineKinematics(Kinematics):
         self._shift, self._turn = shift, turn
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
+        """Jacobian (3, n) of a point's (m) displacement with respect to the coordinates; zeros on the ground, None."""
         return np.zeros((3, self.size)) if body is None else self._shift(body, point)
 
     def turn(self, body: str) -> np.ndarray:
-        """(3, n): small rotation of a body (rad) by the coordinates."""
+        """Jacobian (3, n) of a body's small rotation (rad) with respect to the coordinates."""
         return self._turn(body)
 
 
@@ -191,7 +196,9 @@ def linear_vehicle(
     stiffness: np.ndarray,
     road: np.ndarray,
 ) -> LinearVehicle:
-    """An engine's linear vehicle; ``road`` (n, 2 w): generalised forces per road height, then per rate."""
+    """The linear vehicle from an engine's matrices; ``road`` (n, 2 w) : generalised forces per road height, then per
+    rate.
+    """
     by_height, by_rate = np.split(road, 2, axis=1)
     source = f"{engine}, " + ("loaded" if vehicle.gravity else "unloaded")
     return LinearVehicle(
@@ -212,7 +219,8 @@ SPEEDS = (5.0, 15.0, 45.0)
 
 
 def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearVehicle]:
-    """The vehicle at a speed (m/s, above 0), as the engine linearises it; one or three linearisations in all.
+    """Function that gives the vehicle at a speed (m/s, above 0), as the engine linearises it. It needs one or three
+    linearisations in all.
 
     Side forces damp by 1 / v and drag by v, and nothing else depends on the speed: D = D0 + D1 / v + D2 v exactly.
     """
@@ -234,6 +242,6 @@ def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearV
 def sound(
     engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
 ) -> Trajectory:
-    """The trajectory, checked by the guard of all runs; raises RunFailed."""
+    """The trajectory, after the checks of ``guard``; raises RunFailed."""
     guard(engine, times, states, settings.duration, note)
     return Trajectory(times, states, counts=counts)

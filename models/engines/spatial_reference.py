@@ -15,7 +15,9 @@ from models.vehicles.spatial_linear import UNIT, End, preloads
 
 @dataclass
 class Motion:
-    """Motion of a body: centre, rotation, Jacobians (3, n) of both, and accelerations (3,) without q''."""
+    """Motion of a body: position of its centre, rotation, Jacobians (3, n) of both, and the parts (3,) of their
+    accelerations that do not depend on q''.
+    """
 
     centre: np.ndarray
     rotation: np.ndarray
@@ -25,7 +27,9 @@ class Motion:
     turn_rest: np.ndarray
 
     def at(self, arm: np.ndarray, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Place, rows and the acceleration without q'' of a point at ``arm`` (body's axes) from the centre."""
+        """Position and Jacobian of the point at ``arm`` (body's axes) from the centre, and the part of its acceleration
+        that does not depend on q''.
+        """
         r = self.rotation @ arm
         rows = self.shift - across(r) @ self.turn
         rest = self.shift_rest - across(r) @ self.turn_rest + across(omega) @ (across(omega) @ r)
@@ -33,19 +37,21 @@ class Motion:
 
 
 def across(v: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) of the vector product with v (3,) on the left: numpy's own product takes ten times as long."""
+    """The matrix (3, 3) that multiplies a vector by v (3,) from the left, v x; ten times as fast as numpy's own
+    product.
+    """
     x, y, z = v.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
 def _rotation_about(axis: int, angle: float) -> np.ndarray:
-    """Rotation about a unit axis (Rodrigues)."""
+    """Rotation matrix about a unit axis (Rodrigues)."""
     cross = across(UNIT[axis])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 class SpatialReference:
-    """A vehicle in space as its equations."""
+    """A vehicle in space as equations of motion, without an engine."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float | None = None) -> None:
         self.vehicle, self.speed, self.held = vehicle, float(speed or 0.0), preloads(vehicle)
@@ -53,7 +59,7 @@ class SpatialReference:
         self.size = len(self.index)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
+        """Accelerations (n,) from positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
         self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
         for body in self.vehicle.bodies:
@@ -66,7 +72,9 @@ class SpatialReference:
         return np.linalg.solve(mass, force)
 
     def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
-        """All bodies, parents first: each freedom shifts along, or turns about, an axis that those before it turned."""
+        """Motions of all bodies, parents first. Each freedom shifts along, or turns about, an axis that the freedoms
+        before it have turned.
+        """
         motions: dict[str, Motion] = {}
         for body in self.vehicle.bodies:
             rows = np.zeros((3, self.size))
@@ -98,13 +106,13 @@ class SpatialReference:
         return motions
 
     def _point(self, body: str | None, point: Vector) -> tuple[np.ndarray, np.ndarray]:
-        """Place (3,) and rows (3, n) of a point given in the design position."""
+        """Position (3,) and Jacobian (3, n) of a point that is given in the design position."""
         if body is None:
             return np.array(point), np.zeros((3, self.size))
         return self.motions[body].at(np.subtract(point, self.vehicle.body(body).position), np.zeros(3))[:2]
 
     def _forces(self, road: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of all that acts besides weights."""
+        """Generalised forces (n,) of springs, bars, tyres, side forces and drags, without weights."""
         out, heights, rates = np.zeros(self.size), *np.split(road, 2)
         for spring in self.vehicle.springs:
             out += self._spring(spring)
@@ -134,7 +142,9 @@ class SpatialReference:
         return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row
 
     def _bar(self, bar: AntiRollBar) -> np.ndarray:
-        """Forces (n,) of a bar; the roll of a body beside itself is 0."""
+        """Generalised forces (n,) of an anti-roll bar. Where the bar's frame is the body itself, the roll of the body
+        is not counted.
+        """
         ends = (bar.right, bar.point_right), (bar.left, bar.point_left)
         apart, row = self._travel(*ends, (0.0, 0.0, 1.0), bar.frame)
         roll = np.eye(self.size)[self.index[bar.body, "rx"]] * (bar.frame != bar.body)
@@ -143,7 +153,9 @@ class SpatialReference:
         return np.asarray(-moment * row)
 
     def _travel(self, from_end: End, to_end: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
-        """axis . (point to_end - point one) less its value in the design position, and its derivatives (n,)."""
+        """Distance of two points along an axis less its value in the design position, axis . (point to_end - point
+        from_end), and its derivatives (n,).
+        """
         (first, of_first), (second, of_second) = self._point(*from_end), self._point(*to_end)
         along, apart, row = np.array(axis), np.subtract(to_end[1], from_end[1]), np.zeros(self.size)
         if frame is not None:

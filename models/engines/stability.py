@@ -39,7 +39,9 @@ RK67_SEVENTH = -2.2652475842503 / math.factorial(7)
 
 
 def coefficients(integrator: str) -> list[float] | None:
-    """Stability polynomial R(z) of a Runge-Kutta method, lowest power first; None for other methods."""
+    """Coefficients of the stability polynomial R(z) of a Runge-Kutta method, lowest power first; None for other
+    methods.
+    """
     for order, names in TAYLOR.items():
         if integrator in names:
             return [1 / math.factorial(k) for k in range(order + 1)]
@@ -49,8 +51,9 @@ def coefficients(integrator: str) -> list[float] | None:
 
 
 def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
-    """The vehicle's matrices about zero pitch without ``guided`` coordinates, springs as beyond their dead bands and
-    tyres on the road: that is where they are stiffest."""
+    """The vehicle's matrices about zero pitch without ``guided`` coordinates, where the vehicle is stiffest: with
+    springs as beyond their dead bands and tyres on the road.
+    """
     known = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if not strut.pushes_only))
     taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
     mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
@@ -61,7 +64,7 @@ def linearised(vehicle: Vehicle, guided: Collection[int] = ()) -> Linear:
 
 
 def first_order(linear: Linear) -> np.ndarray:
-    """A (2n, 2n) of y' = A y, y = (q, q')."""
+    """State matrix A (2n, 2n) of y' = A y, where y = (q, q')."""
     mass, damping, stiffness, *_ = linear
     n = len(mass)
     inverse = np.diag(1 / mass.diagonal())
@@ -69,7 +72,8 @@ def first_order(linear: Linear) -> np.ndarray:
 
 
 def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | None:
-    """The matrix of one step of ``step`` seconds over (q, q'), (2n, 2n); None where no step is too long.
+    """Matrix (2n, 2n) that advances (q, q') by one step of ``step`` seconds; None for integrators that are stable in
+    any step.
 
     That is so for generalised-alpha, the trapezoidal rule and MuJoCo's ``discrete``, which are implicit in
     position and velocity, and for adaptive integrators, which shorten their own steps.
@@ -92,10 +96,11 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
 
 
 def _verlet(step: float, linear: Linear) -> np.ndarray:
-    """Exudyn's velocity Verlet, (3n, 3n) over (q, q', q'').
+    """Matrix (3n, 3n) that advances (q, q', q'') by one step of Exudyn's velocity Verlet.
 
-    The acceleration of a step's end reads the velocity of its middle, and the next step begins with it: a
-    state of its own. One step alone looks stable up to 5.6 ms where two are not beyond 2.7 ms.
+    The acceleration at the end of a step uses the velocity at its middle, and the next step begins with this
+    acceleration, which is therefore part of the state. A single step looks stable up to 5.6 ms, two are stable only up
+    to 2.7 ms.
     """
     a = first_order(linear)
     n = len(a) // 2
@@ -106,7 +111,9 @@ def _verlet(step: float, linear: Linear) -> np.ndarray:
 
 
 def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndarray:
-    """MuJoCo's single steps: velocities with part of the damping implicit, then positions with the new ones."""
+    """Matrix of one of MuJoCo's single steps: new velocities, with part of the damping implicit, then positions from
+    these.
+    """
     mass, damping, stiffness, *_ = linear
     n = len(mass)
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
@@ -115,7 +122,7 @@ def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndar
 
 
 def growth(integrator: str, step: float, duration: float, linear: Linear) -> float:
-    """Natural logarithm of the growth of the fastest growing mode over a run; 0 if none grows."""
+    """Natural logarithm of the factor by which the fastest growing mode grows over a run; 0 if none grows."""
     matrix = step_matrix(integrator, step, linear)
     if matrix is None:
         return 0.0
@@ -124,7 +131,7 @@ def growth(integrator: str, step: float, duration: float, linear: Linear) -> flo
 
 
 def limit(integrator: str, step: float, duration: float, linear: Linear) -> float:
-    """Longest step (s) below an unstable one at which no mode grows over the run, to four digits."""
+    """Longest step (s), to four digits, at which no mode grows over the run; the search starts at an unstable step."""
     allowed, stable = math.log(GROWTH), step / 2
     while growth(integrator, stable, duration, linear) > allowed and stable > 1e-12 * step:
         stable /= 2
@@ -139,7 +146,7 @@ def limit(integrator: str, step: float, duration: float, linear: Linear) -> floa
 
 
 def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
-    """Refuse a step at which a mode of the vehicle would grow, naming the limit and the fastest pole."""
+    """Refuse a step with which a mode of the vehicle would grow; the message gives the limit and the fastest pole."""
     linear = linearised(assembly.vehicle, assembly.guided)
     grown = growth(settings.integrator, settings.step, settings.duration, linear)
     if grown <= math.log(GROWTH):
@@ -155,7 +162,7 @@ def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
 
 
 def _pole(linear: Linear) -> str:
-    """The eigenvalue of the vehicle that lies farthest from zero, as text."""
+    """Text of the vehicle's eigenvalue with the largest magnitude."""
     poles = np.linalg.eigvals(first_order(linear))
     pole = complex(poles[np.abs(poles).argmax()])
     real = 0.0 if abs(pole.real) < 1e-9 * abs(pole) else pole.real

@@ -18,14 +18,16 @@ ACTS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, parts.ON_TRA
 
 
 def divided(handling: Handling, engine: str) -> Division:
-    """Springs and bars of towed bodies between "exudyn" or "mujoco" and the compiled forces."""
+    """Division of the springs and bars of towed bodies between "exudyn" or "mujoco" and the compiled forces."""
     free = handling.vehicle
     elements = elements_of(free, handling.held) if handling.forces == "native" and free.towed else ()
     return divide(free, (element for element in elements if element.frame in free.towed), engine)
 
 
 def numbers_beside(handling: Handling, division: Division) -> np.ndarray:
-    """The vehicle's table for the compiled forces beside native parts; the whole one itself where there are none."""
+    """The table for the compiled forces without what native parts compute; the vehicle's own table where there are no
+    native parts.
+    """
     if not division.native:
         return handling.numbers
     numbers, native = handling.numbers.copy(), {part.element.name for part in division.native}
@@ -42,7 +44,7 @@ def numbers_beside(handling: Handling, division: Division) -> np.ndarray:
 
 
 def _remainder(row: np.ndarray, left: Element | None) -> None:
-    """Leave of a part what is not native, nothing where all of it is."""
+    """Reduce a part's row of the table to what is not native, to zeros where the part is entirely native."""
     gone = left is None or left.travel_force is None, left is None or left.rate_force is None
     row[ACTS[:4]] = (left.stiffness, left.damping, left.held, left.friction) if left else 0.0
     for column, none in zip(ACTS[4:], gone, strict=True):

@@ -23,8 +23,9 @@ CENTRE = (0.0, 0.0, 0.0)
 
 
 def driven_by(equations: Equations) -> Driven:
-    """The wheelset as engines build it: bodies in the order of the joints, the suspension of both ends, the table of
-    the rails."""
+    """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
+    of numbers for the forces of the rails.
+    """
     body = equations.body
     across, along = body.across, body.along
     inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))
@@ -46,11 +47,11 @@ def driven_by(equations: Equations) -> Driven:
 
 
 class EngineWheelset(Equations):
-    """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
+    """A wheelset that an engine moves along the track at a speed; parameters and results are those of ``Equations``."""
 
     @cached_property
     def model(self) -> FreeModel:
-        """The wheelset in its engine, by its joints."""
+        """The wheelset in its engine, with joint coordinates."""
         return free_model(self.ENGINE, driven_by(self))
 
     def rates(self, state: Array) -> Array:
@@ -59,7 +60,7 @@ class EngineWheelset(Equations):
         return rates_of(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
     def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States by the engine's RK4, and the contacts of those that are kept."""
+        """States by the engine's RK4, every ``stride``-th of them, and the contacts in these states."""
         joints = to_joints(state)
         states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)

@@ -11,7 +11,7 @@ from models.core.systems import SYSTEMS
 
 
 def run(scene: Any, engine: str = "", **how: Any) -> Result:
-    """Run a scene in one engine; ``how`` is what the system's own ``run`` takes, such as one of its manoeuvres.
+    """Run a scene in one engine; ``how`` is passed on to the system's own ``run``, for example the name of a manoeuvre.
 
     Raises InputError, Refused or RunFailed, never returns a partial run.
     """

@@ -20,9 +20,9 @@ SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity's unit and its values in every case.
+    """A quantity's unit, and its values in every case (a run, or a part of it).
 
-    sampled : cases are mean squares (m,) of samples that know nothing of each other; it is the root of their mean.
+    sampled : each case holds mean squares (m,) of independent samples; the quantity is the root of their mean.
     """
 
     unit: str
@@ -31,21 +31,23 @@ class Quantity:
 
     @property
     def sizes(self) -> np.ndarray:
-        """Sizes to which changes of the quantity are relative, case by case."""
+        """Sizes by which changes of the quantity are divided, one for each case."""
         return np.sqrt([case.mean() for case in self.cases]) if self.sampled else sizes(self.cases)
 
 
 @dataclass(frozen=True)
 class RunQuantities:
-    """Quantities by name; CPU seconds of the march alone; counts, which repeat: "steps", "calls" of the right-hand
-    side, "states", and "terms", where a call goes through any beside them (cells of contact nets, waves of roads)."""
+    """Quantities of a run by name, CPU seconds of the march alone, and counts that repeat exactly: "steps", "calls" of
+    the right-hand side, "states", and "terms", where a call evaluates any besides these (cells of contact patches,
+    waves of roads).
+    """
 
     quantities: dict[str, Quantity]
     counts: dict[str, int]
     seconds: float = field(compare=False)
 
     def of(self, name: str, file: str = "") -> Quantity:
-        """A quantity, or "rms" or "max" of one; InputError for what there is not."""
+        """A quantity by its name, or the "rms" or "max" of one; InputError for an unknown name."""
         if name in self.quantities:
             return self.quantities[name]
         word, _, rest = name.partition(" ")
@@ -59,16 +61,17 @@ class RunQuantities:
 
 
 def sizes(full_results: Sequence[np.ndarray]) -> np.ndarray:
-    """Sizes to which changes are relative, case by case: the standard deviation of a path, the magnitude of a number.
+    """Sizes by which changes are divided, one for each case: the standard deviation of a path, the magnitude of a
+    number.
 
-    A case that hardly moves beside the others is held to what it is of them.
+    A case that hardly moves compared with the others has at least the size HARDLY times the largest one.
     """
     amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full_results])
     return np.maximum(amounts, HARDLY * amounts.max(initial=0.0))
 
 
 def rounding(answer: RunQuantities, unit: str) -> float:
-    """Size up to which a quantity of a unit does not move, but for rounding."""
+    """Size below which changes of quantities with this unit are only rounding."""
     alike = [
         np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
         for quantity in answer.quantities.values()
@@ -83,7 +86,7 @@ SURE = 0.9985
 
 
 def by_chance(change: Cases, full_results: Cases) -> tuple[float, float]:
-    """Largest relative change of a sampled quantity, and what chance may add to it, where that is largest.
+    """Largest relative change of a sampled quantity, and the statistical error of this change.
 
     The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
     from it, times Student's t for m - 1.
@@ -100,7 +103,7 @@ def by_chance(change: Cases, full_results: Cases) -> tuple[float, float]:
 
 
 def less(run: Cases, full_results: Cases) -> Cases:
-    """Differences of two runs at the times that both have: the longer step's, every so many of the shorter one's.
+    """Differences of two runs at the times that both have, which are those of the run with longer steps.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
@@ -117,18 +120,20 @@ def less(run: Cases, full_results: Cases) -> Cases:
 
 
 def _thinned(*paths: np.ndarray) -> list[np.ndarray]:
-    """Paths at the times that all have."""
+    """The paths at those times that all of them have."""
     few = min(map(len, paths))
     return [path[:: (len(path) - 1) // max(few - 1, 1) or 1] for path in paths]
 
 
 def added(*changes: Cases) -> Cases:
-    """Sum of differences, at the times that all have."""
+    """Sum of several differences, at those times that all of them have."""
     return tuple(np.sum(_thinned(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
 def relative(change: Cases, size: np.ndarray) -> float:
-    """Largest relative change of all cases: rms of a path's difference, or a number's, by its size."""
+    """Largest relative change among the cases: the rms difference of a path, or the difference of a number, divided by
+    its size.
+    """
     moved = np.array([float(np.sqrt(np.mean(difference**2))) for difference in change])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(size > 0.0, moved / size, np.where(moved > 0.0, np.inf, 0.0))

@@ -53,14 +53,16 @@ RUNS = 100
 
 @dataclass(frozen=True)
 class Choice:
-    """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
+    """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
+    relative changes (quantities,).
 
-    predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
-    add so much to that, where quantities are means of samples; within_tolerance : whether each sum of both is. calls
-    and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
-    scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
-    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried. barred : by
-    effects that stay, what would be broken without them that the scene keeps.
+    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run;
+    chance : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of
+    both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene.
+    rounds : runs of the whole scene for confirmation; spent : calls of all runs. more : factor, roughly, by which more
+    samples would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether the search
+    ended before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps and that
+    would be broken without them.
     """
 
     candidates: tuple[str, ...]
@@ -81,11 +83,13 @@ class Choice:
 
 
 class Chooser:
-    """A scene's effects in one implementation, for quantities (see ``models.advice.choice.answer``) and a tolerance.
+    """Search for the effects of a scene that can be left out in one implementation, for quantities (see
+    ``models.advice.choice.answer``) and a tolerance.
 
-    progress(share) is told the share that is spent of the runs that the search may take. executor : computes the runs
-    without one effect or two that the screen is about to ask for; those that confirm, and those that are timed, are
-    this process's."""
+    progress(share) : called with the share that is spent of the runs that the search may make. executor : computes the
+    runs without one or two effects that the screen will need; runs that confirm, and timed runs, are made by this
+    process.
+    """
 
     def __init__(
         self,
@@ -111,7 +115,7 @@ class Chooser:
         self.rounds, self._doubtful, self.ended = 0, list[float](), False
 
     def _part(self) -> Screen:
-        """The first part of the scene, or few of its samples."""
+        """Screen of the first part of the scene, or of a few of its samples."""
         whole = self.whole.variants
         if not whole.system.WINDOWED:
             return self.whole
@@ -119,13 +123,15 @@ class Chooser:
         return self.whole if part is whole else Screen(part, self.whole.quantities)
 
     def _coarse(self, screen: Screen) -> Screen:
-        """The screen of the scene in the screen's longer steps."""
+        """Screen of the same runs in longer steps, by the factor ``step_factor``."""
         runs = screen.variants
         coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
     def _steps(self, screen: Screen) -> tuple[int, np.ndarray]:
-        """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
+        """Longest steps that are allowed for the screen, as a multiple of the scene's own, and the relative changes
+        (quantities,) that they cause.
+        """
         whole = self.whole.variants
         lengths = [k for k in whole.lengths() if k in screen.variants.lengths()]
         allowed = (ROUGH if self.alike else FINE) * self.tolerance
@@ -137,7 +143,9 @@ class Chooser:
     def _longest(
         self, screen: Screen, omitted_effects: Set, lengths: list[int], allowed: float
     ) -> tuple[int, np.ndarray]:
-        """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""
+        """Longest step of ``lengths`` whose relative changes (quantities,) are allowed, and these changes. It is found
+        by bisection; the first step is always allowed.
+        """
         low, high, shares = 0, len(lengths), np.zeros(len(screen.quantities))
         while high - low > 1:
             middle = (low + high) // 2
@@ -146,16 +154,18 @@ class Chooser:
         return lengths[low], shares
 
     def share(self, omitted_effects: Set) -> float:
-        """Largest predicted change, with what may be left out of it, by the tolerance; infinite where an assumption
-        would be broken that the scene keeps."""
+        """Ratio of the largest predicted change, with a bound on what the prediction omits, to the tolerance; infinite
+        where leaving the effects out breaks an assumption that the scene keeps.
+        """
         if self.barred(omitted_effects):
             return math.inf
         error = self.error + self.screen.predicted(omitted_effects) + self.screen.remainder(omitted_effects)
         return float(np.max(error)) / self.tolerance
 
     def barred(self, omitted_effects: Set) -> bool:
-        """Whether a run without these effects breaks an assumption that the scene keeps; of more than two it is
-        foretold: an effect is missed whose every pair is."""
+        """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two effects this
+        is predicted from pairs: it does if, for some effect, every pair with another one does.
+        """
         runs = self.screen.variants
         if len(omitted_effects) <= 2:
             return bool(runs.breaks(omitted_effects))
@@ -165,19 +175,20 @@ class Chooser:
         )
 
     def reach(self, omitted_effects: Set) -> int:
-        """Longest step, by the scene's own, that the predictions allow without these effects."""
+        """Longest step without these effects that the predictions allow, as a multiple of the scene's own."""
         if omitted_effects not in self._reach:
             left = max(0.0, BUDGET - self.share(omitted_effects)) * self.tolerance
             self._reach[omitted_effects], _ = self._longest(self.screen, omitted_effects, self.lengths, left)
         return self._reach[omitted_effects]
 
     def work(self, omitted_effects: Set) -> float:
-        """Work of a run without these effects, at the longest step; infinite if it fails."""
+        """Work of a run without these effects in the longest step that is allowed; infinite if the run fails."""
         return self.screen.variants.work(omitted_effects, self.reach(omitted_effects) // self.step_factor)
 
     def confirm(self, omitted_effects: Set) -> np.ndarray:
-        """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so; what chance
-        may add is added."""
+        """Relative changes (quantities,) over the whole run without these effects, plus their statistical errors, in
+        the longest step that is confirmed, or nearly so.
+        """
         if omitted_effects not in self._confirmed:
             longest = self.reach(omitted_effects)
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
@@ -198,14 +209,16 @@ class Chooser:
         return bool((changes <= self.tolerance).all())
 
     def better(self, further: Set, current: Set) -> bool:
-        """Whether it holds to leave these out, and takes less work than what is kept does at the steps that hold."""
+        """Whether leaving out ``further`` is confirmed, and takes less work than leaving out ``current``, each in its
+        confirmed step.
+        """
         if not self.holds(self.confirm(further)):
             return False
         work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, current)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
-        """The greedy choice, confirmed."""
+        """The greedy choice, confirmed over the whole run."""
         none: Set = frozenset()
         if not self.holds(self.confirm(none)):
             self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
@@ -226,7 +239,7 @@ class Chooser:
         return self._sure(self._choice(kept[-1]))
 
     def _sure(self, choice: Choice) -> Choice:
-        """The choice; InputError where nothing was found by which it could be better, for chance alone."""
+        """The choice; InputError if nothing can be left out only because the statistical errors are too large."""
         if not choice.more or choice.left_out or choice.times > 1:
             return choice
         raise InputError(
@@ -263,11 +276,11 @@ class Chooser:
         )
 
     def _spent(self) -> int:
-        """Calls of all runs so far."""
+        """Number of right-hand side calls of all runs so far."""
         return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
     def _budget_spent(self) -> bool:
-        """Whether the search has used all the calls that it may take; it has ``ended`` then."""
+        """Whether the search has used all the calls that it may make; if so, it sets ``ended``."""
         whole_run = self.whole.variants.of()
         share = self._spent() / (RUNS * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
@@ -275,7 +288,9 @@ class Chooser:
         return self.ended
 
     def told(self, omitted_effects: Set, times: int) -> np.ndarray:
-        """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
+        """Predicted changes (quantities,) if effects are left out and the step is lengthened as well. What the step
+        changes comes from a comparison with a shorter step.
+        """
         screen, runs = self.teller, self.whole.variants
         change = screen.change(omitted_effects) if omitted_effects else None
         if times == 1:
@@ -289,9 +304,11 @@ class Chooser:
         return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
 
     def further(self, omitted_effects: Set) -> dict[str, float]:
-        """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
+        """Predicted change for each effect that stayed, if it were left out, too: with a larger tolerance than this, it
+        could be.
 
-        Only those that may go, and whose going would save anything at the same step."""
+        Only those that may go, and whose going would save anything at the same step.
+        """
         shares, times = {}, self.reach(omitted_effects) // self.step_factor
         for effect in self.effects:
             further = omitted_effects | {effect}
@@ -300,7 +317,7 @@ class Chooser:
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
     def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
-        """The path that goes on from a kept one, step by step, as far as predictions allow."""
+        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow."""
         path = list(start)
         while True:
             step = self._next(path[-1], banned, [frozenset([effect]) for effect in self.effects])
@@ -310,7 +327,7 @@ class Chooser:
             path.append(path[-1] | step)
 
     def _promising(self) -> list[Set]:
-        """Pairs of which at least one breaks the budget alone, while both together hold it."""
+        """Pairs of effects of which at least one exceeds the budget alone, while both together keep to it."""
         if self._pairs is None:
             alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
             pairs = [pair for pair in combinations(self.effects, 2) if max(alone[effect] for effect in pair) > BUDGET]
@@ -319,7 +336,7 @@ class Chooser:
         return self._pairs
 
     def _within(self, pairs: list[Set]) -> list[Set]:
-        """The pairs that the budget of errors allows, of those for which there is budget left to tell."""
+        """Pairs of effects that keep to the error budget, as far as the budget of calls lets them be tested."""
         within = list[Set]()
         for i, pair in enumerate(pairs):
             if self._budget_spent():
@@ -330,7 +347,9 @@ class Chooser:
         return within
 
     def _next(self, omitted_effects: Set, banned: set[Set], steps: list[Set]) -> Set:
-        """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
+        """The step that saves the most work for what it adds to the predicted error; empty where no step keeps to the
+        budget.
+        """
         best, most = frozenset[str](), 0.0
         now, work = self.share(omitted_effects), self.work(omitted_effects)
         steps = [

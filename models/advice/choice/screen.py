@@ -25,7 +25,9 @@ Changes = dict[str, Cases]
 
 
 class Screen:
-    """Predictions for quantities, by runs of ``variants``; InputError for a quantity that does not move at all."""
+    """Predictions of how quantities change if effects are left out, from runs of ``variants``. InputError for a
+    quantity that does not move.
+    """
 
     def __init__(self, variants: Variants, quantities: list[str]) -> None:
         self.variants, self.quantities = variants, quantities
@@ -50,7 +52,7 @@ class Screen:
         raise InputError(self.variants.scene.file, f"quantities.{name}", None, why)
 
     def between(self, run: RunQuantities | None, other_answer: RunQuantities | None) -> Changes | None:
-        """Differences of two runs, quantity by quantity; None where one of them is missing."""
+        """Differences of two runs in each quantity; None where one of the runs is missing."""
         if run is None or other_answer is None:
             return None
         try:
@@ -61,15 +63,15 @@ class Screen:
             raise
 
     def shares(self, change: Changes | None) -> np.ndarray:
-        """Relative changes (quantities,); infinite where there is none."""
+        """Relative changes (quantities,); infinite where ``change`` is None."""
         return self._judged(change)[0]
 
     def chance(self, change: Changes | None) -> np.ndarray:
-        """Chance error of predicted changes (quantities,): zero where a quantity is no mean of samples."""
+        """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
         return self._judged(change)[1]
 
     def _judged(self, change: Changes | None) -> np.ndarray:
-        """Relative change and its chance error (2, quantities)."""
+        """Relative changes and their statistical errors (2, quantities)."""
         if change is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
@@ -81,11 +83,11 @@ class Screen:
         return np.array(pairs).T
 
     def alone(self, effect: str) -> Changes | None:
-        """d of an effect."""
+        """First-order difference d: the change if this effect alone is left out."""
         return self.change(frozenset([effect]))
 
     def second(self, first: str, second_effect: str) -> Changes | None:
-        """e of a pair."""
+        """Second-order difference e of a pair: the change without both, less the changes without each alone."""
         sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
         both, *singles = (self.change(effects) for effects in sets)
         known = [part for part in singles if part is not None]
@@ -94,11 +96,11 @@ class Screen:
         return {name: added(both[name], *(_minus(part[name]) for part in known)) for name in self.quantities}
 
     def ahead(self, sets: Iterable[Set]) -> None:
-        """Have the runs computed that ``change`` of these sets will ask for."""
+        """Compute in advance the runs that ``change`` needs for these sets."""
         self.variants.ahead((part, 1) for chosen in sets for part in _parts(chosen))
 
     def change(self, omitted_effects: Set) -> Changes | None:
-        """Predicted differences of a set; None where they cannot be told."""
+        """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
@@ -110,12 +112,13 @@ class Screen:
         return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
 
     def predicted(self, omitted_effects: Set) -> np.ndarray:
-        """Relative changes (quantities,) of a set, without the remainder."""
+        """Predicted relative changes (quantities,) if a set of effects is left out, without the ``remainder``."""
         return self.shares(self.change(omitted_effects)) if omitted_effects else np.zeros(len(self.quantities))
 
     def remainder(self, omitted_effects: Set) -> np.ndarray:
-        """Bound on changes of third and higher orders (quantities,): the second, by as much as it lies below the
-        first."""
+        """Estimate (quantities,) of changes of third and higher order: the second order, reduced by the ratio of the
+        second order to the first.
+        """
         none = np.zeros(len(self.quantities))
         if len(omitted_effects) <= 2:
             return none
@@ -126,14 +129,14 @@ class Screen:
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
     def of_step(self, omitted_effects: Set, times: int) -> np.ndarray:
-        """Relative changes (quantities,) by longer steps alone, without these effects."""
+        """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if times == 1:
             return np.zeros(len(self.quantities))
         return self.shares(self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects)))
 
 
 def _parts(omitted_effects: Set) -> list[Set]:
-    """Sets whose runs tell what a set changes."""
+    """Sets of effects whose runs are needed to predict the changes for a set."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(few) for count in (1, 2) for few in combinations(sorted(omitted_effects), count)]

@@ -40,7 +40,7 @@ REPEATS, ENOUGH = 3, 0.02
 
 
 def system_of(scene: Any) -> ModuleType:
-    """The file that runs scenes of this one's system; InputError where there is none."""
+    """The module that runs scenes of this scene's system; InputError where there is none."""
     files = modules_of("models.advice.choice.systems")
     if scene.system not in files:
         raise InputError(
@@ -56,11 +56,12 @@ def system_of(scene: Any) -> ModuleType:
 
 @dataclass
 class Variants:
-    """Runs of a ``scene`` by one implementation; a variant is the effects that are left out, and the step by its own.
+    """Runs of a ``scene`` by one implementation. A variant is given by the effects that are left out and by the factor
+    of the step.
 
-    None stands for one that cannot be, or whose run fails. ``executor`` : computes runs ``ahead``. ``calls`` : of all
-    runs that were asked for so far, without those that were repeated for their seconds; runs ahead that nobody asks for
-    do not count, so that no choice depends on who computes.
+    None represents a variant that is impossible, or whose run fails. ``executor`` : computes runs ``ahead``.
+    ``calls`` : of all runs that were requested so far, without repetitions for their seconds. Runs ahead that are never
+    requested do not count, so that no choice depends on the executor.
     """
 
     scene: Any
@@ -80,30 +81,30 @@ class Variants:
 
     @property
     def _opened(self) -> bool:
-        """Whether scenes are run as something else, which knows its effects and makes its own variants."""
+        """Whether the system replaces the scene by an object that knows its effects and makes its own variants."""
         return hasattr(self.system, "opened")
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Effects that the scene names."""
+        """Names of the effects that the scene has."""
         return tuple(self.scene.named) if self._opened else named_effects(self.scene)
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Effects that the scene does not name."""
+        """Names of the effects that the scene does not have."""
         return tuple(self.scene.absent) if self._opened else absent_effects(self.scene)
 
     def beside(self, name: str) -> Any:
-        """The scene with one of these at its usual values; InputError where it cannot be."""
+        """The scene with one of the absent effects added, at its usual values; InputError where it cannot be added."""
         return self.scene.beside(name) if self._opened else with_effects(self.scene, name)
 
     def says(self, name: str) -> str:
-        """Sentence on what an effect is, or what leaving it out means."""
+        """Sentence that describes an effect, or what leaving it out means."""
         told = self.scene.said if self._opened else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
     def of(self, omitted_effects: Iterable[str] = (), times: int = 1) -> RunQuantities | None:
-        """The run without these effects, with steps so many times as long."""
+        """Quantities of the run without these effects, in steps ``times`` as long; None if it fails."""
         key = (frozenset(omitted_effects), times)
         if key not in self._kept:
             answer, self._broken[key] = self._ready.pop(key) if key in self._ready else self.run(key)
@@ -112,14 +113,15 @@ class Variants:
         return self._kept[key]
 
     def ahead(self, keys: Iterable[Key]) -> None:
-        """Have the executor compute runs that will probably be asked for; without an executor each waits until it
-        is."""
+        """Let the executor compute runs that will probably be requested; without an executor nothing is computed in
+        advance.
+        """
         if self.executor is not None:
             new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._ready]
             self._ready |= zip(new, block_results(self._job, new, self.executor), strict=True)
 
     def run(self, key: Key) -> Outcome:
-        """The run of a variant, made anew."""
+        """Run a variant, even if it was run before."""
         with breaches() as broken:
             return self._run(*key), broken
 
@@ -131,22 +133,23 @@ class Variants:
         return answer
 
     def breaks(self, omitted_effects: Set, times: int = 1) -> list[BrokenAssumption]:
-        """Assumptions that the run without these effects breaks, and the scene itself keeps."""
+        """Assumptions that the scene itself keeps, and that the run without these effects breaks."""
         if self.of(omitted_effects, times) is None or self.of() is None:
             return []
         known = self._broken[frozenset(), 1]
         return [broken for name, broken in self._broken[omitted_effects, times].items() if name not in known]
 
     def stated(self, omitted_effects: Set, times: int = 1) -> list[Result]:
-        """The results of a variant with the errors that they state, which takes its runs once more and their
-        estimates."""
+        """Results of a variant together with the errors that they state; its runs are repeated, with error
+        estimates.
+        """
         results: list[Result] = []
         with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
             self.system.computed_quantities(self.changed(omitted_effects, times), self.engine, error=True)
         return results
 
     def changed(self, omitted_effects: Set, times: int = 1) -> Any:
-        """The scene of a variant; InputError where it cannot be."""
+        """The scene of a variant; InputError where there can be no such scene."""
         if self._opened:
             return self.scene.without(omitted_effects).longer(times)
         scene = without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
@@ -157,8 +160,9 @@ class Variants:
         return rebuilt(table, scene)
 
     def work(self, omitted_effects: Set, times: int = 1) -> float:
-        """Work of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through,
-        and one for each effect that is left; infinite where there is no run."""
+        """Work of a run, from counts alone, so that it repeats exactly: calls times the sum of states, terms and
+        remaining effects; infinite where the run fails.
+        """
         run = self.of(omitted_effects, times)
         if run is None:
             return math.inf
@@ -166,7 +170,7 @@ class Variants:
         return float(run.counts["calls"] * max(each, 1))
 
     def per_call(self, omitted_effects: Set) -> float:
-        """CPU seconds of one call, the least of a few runs of this process; infinite where there is none."""
+        """CPU seconds of one call, the least of a few runs in this process; infinite where no run succeeds."""
         if omitted_effects not in self._costs:
             took, run = (
                 list[float](),
@@ -180,14 +184,16 @@ class Variants:
         return self._costs[omitted_effects]
 
     def lengths(self) -> list[int]:
-        """Factors by which a step may be longer, such that whole numbers of steps make up the run."""
+        """Factors by which the step may be lengthened, so that whole numbers of steps fit into the run."""
         count = self.system.parts(self.scene)
         return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 
     def window(self, steps: int) -> "Variants":
-        """Variants of the run's first part, of at least ``steps`` steps; the run itself where it is hardly longer.
+        """Variants of the first part of the run, of at least ``steps`` steps; of the whole run where this is hardly
+        longer.
 
-        Of a length that the scene may have: whole samples of what it measures, for one."""
+        The length is one that the scene may have, for example whole samples of a measurement.
+        """
         if self._opened:
             return Variants(self.scene.fewer(steps), self.engine, self.executor)
         count = self.system.steps(self.scene)
@@ -200,5 +206,5 @@ class Variants:
 
 
 def _run(scene: Any, engine: str, key: Key) -> Outcome:
-    """``Variants.run``, in a worker."""
+    """Do ``Variants.run`` in a worker process."""
     return Variants(scene, engine).run(key)

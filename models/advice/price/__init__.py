@@ -13,12 +13,13 @@ from models.advice.price.problem import Setting
 
 @dataclass(frozen=True)
 class SettingLadder:
-    """Settings of one engine's method, from coarse to fine.
+    """Settings of one method of an engine, ordered from coarse to fine; each is a rung.
 
-    values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
-    declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not its
-    default; sure : a reference is known where a finer rung changes it by less than this part of the tolerance; said :
-    what that rung is, before the change, where it is not half the step, or cells and steps together
+    values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``;
+    order : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is
+    not its default; sure : a reference is known where a finer rung changes it by less than the tolerance divided by
+    this; said : text on what that rung is, before the change, where it is not half the step, or cells and steps
+    together
     """
 
     engine: str
@@ -32,17 +33,17 @@ class SettingLadder:
     said: str = ""
 
     def setting(self, i: int) -> Setting:
-        """The setting on a rung."""
+        """The setting on rung ``i`` of the ladder."""
         owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
         return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
 
     def work(self, old_value: float, new_value: float) -> float:
-        """Ratio of the work at one setting's value to that at another: cells lie along and across."""
+        """Ratio of the work with one setting's value to that with another. Cells count along and across the contact."""
         return 1.0 if self.adaptive else (old_value / new_value) ** (2 if self.cells else 1)
 
 
 class InCells(Setting):
-    """One whose value is the share of a contact's length that a cell has."""
+    """A setting whose value is the ratio of a cell's length to that of the contact."""
 
     def label(self) -> str:
         """Number of cells along the contact, as text."""
@@ -51,7 +52,9 @@ class InCells(Setting):
 
 @dataclass(frozen=True)
 class PricedRun:
-    """times (n,) in s from 0; values (n, k) of the quantity's channels, in its unit; counts of what it took."""
+    """Result of a run. times (n,) : s, from 0; values (n, k) : of the quantity's channels, in its unit; counts : of the
+    work that the run took.
+    """
 
     times: np.ndarray
     values: np.ndarray
@@ -59,7 +62,7 @@ class PricedRun:
 
 
 class PricedScene(Protocol):
-    """Protocol of a priced scene, which the search for settings uses."""
+    """Protocol of a scene that can be priced: what the search for the cheapest settings needs."""
 
     @property
     def title(self) -> str:
@@ -68,7 +71,7 @@ class PricedScene(Protocol):
 
     @property
     def quantity(self) -> str:
-        """The quantity that the tolerance is set on."""
+        """Name of the quantity to which the tolerance applies."""
         ...
 
     @property
@@ -78,17 +81,17 @@ class PricedScene(Protocol):
 
     @property
     def whole(self) -> float:
-        """Length of the scene's run, s."""
+        """Duration (s) of the scene's run."""
         ...
 
     @property
     def first(self) -> float:
-        """Length (s) of the first part of the run, in which settings are searched."""
+        """Duration (s) of the first part of the run, in which settings are searched."""
         ...
 
     @property
     def kink_period(self) -> float:
-        """Time between kinks of the quantity, s; 0 where there are none."""
+        """Time (s) between points where the quantity is not smooth; 0 where there are none."""
         ...
 
     @property
@@ -98,7 +101,7 @@ class PricedScene(Protocol):
 
     @property
     def counted(self) -> str:
-        """Name among the counts of what work is counted in."""
+        """Name of the count that measures the work, such as force calls."""
         ...
 
     def ladders(self) -> list[SettingLadder]:
@@ -106,21 +109,23 @@ class PricedScene(Protocol):
         ...
 
     def reference(self) -> SettingLadder:
-        """Settings that are refined until the truth is known; each step is half the one before."""
+        """Ladder of the settings that are refined until the truth is known; each step is half the one before."""
         ...
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """A setting of another family that must agree with the reference's last one; None where there is none."""
+        """A setting of another family of methods that must agree with the reference's finest one; None where there is
+        none.
+        """
         ...
 
     def solve(self, setting: Setting, duration: float) -> Any:
-        """Build and run; InputError or RunFailed where that cannot be done."""
+        """Build and run the scene with a setting; InputError or RunFailed where this is impossible."""
         ...
 
     def answer(self, solution: Any) -> PricedRun:
-        """The quantity in what ``solve`` gave."""
+        """The quantity, read from what ``solve`` returned."""
         ...
 
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as a scene file holds it."""
+        """Lines of a scene file that contain the setting."""
         ...

@@ -22,13 +22,14 @@ def slope(sizes: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float) -> float:
-    """Slope over the finest points that stand clear of the floor (in the unit of the errors)."""
+    """Observed order: slope of log error over the finest points whose errors are above ``floor``."""
     clear = sorted((h, e) for h, e in zip(sizes, errors, strict=True) if e >= floor)[:FITTED_POINTS]
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
 def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
-    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to EQUAL_ERROR_SHARE.
+    """Groups of curves (name -> {setting: error}) that coincide: their errors at all common settings agree to
+    EQUAL_ERROR_SHARE.
 
     At least three settings must be common: two curves that merely cross are not the same.
     """
@@ -46,7 +47,7 @@ def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
 
 @dataclass(frozen=True)
 class ToleranceCost:
-    """Cost of meeting a tolerance: cost, the setting's value, and how both were found.
+    """Cost at which a tolerance is met: the cost, the setting's value, and how both were found.
 
     "tried" : the first setting that does, nothing in between; "coarsest" : already the coarsest setting
     does; "extrapolated" : not even the finest does.
@@ -65,7 +66,7 @@ def reach(
     order: int = 0,
     extrapolate: bool = False,
 ) -> ToleranceCost | None:
-    """Cost at which a curve meets ``target`` and stays below it.
+    """Cost at which the error of a curve falls below ``target`` and stays there.
 
     Points are taken from coarse to fine by ``values``. With the declared ``order`` of a fixed-step method the
     answer is interpolated log-log between two settings, and, with ``extrapolate``, carried beyond the finest
@@ -91,7 +92,7 @@ def reach(
 
 
 def pareto(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Indices of the points that no other one beats in both cost and error, by rising cost."""
+    """Indices of the points that no other point beats in both cost and error, in the order of rising cost."""
     order = sorted(range(len(costs)), key=lambda i: (costs[i], errors[i]))
     front: list[int] = []
     for i in order:

@@ -28,8 +28,9 @@ SEED = 11
 
 @dataclass(frozen=True)
 class QuantityChange:
-    """A quantity's largest change of all cases: rms of a path's difference, or a number's, and by its own size; what
-    chance may add to the latter."""
+    """Largest change of a quantity among all cases: absolute, as the rms difference of a path or the difference of a
+    number, and relative to the quantity's size. chance : statistical error of the latter.
+    """
 
     name: str
     unit: str
@@ -40,7 +41,8 @@ class QuantityChange:
 
 @dataclass(frozen=True)
 class EffectPrice:
-    """An effect that a scene names (``there``) or could have; ``why`` it has no price, "" where it has.
+    """Price of an effect that a scene has (``there``) or could have; ``why`` : reason why it has no price, "" where it
+    has one.
 
     counts : steps, calls, states without and with it; micros : CPU microseconds of a step that it adds, median and
     median absolute deviation of the turns; ratio : of seconds with it by those without, and its 95 % interval;
@@ -62,8 +64,8 @@ class EffectPrice:
 
 @dataclass(frozen=True)
 class PriceList:
-    """Price list of a scene's effects in an implementation. each : steps of one run, at most, of the ``whole`` ones
-    that it may have.
+    """Price list of a scene's effects in one implementation. each : largest number of steps of a run; whole : steps of
+    the complete run.
 
     micros : CPU microseconds of a step of the scene as it is, median and median absolute deviation.
     """
@@ -78,8 +80,9 @@ class PriceList:
 
 
 def price_list(scene: Any, engine: str | None = None) -> PriceList:
-    """Run the scene, and every scene that has one effect more or less. Raises InputError or RunFailed where the scene
-    itself cannot be run."""
+    """Price list from runs of the scene, and of every scene with one effect more or one less. Raises InputError or
+    RunFailed where the scene itself cannot be run.
+    """
     if scene.system == "ride" and not goes_in_time(scene):
         from models.advice.price.effects_of_ride import price_list_of_ride
 
@@ -125,7 +128,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
 
 
 def _turns(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
-    """CPU microseconds of a step (turns,) of every run."""
+    """CPU microseconds of a step (turns,) for every run; the runs take turns in random order."""
     micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
     for i in range(ROUNDS):
@@ -138,7 +141,7 @@ def _turns(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray
 
 
 def spread(values: np.ndarray) -> tuple[float, float]:
-    """Median and median absolute deviation."""
+    """Median and median absolute deviation of values."""
     told = describe(values.tolist())
     return told["median"], told["mad"]
 
@@ -173,7 +176,7 @@ def _price(
 
 
 def _changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
-    """Changes of the quantities that both runs have, relative to the scene's size."""
+    """Changes of the quantities that both runs have, relative to their size in the scene."""
     changed = []
     for name, quantity in base.quantities.items():
         if name in other_answer.quantities:

@@ -25,7 +25,7 @@ STEPS = 500
 
 
 def price_list_of_ride(scene: Any) -> PriceList:
-    """Prices at the scene's middle speed; InputError for one that varies."""
+    """Price list of effects at the scene's middle speed, in closed form; InputError for a scene whose speed varies."""
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
     speeds = scene.speeds.all()
@@ -51,7 +51,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
 
 
 def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
-    """The scene without an effect, or why there is none."""
+    """The scene without an effect, or the reason why this is impossible."""
     why = illegal([effect])
     if why:
         return why
@@ -62,7 +62,7 @@ def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
 
 
 def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
-    """The scene with one more effect at its usual values, or why there is none."""
+    """The scene with one more effect at its usual values, or the reason why this is impossible."""
     try:
         return FullScene(ReducedScene.complete(with_effects(scene, name)), speed).full
     except InputError as error:
@@ -70,13 +70,15 @@ def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
 
 
 def _counts(system: Reduced) -> dict[str, int]:
-    """States, and calls per second of motion at the step limit."""
+    """Counts of a reduced scene: states, and calls of the right-hand side per second of motion in the longest stable
+    step.
+    """
     of_run = cost(system.of_vehicle, system.excitation)
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 
 def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
-    """CPU microseconds of a step (ROUNDS,) of every system, in a random order."""
+    """CPU microseconds of a step (ROUNDS,) for every system; the systems take turns in random order."""
     micros, order = {name: np.empty(ROUNDS) for name in systems}, np.random.default_rng(SEED)
     for i in range(ROUNDS):
         for j in order.permutation(len(systems)):
@@ -86,7 +88,7 @@ def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
 
 
 def _step_microseconds(A: np.ndarray) -> float:
-    """Microseconds of a step."""
+    """CPU microseconds of one step with the state matrix A."""
     x, step = np.ones(len(A)), 1e-6
     begun = time.process_time()
     for _ in range(STEPS):
@@ -102,7 +104,7 @@ def _price(
     micros: dict[str, np.ndarray],
     is_present: bool = True,
 ) -> EffectPrice:
-    """Price of an effect that is ``is_present``, by the scene without it, or of one more, by the scene with it."""
+    """Price of an effect. If it ``is_present``, ``other`` is the scene without it, else the scene with it."""
     if isinstance(other, str):
         return EffectPrice(name, is_present, description, other)
     without_it, with_it = ((other, micros[name]), (full_scene.full, micros[""]))[:: 1 if is_present else -1]
@@ -121,7 +123,7 @@ def _price(
 
 
 def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
-    """Standard deviations, exact; infinite where white noise reaches a quantity."""
+    """Changes of the standard deviations, exact; infinite where white noise reaches a quantity."""
     names = full_scene.full.system.names
     units = [output.unit for output in full_scene.linear.outputs]
     units += ["m/s^2"] * (len(names) - len(units))  # weighted accelerations come last

@@ -16,7 +16,7 @@ ROUNDING_CHANGE = 1e-12
 
 
 def lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    """Lines of text: the cost of the scene, then every effect with its cost and its changes."""
+    """Text of a price list: the cost of the scene, then every effect with its cost and the changes that it makes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
@@ -46,7 +46,7 @@ def _micros(spread: tuple[float, float]) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """A number with so many digits, without an exponent where a number is large."""
+    """A number as text with ``digits`` significant digits, without an exponent even if it is large."""
     large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
@@ -74,7 +74,7 @@ def _counts(price: EffectPrice) -> str:
 
 
 def _changes(price: EffectPrice, quantities: list[str]) -> str:
-    """The quantities that were asked for, or those that change most."""
+    """Text on the changes of the requested quantities, or of those that change most."""
     asked = [change for change in price.changes if change.name in quantities]
     shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
     return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
@@ -89,7 +89,7 @@ def _changed(change: QuantityChange) -> str:
 
 
 def as_dict(prices: PriceList) -> dict[str, Any]:
-    """The price list as plain values for JSON; None for what is not finite."""
+    """The price list as plain values for JSON; values that are not finite become None."""
     plain: dict[str, Any] = _plain(asdict(prices))
     return plain
 

@@ -27,14 +27,16 @@ OTHER_TOLERANCE = 1e-8
 
 
 def first_part(duration: float, longest: float) -> float:
-    """A whole part of a run (s), at most so long (s)."""
+    """Duration (s) of the first part of a run: at most ``longest``, and a whole fraction of the run."""
     return duration / math.ceil(duration / longest * (1 - 1e-9))
 
 
 @dataclass(frozen=True)
 class MeshedScene(ABC):
-    """See ``models.advice.price.PricedScene``. reference_engine : that runs the reference; step : the scene's (s);
-    longest : step (s) of the reference's first rung; cells : the scene's, 0 where its contacts have none."""
+    """A priced scene with contact cells, see ``models.advice.price.PricedScene``. reference_engine : engine of the
+    reference; step : the scene's (s); longest : step (s) on the reference's first rung; cells : the scene's, 0 where
+    its contacts have none.
+    """
 
     title: str
     quantity: str
@@ -51,33 +53,37 @@ class MeshedScene(ABC):
 
     @abstractmethod
     def run(self, engine: str, cells: int, step: float, duration: float) -> Any:
-        """A run in an engine."""
+        """Run the scene in an engine with this number of cells and this step (s)."""
 
     @abstractmethod
     def exact(self, cells: int, step: float, duration: float) -> Any:
-        """A run by DOP853 about the accelerations of ``reference_engine``, with rows every ``step`` (s)."""
+        """Run the scene by the solver DOP853 with accelerations of ``reference_engine``; rows are ``step`` (s)
+        apart.
+        """
 
     @abstractmethod
     def read(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times (n,) in s, values (n, k), how often contacts were asked for their forces; the run is judged."""
+        """Times (n,) in s and values (n, k) of a run, and how often contact forces were evaluated; the run's
+        assumptions are judged.
+        """
 
     @abstractmethod
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as the scene file holds it."""
+        """Lines of a scene file that contain the setting."""
 
     @property
     def counted(self) -> str:
-        """Work is counted in cells where there are any."""
+        """Name of the count that measures the work: contact cells if there are any, else force calls."""
         return "contact cells" if self.cells else "force calls"
 
     @cached_property
     def steps(self) -> dict[str, float]:
-        """Methods with their steps (s), each a part of ``first``."""
+        """Steps (s) by the name of the method; each is a whole fraction of ``first``."""
         steps = dict.fromkeys(self._part(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[SettingLadder]:
-        """Every step of every engine over the cells, or the steps alone."""
+        """A ladder of cells for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, HALVINGS)))
             return [SettingLadder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
@@ -90,7 +96,9 @@ class MeshedScene(ABC):
         ]
 
     def reference(self) -> SettingLadder:
-        """Twice the cells on every rung and half the step on every second; or half the step alone."""
+        """Ladder of the reference: twice the cells on every rung and half the step on every second; without cells, half
+        the step.
+        """
         if not self.cells:
             return SettingLadder(
                 self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4
@@ -105,11 +113,15 @@ class MeshedScene(ABC):
         )
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """DOP853; None where there are cells, for all solvers share the error that these have."""
+        """DOP853, to check the reference; None where there are cells, since all solvers share the error of the
+        cells.
+        """
         return None if self.cells else Setting("reference", OTHER_METHOD, reference_setting.value, 0)
 
     def solve(self, setting: Setting, duration: float) -> Any:
-        """Number of cells, 0 where the scene has none, and the run with a setting for a duration (s)."""
+        """Run the scene with a setting for a duration (s); returns the number of cells, 0 without cells, and the
+        run.
+        """
         cells = round(1.0 / setting.value) if self.cells else 0
         rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
         if setting.method == OTHER_METHOD:
@@ -119,7 +131,7 @@ class MeshedScene(ABC):
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
     def answer(self, solution: Any) -> PricedRun:
-        """The quantity, with the cells that it took."""
+        """The quantity along a run, with the number of cells that were evaluated."""
         cells, run = solution
         times, values, asked = self.read(run)
         return PricedRun(times, values, {"force calls": asked, "contact cells": asked * cells**2})
@@ -128,19 +140,19 @@ class MeshedScene(ABC):
         return self._part(self.longest) / 2 ** (max(0, rung) // 2)
 
     def _part(self, step: float) -> float:
-        """The longest part (s) of ``first`` up to a step (s)."""
+        """The longest whole fraction (s) of ``first`` that is at most ``step`` (s)."""
         return self.first / math.ceil(self.first / step * (1 - 1e-9))
 
 
 def chosen(quantity: str, known: dict[str, Any]) -> str:
-    """A quantity that a scene has; InputError for one that it has not."""
+    """The name of a quantity that a scene has; InputError for an unknown one."""
     if quantity not in known:
         raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known))
     return quantity
 
 
 def run_and_quantity(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
-    """The run and the quantity of a scene that a user names: RUN.QUANTITY, of the first run where none is named."""
+    """Names of the run and of the quantity, which a user gives as RUN.QUANTITY; the first run where none is named."""
     name, _, asked = (quantity or usual).rpartition(".")
     name = name or next(iter(runs))
     if name not in runs:

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to solve a problem.
+    """One way to solve a problem: an engine, a method, and its step, tolerance or number of cells.
 
     engine, method : together the name of a work-precision curve
     value : step in s, relative tolerance where ``adaptive``, or 1 by the number of cells where ``cells``
@@ -28,21 +28,21 @@ class Setting:
 
     @property
     def curve(self) -> str:
-        """Name of the curve that the setting lies on."""
+        """Name of the work-precision curve to which the setting belongs."""
         return f"{self.engine} {self.method}"
 
     def label(self) -> str:
-        """The setting as a reader names it: a step with its unit, a tolerance, or cells along a contact."""
+        """The setting as text: a step with its unit, a tolerance, or a number of cells along a contact."""
         if self.cells:
             return f"{round(1.0 / self.value)} cells"
         return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
 
 
 class Solver(Protocol):
-    """A model that is built and can be run."""
+    """A model that has been built and can be run."""
 
     def run(self) -> Any:
-        """Solve; raises RunFailed rather than give a wrong answer."""
+        """Solve the problem; raises RunFailed rather than give a wrong answer."""
         ...
 
 
@@ -67,18 +67,19 @@ class Problem(Protocol):
     tolerances: tuple[float, ...]
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """All settings to try, or the small share that quick runs use."""
+        """All settings to try, or the few that quick runs use."""
         ...
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and its step (s) or tolerance."""
+        """The setting of this problem that has this engine, this method, and this step (s) or tolerance."""
         ...
 
     def build(self, setting: Setting) -> Solver:
-        """A model ready to run; raises Refused where the engine would answer wrongly."""
+        """A model of the problem, ready to run; raises Refused where the engine would answer wrongly."""
         ...
 
     def errors(self, solution: Any) -> dict[str, float]:
-        """Largest error per quantity over the run, in the units of ``units``; where it judges the run, too, points of
-        work-precision curves are marked that break an assumption."""
+        """Largest error of each quantity over the run, in the units of ``units``. Where it also judges the run's
+        assumptions, work-precision curves mark points that break one.
+        """
         ...

@@ -54,9 +54,10 @@ DEARER = 8.0
 
 @dataclass(frozen=True)
 class SettingChoice:
-    """A setting with the error that it has (in the quantity's unit; the truth's own uncertainty where that is more),
-    its force calls, its seconds (median), and those of the rounds in which it was timed beside others; ``confirmed`` :
-    over the whole run."""
+    """A setting with its cost. error : in the quantity's unit, at least the uncertainty of the truth; calls : of
+    forces; seconds : median; confirmed : whether over the whole run; rounds : seconds in the rounds in which it was
+    timed alternately with others.
+    """
 
     tried: TriedSetting
     error: float
@@ -72,8 +73,10 @@ Winners = dict[tuple[str, str], SettingChoice]
 
 @dataclass(frozen=True)
 class Default:
-    """An engine's default method: its error as it comes (None if it gave no answer, then ``reason``), and refined to
-    meet the tolerance; ``extrapolated`` by its declared order where no step tried was fine enough."""
+    """An engine's default method. as_it_is : outcome of its default setting, with a ``reason`` if it gave no answer;
+    refined : the setting that meets the tolerance; extrapolated : whether by the declared order, because no step that
+    was tried is fine enough.
+    """
 
     as_it_is: TriedSetting
     refined: SettingChoice | None
@@ -82,8 +85,9 @@ class Default:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """Winners by engine and cost ("" for all engines), defaults by engine, all that was tried; the truth over the part
-    that was searched, and over the whole run."""
+    """Result of a search for settings: winners by engine and cost ("" for all engines), defaults by engine, all
+    settings that were tried, and the truth over the searched part and over the whole run.
+    """
 
     scene: PricedScene
     tolerance: float
@@ -100,7 +104,8 @@ class Recommendation:
 
 
 def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
-    """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known.
+    """The cheapest settings of a scene that meet a tolerance. InputError for impossible requests, RunFailed where no
+    truth can be computed.
 
     The scene's crew computes what is not timed.
     """
@@ -112,7 +117,7 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
 
 
 def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
-    """A scene as its system's file gives it to the search; InputError where there is none."""
+    """A scene in the form that the search needs, made by its system's module; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
         priceable: PricedScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
@@ -125,7 +130,7 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> Priced
 
 
 def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = None) -> Recommendation:
-    """Search the first part of the run, time what is near the best, confirm it over the whole run.
+    """Search settings over the first part of the run, time those near the best, and confirm them over the whole run.
 
     executor : computes what is not timed.
     """
@@ -146,7 +151,9 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
 
 
 def _timed_settings(search: Search) -> list[SettingChoice]:
-    """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
+    """The coarsest setting of every method that meets the tolerance; those that may be the fastest are timed in several
+    rounds.
+    """
     curves: dict[str, TriedSetting] = {}
     for attempt in search.meeting():
         coarsest = curves.setdefault(attempt.setting.curve, attempt)
@@ -164,7 +171,7 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
 
 
 def _rivals(attempts: list[TriedSetting]) -> list[TriedSetting]:
-    """The settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
+    """Settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
     rivals = dict[TriedSetting, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
         alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
@@ -179,7 +186,7 @@ def _rivals(attempts: list[TriedSetting]) -> list[TriedSetting]:
 
 
 def _raced(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
-    """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
+    """Seconds of each setting in a few rounds, and in more rounds for those that are not far behind the fastest."""
     seconds = _rounds(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
     least: dict[str, float] = {}
@@ -209,12 +216,14 @@ def _rounds(search: Search, rivals: list[TriedSetting], rounds: int) -> dict[Set
 
 
 def _winners(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
-    """The cheapest for every engine and cost for which there is any."""
+    """The cheapest setting for every pair of engine and cost in ``keys`` that has any."""
     return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
 
 
 def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
-    """The least cost; an engine's default method is kept where it does not take longer beyond doubt: seconds wander."""
+    """The setting of an engine with the least cost. By seconds, which scatter, a default method is preferred unless it
+    is clearly slower.
+    """
     able = [choice for choice in timed if choice.tried.setting.engine.startswith(engine)]
     if not able:
         return None
@@ -226,7 +235,7 @@ def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoi
 
 
 def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
-    """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
+    """Whether a setting takes longer than another: significantly so, where both were timed in the same rounds."""
     both = min(len(choice.rounds), len(best.rounds))
     if both < FEWEST_ROUNDS:
         return choice.seconds > best.seconds
@@ -237,7 +246,9 @@ Known = tuple[ReferenceTruth, list[SettingChoice], Winners]
 
 
 def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None) -> Known:
-    """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
+    """The winners and defaults after runs over the whole scene, refined until they meet the tolerance there; with the
+    truth.
+    """
     scene = search.scene
     rung = max(0, search.truth.rung - 1)
     known = truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
@@ -252,23 +263,24 @@ def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, exe
 
 
 def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
-    """The winners and the defaults."""
+    """The winners and the settings of default methods, each once."""
     return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
 
 
 @dataclass(frozen=True)
 class _Confirmed:
-    """A setting that meets the tolerance over the whole run, None where none does; attempts that had other failures
-    than an error that is too large."""
+    """A setting that meets the tolerance over the whole run, None where there is none, and attempts that failed for
+    other reasons than their error.
+    """
 
     choice: SettingChoice | None
     failed: list[TriedSetting] = field(default_factory=list)
 
 
 def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _Confirmed:
-    """A setting, or the next finer one of its method that meets the tolerance over the whole run.
+    """The setting, or the next finer one of its method, that meets the tolerance over the whole run.
 
-    The seconds of all attempts are told by the rounds in which the first was timed.
+    The seconds of all attempts are scaled from the rounds in which the first one was timed.
     """
     (ladder, choice), failed = block, list[TriedSetting]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
@@ -291,8 +303,9 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
 def _resolved(
     scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> Known:
-    """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
-    be far better than its tolerance asks, and as good as the reference that judged it."""
+    """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
+    be far better than its tolerance asks, and as good as the reference that it was compared with.
+    """
     shown = _winners_and_defaults(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _blurred(truth, errors):
@@ -314,7 +327,9 @@ def _whole_answer(scene: PricedScene, setting: Setting) -> PricedRun:
 
 
 def _blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
-    """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
+    """Whether the smallest error is too close to the uncertainty of the truth, and a better truth would take seconds,
+    not minutes.
+    """
     return (
         min(errors.values(), default=np.inf) < RESOLVED * truth.uncertainty
         and DEARER * truth.seconds < LONG_ROUNDS_SECONDS
@@ -324,7 +339,7 @@ def _blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
 def _finer_truth(
     scene: PricedScene, known: ReferenceTruth, answers: dict[Setting, PricedRun], executor: Executor | None
 ) -> tuple[ReferenceTruth, dict[Setting, float]]:
-    """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
+    """A truth that is exact enough for the errors of all answers, or the best that time allows, and these errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
     while _blurred(known, errors):
         try:

@@ -45,7 +45,7 @@ DRAWS = 200
 
 @dataclass(frozen=True)
 class Point:
-    """One setting and what became of it: errors by quantity, counts, seconds of every round, or of the one run.
+    """Outcome of one setting: errors by quantity, counts, and the seconds of every round, or of the only run.
 
     changed : whether the last of those rounds counted, or erred by, anything else; None without rounds. broken :
     assumptions that the run broke, of a problem whose solutions are judged.
@@ -61,13 +61,13 @@ class Point:
     broken: tuple[str, ...] = ()
 
     def cost(self, kind: str) -> float:
-        """A count, or the median of the seconds."""
+        """Cost of this kind: a count, or the median of the seconds."""
         return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts[kind])
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Cost of a default method divided by that of the cheapest setting, for the same error.
+    """Ratio of the cost of a default method to that of the cheapest setting with the same error.
 
     factor with its 95 % interval (equal to it for counts, NaN after too few rounds); ``how`` as in ``ToleranceCost``,
     for the default's side.
@@ -81,7 +81,9 @@ class Loss:
 
 @dataclass(frozen=True)
 class MeasuredPoints:
-    """All points of a problem, with what tables and figures need to know of it (see ``Problem``); as JSON keeps it."""
+    """All points of a problem, with the facts about it that tables and figures need (see ``Problem``), as they are
+    saved as JSON.
+    """
 
     key: str
     title: str
@@ -96,39 +98,39 @@ class MeasuredPoints:
 
     @property
     def quantity(self) -> str:
-        """The quantity that tolerances are set on."""
+        """Name of the quantity to which the tolerances apply."""
         return next(iter(self.units))
 
     @property
     def unit(self) -> str:
-        """Unit of the quantity that tolerances are set on."""
+        """Unit of the quantity to which the tolerances apply."""
         return self.units[self.quantity]
 
     @property
     def middle(self) -> float:
-        """The tolerance that rows are about, the looser of two."""
+        """The tolerance that the report's rows use: the middle one, of two the looser."""
         return sorted(self.tolerances)[len(self.tolerances) // 2]
 
     @property
     def costs(self) -> tuple[str, str]:
-        """Names of the two costs: the unit of counted work, and seconds."""
+        """Names of the two kinds of cost: the count that measures the work, and seconds."""
         return next(kind for kind in WORK if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
     def defaults(self) -> dict[str, Point]:
-        """The points that are somebody's default setting, by whose."""
+        """Points at default settings, by the name of the engine whose default it is."""
         return {p.setting.default: p for p in self.points if p.setting.default}
 
     def error(self, p: Point) -> float:
-        """Error of a point in the quantity that tolerances are set on."""
+        """Error of a point in the quantity to which the tolerances apply."""
         return p.errors[self.quantity]
 
     def floor(self, quantity: str = "") -> float:
-        """Error of a quantity below which the reference cannot judge."""
+        """Error of a quantity below which the reference is too uncertain to judge."""
         return HOLLOW * self.uncertainty[quantity or self.quantity]
 
     def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
-        """Points of each curve, from coarse to fine; None takes every status."""
+        """Points of each curve with this status, from coarse to fine; None means any status."""
         points_of = defaultdict(list)
         for p in sorted(self.points, key=lambda p: -p.setting.value):
             if status in (None, p.status):
@@ -136,12 +138,14 @@ class MeasuredPoints:
         return points_of
 
     def front(self, kind: str) -> list[Point]:
-        """The points that stand clear of the reference's uncertainty and that no other one beats, by rising cost."""
+        """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
+        ``floor``.
+        """
         clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.floor()]
         return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
 
     def orders(self, quantity: str) -> dict[str, float]:
-        """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
+        """Observed order of convergence of each curve: in the step, or in 1 / force calls for adaptive methods."""
         orders = {}
         for curve, points in self.curves().items():
             sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
@@ -149,7 +153,7 @@ class MeasuredPoints:
         return orders
 
     def same(self) -> list[tuple[str, ...]]:
-        """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
+        """Groups of curves that coincide, judged on the points whose errors are above ``floor``."""
         return coinciding(
             {
                 curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.floor()}
@@ -158,7 +162,7 @@ class MeasuredPoints:
         )
 
     def miscounted(self) -> list[str]:
-        """Settings with fixed stages whose force calls are not stages times steps."""
+        """Texts on settings of methods with fixed stages whose number of force calls is not stages times steps."""
         wrong = []
         for p in self.points:
             steps = round(self.duration / p.setting.value)
@@ -169,7 +173,7 @@ class MeasuredPoints:
         return wrong
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
-        """Cost at which each curve meets ``target``, in one of ``costs``; curves that do not meet it are left out."""
+        """Cost of the kind ``kind`` at which each curve meets ``target``; curves that do not meet it are left out."""
         reaches = {
             curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
@@ -179,14 +183,15 @@ class MeasuredPoints:
     def _reach(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
-        """``curves.reach`` on the points of one curve."""
+        """Cost at which the points of one curve meet a target, by ``curves.reach``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
         return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)
 
     def loss(self, target: float, kind: str, default: str, engine: str = "") -> Loss | None:
-        """Loss of the curve ``default`` against the cheapest one among ``engine`` ("" for all); None if none meets
-        it."""
+        """Loss of the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines); None if no
+        curve meets the target.
+        """
         best = cheapest(self.reaches(target, kind), engine)
         usual = self.reaches(target, kind, extrapolate=True).get(default)
         if best is None or usual is None:
@@ -202,18 +207,19 @@ class MeasuredPoints:
         return Loss(factor, low, high, usual.how)
 
     def _resampled(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
-        """Seconds that a curve needs by the points it rests on, once per bootstrapped set of the rounds that both
-        have."""
+        """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
+        bootstrap sample of the rounds that both have.
+        """
         kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
         medians = np.array([np.median(seconds[resamples(rounds, DRAWS)], axis=1) for seconds in kept])
         cheapest_reaches = [self._reach(side, target, costs) for costs in medians.T]
         return np.array([least.cost for least in cheapest_reaches if least is not None])
 
     def racing(self) -> list[Point]:
-        """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on,
-        and what those may that take little longer, of all and of each engine; what a default rests on that is refined;
-        of the front of the figure what is not slow; what takes LONG_RUN_SECONDS, for the middle tolerance alone. Work
-        is counted, so what wins by it needs no rounds.
+        """Points that are timed in several rounds because their seconds in a single run are decisive: default settings,
+        points that determine the cheapest settings and those little slower, of each engine and of all, points that
+        determine a refined default, and those on the figure's front that are not slow. Runs longer than
+        LONG_RUN_SECONDS are chosen for the middle tolerance alone. Work is counted, so that it needs no rounds.
         """
         curves, usual = self.curves(), self.defaults.values()
         chosen = [p for p in usual if p.status == "ok"] + [
@@ -231,7 +237,7 @@ class MeasuredPoints:
 
 
 def measured(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
-    """A problem with its points."""
+    """The points of a problem, with the facts about it."""
     told = {each.name: getattr(problem, each.name) for each in fields(MeasuredPoints) if each.name != "points"}
     return MeasuredPoints(**told, points=list(points))
 
@@ -241,7 +247,7 @@ TUPLES = ("seconds", "broken")
 
 
 def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
-    """A ``MeasuredPoints`` from the dictionary that ``dataclasses.asdict`` made of it."""
+    """A ``MeasuredPoints`` from the dictionary that ``dataclasses.asdict`` made from it."""
     points = [
         Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLES})
         for p in dictionary["points"]
@@ -250,8 +256,8 @@ def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
 
 
 def attempt(problem: Problem, setting: Setting) -> Point:
-    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
-    a doubt, the solution's ``doubt``), or SILENT: it is not finite or beyond all sense, and came back without a word.
+    """Try one setting. Its status is ok, raised (the run failed with a message), refused (it was not run), flagged (the
+    solution has a ``doubt``), or SILENT (the answer is not finite, or absurd, without any message).
     """
     begun = CLOCK()
     try:
@@ -285,7 +291,7 @@ def attempt(problem: Problem, setting: Setting) -> Point:
 
 
 def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) -> MeasuredPoints:
-    """All points of a problem: with the seconds of ``rounds`` interleaved rounds where they decide something, else with
+    """All points of a problem. Those that are decisive have the seconds of ``rounds`` interleaved rounds, the others
     those of one run.
 
     Seconds are those of building the model and running it, input tables included, for every engine alike.
@@ -299,7 +305,9 @@ def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) 
 
 
 def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_seconds: float) -> dict[Setting, Point]:
-    """The points with the seconds of their rounds, and whether their last run counted and gave what their first did."""
+    """The points with the seconds of their rounds, and whether counts or errors of the last run differ from the first
+    one's.
+    """
     last: dict[Setting, Any] = {}
 
     def run(setting: Setting) -> None:
@@ -322,7 +330,7 @@ def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_se
 
 
 def _nearly_cheapest(reaches: Reaches, engine: str) -> Reaches:
-    """The cheapest curve among those of one engine, or of all, and those that take little longer."""
+    """The cheapest curve of one engine, or of all, and the curves that are little slower."""
     best = cheapest(reaches, engine)
     return {
         curve: least
@@ -332,13 +340,13 @@ def _nearly_cheapest(reaches: Reaches, engine: str) -> Reaches:
 
 
 def resting(points: list[Point], cheapest_reach: ToleranceCost) -> list[Point]:
-    """The one or two points of a curve that a reach is made of."""
+    """The one or two points of a curve between which the cost of meeting a tolerance is interpolated."""
     coarser = [p for p in points if p.setting.value >= cheapest_reach.value * (1 - 1e-12)]
     finer = [p for p in points if p.setting.value <= cheapest_reach.value * (1 + 1e-12)]
     return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
 
 
 def cheapest(reaches: Reaches, engine: str = "") -> tuple[str, ToleranceCost] | None:
-    """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
+    """The curve that meets a tolerance at the least cost, among those of one engine or of all engines."""
     able = [item for item in reaches.items() if item[0].startswith(engine)]
     return min(able, key=lambda item: item[1].cost, default=None)

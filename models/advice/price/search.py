@@ -33,9 +33,9 @@ LARGEST_RELATIVE_ERROR = 10.0
 
 @dataclass(frozen=True)
 class TriedSetting:
-    """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run, as the
-    processor counts them: other work on the machine is not in them. It is "flagged" where it breaks an assumption that
-    the reference keeps."""
+    """Outcome of one setting: error in the quantity's unit, calls (or cells), and processor seconds of one run, without
+    other work on the machine. It is "flagged" where it breaks an assumption that the reference keeps.
+    """
 
     setting: Setting
     status: Status
@@ -47,7 +47,7 @@ class TriedSetting:
 
 @dataclass
 class Search:
-    """Settings of a scene tried over ``duration`` (s) against its truth."""
+    """Settings of a scene that are tried over ``duration`` (s), and compared with the scene's truth."""
 
     scene: PricedScene
     truth: ReferenceTruth
@@ -57,11 +57,11 @@ class Search:
 
     @property
     def held(self) -> float:
-        """Error that a setting may show beside a truth which is uncertain itself."""
+        """Largest error that a setting may show: the tolerance less the uncertainty of the truth."""
         return self.tolerance - self.truth.uncertainty
 
     def everything(self) -> "Search":
-        """Every ladder, those of high order first: what they cost tells when others are given up."""
+        """Search every ladder, methods of high order first. Their cost decides where other ladders are given up."""
         for ladder in {each.engine: each for each in self.scene.ladders()}.values():
             self._warm(ladder)
         for ladder in sorted(self.scene.ladders(), key=lambda each: (each.adaptive, -each.order)):
@@ -69,7 +69,7 @@ class Search:
         return self
 
     def attempt(self, setting: Setting) -> TriedSetting:
-        """Try a setting, and keep its result."""
+        """Try a setting and record its outcome."""
         begun = time.process_time()
         try:
             with breaches() as broken:
@@ -93,13 +93,14 @@ class Search:
         return attempt
 
     def _warm(self, ladder: SettingLadder) -> None:
-        """One run that is not timed: an engine's first one imports and compiles."""
+        """Run once without timing, since the first run of an engine imports and compiles."""
         with suppress(InputError, RunFailed):
             self.scene.solve(ladder.setting(_next(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration)
 
     def climb(self, ladder: SettingLadder) -> None:
-        """Find a ladder's coarsest setting that meets the tolerance: each one tried halves what is left, at least
-        nearly always, and the declared order says where to try next, or another engine with the same method."""
+        """Find a ladder's coarsest setting that meets the tolerance, nearly by bisection. The declared order, or
+        another engine with the same method, predicts which rung to try next.
+        """
         low, high, last, same = 0, len(ladder.values), None, self._elsewhere(ladder)
         while low < high:
             i = _next(ladder, low, high, last, self.tolerance)
@@ -118,27 +119,29 @@ class Search:
                 low = i + 1
 
     def meeting(self, engine: str = "") -> list[TriedSetting]:
-        """The tried settings that meet the tolerance, of one engine or of all."""
+        """Outcomes of the settings, of one engine or of all, that meet the tolerance."""
         return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
     def meets(self, attempt: TriedSetting) -> bool:
-        """Whether a setting holds the tolerance, and keeps the assumptions that the reference keeps."""
+        """Whether a setting meets the tolerance and keeps the assumptions that the reference keeps."""
         return attempt.status == "ok" and attempt.error <= self.held
 
     def _elsewhere(self, ladder: SettingLadder) -> float:
-        """The value that the method needs in another engine, 0 where none has it."""
+        """The setting's value that the same method needs in another engine, 0 where none has it."""
         alike = [attempt.setting.value for attempt in self.meeting() if attempt.setting.method == ladder.method]
         return max((value for value in alike if value in ladder.values), default=0.0)
 
     def _affordable(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
-        """The finest rung whose run takes no longer than REFINED_SECONDS, or than what the engine has that meets."""
+        """The finest rung whose run takes no longer than REFINED_SECONDS, or than the engine's fastest setting that
+        meets the tolerance.
+        """
         best = min(attempt.seconds for attempt in self.meeting(ladder.engine))
         most = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
         work = [ladder.work(last_tried.setting.value, value) for value in ladder.values]
         return max(i for i, times in enumerate(work) if i == 0 or times <= most)
 
     def _hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
-        """Whether a rung would cost far more than what its engine has that meets the tolerance."""
+        """Whether a rung would cost far more than another setting of its engine that meets the tolerance."""
         best = self.meeting(ladder.engine)
         if last_tried is None or not last_tried.seconds or ladder.default or not best:
             return False
@@ -146,7 +149,9 @@ class Search:
         return all(finer * cost(last_tried) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds, _calls))
 
     def _too_long(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
-        """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
+        """Whether a rung would take minutes although another engine has met the tolerance much faster; if so, this is
+        recorded as refused.
+        """
         best = min((attempt.seconds for attempt in self.meeting()), default=float("inf"))
         seconds = (
             0.0 if last_tried is None else ladder.work(last_tried.setting.value, ladder.values[i]) * last_tried.seconds
@@ -162,7 +167,9 @@ _seconds, _calls = attrgetter("seconds"), attrgetter("calls")
 
 
 def _next(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting | None, tolerance: float) -> int:
-    """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
+    """The rung to try next: predicted from the last one by the declared order, or the middle rung if that is
+    impossible.
+    """
     if last_tried is None:
         wanted = LOOSE if ladder.adaptive else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else START)
     elif last_tried.status == "ok" and last_tried.error > 0.0:
@@ -175,6 +182,6 @@ def _next(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting |
 
 
 def _rung(ladder: SettingLadder, target: float, low: int, high: int) -> int:
-    """The coarsest rung that is no coarser than what is wanted, of those left."""
+    """The coarsest of the remaining rungs that is no coarser than ``target``."""
     i = bisect_left(ladder.values, -target * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)

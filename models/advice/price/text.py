@@ -16,7 +16,9 @@ HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
 
 def lines(recommendation: Recommendation) -> list[str]:
-    """The table of cheapest settings, what the defaults lose, what failed, and what to write into the scene."""
+    """Text of a recommendation: the cheapest settings, the extra cost of defaults, what failed, and what to write into
+    the scene.
+    """
     scene = recommendation.scene
     first = (
         f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.searched.how} "
@@ -63,7 +65,7 @@ def _table(recommendation: Recommendation) -> list[str]:
 
 
 def _merged(winners: Winners) -> Winners:
-    """One row where the same setting is the cheapest by both costs."""
+    """The winners, with one row instead of two where the same setting is the cheapest by both costs."""
     rows = Winners()
     for (engine, kind), choice in winners.items():
         if (engine, "seconds") in rows and rows[engine, "seconds"] is choice:
@@ -103,7 +105,9 @@ def _defaults(recommendation: Recommendation) -> list[str]:
 
 
 def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool) -> str:
-    """Text: cost of the refined default method beside the engine's cheapest setting and the cheapest of all."""
+    """Text on the cost of the refined default method, compared with the engine's cheapest setting and with the cheapest
+    of all.
+    """
     if refined is None:
         return "; no step that was tried holds the tolerance over the whole run"
     parts = [
@@ -118,7 +122,7 @@ def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | 
 
 
 def _failures(tried: tuple[TriedSetting, ...]) -> list[str]:
-    """Settings without an answer, by method, with the reason of the last one that was tried."""
+    """Lines on settings without an answer, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[TriedSetting]](list)
     for attempt in tried:
         if attempt.status != "ok":

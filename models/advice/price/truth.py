@@ -25,10 +25,11 @@ MOST_ROWS = 4_000_000
 
 @dataclass(frozen=True)
 class ReferenceTruth:
-    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder;
-    kink_period : s between kinks of the quantity, 0 where there are none; seconds : of the processor that the reference
-    took, which tell how patient to be and are no price; broken : assumptions that the reference breaks, and with it
-    every setting that is right."""
+    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; how : text on its origin;
+    rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there are none; seconds :
+    of the processor that it took, a guide to how long to wait and no price; broken : assumptions that the reference
+    breaks, as every correct setting does.
+    """
 
     answer: PricedRun
     uncertainty: float
@@ -39,25 +40,28 @@ class ReferenceTruth:
     broken: tuple[BrokenAssumption, ...] = ()
 
     def beside(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
-        """The broken assumptions that the reference keeps."""
+        """Those of the broken assumptions that the reference keeps."""
         known = {assumption.name for assumption in self.broken}
         return [assumption for name, assumption in broken.items() if name not in known]
 
     def error(self, other_answer: PricedRun) -> float:
-        """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
+        """Largest difference of another answer from the truth, at the other answer's times; infinite if that answer is
+        not finite.
+        """
         if not np.isfinite(other_answer.values).all():
             return float("inf")
         return float(np.abs(other_answer.values - values_at(self.answer, other_answer.times, self.kink_period)).max())
 
     @property
     def size(self) -> float:
-        """Largest magnitude of the quantity."""
+        """Largest magnitude of the quantity over the run."""
         return float(np.abs(self.answer.values).max())
 
 
 def values_at(answer: PricedRun, times: np.ndarray, kink_period: float = 0.0) -> np.ndarray:
-    """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
-    all of them of one period."""
+    """Values (m, k) of an answer at ``times`` (m,) in s: its rows where they coincide, else cubic interpolation in four
+    rows within one kink period.
+    """
     last = len(answer.times) - 1
     step = float(answer.times[-1]) / last
     place = times / step
@@ -85,12 +89,13 @@ def truth(
     second_method: bool = True,
     executor: Executor | None = None,
 ) -> ReferenceTruth:
-    """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``second_method`` : also by
-    another family of methods.
+    """The truth of a scene's quantity over ``duration`` (s), to within a twentieth of ``tolerance``;
+    ``second_method`` : whether another family of methods must confirm it.
 
-    executor : computes the first two settings of the reference beside one another: fewer tell nothing.
+    executor : computes the first two settings of the reference at the same time, since fewer are never enough.
 
-    InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
+    InputError where this uncertainty cannot be reached, RunFailed where two families of solvers differ or no run
+    ends.
     """
     ladder = scene.reference()
     settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)
@@ -111,7 +116,9 @@ def truth(
 
 
 def _change(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
-    """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
+    """Largest difference between an answer and that with half the step, at the rows of both; the coarser answer is
+    interpolated between its rows.
+    """
     both = ((fine, coarse), (coarse, fine))
     return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
 
@@ -121,7 +128,9 @@ def _named(setting: Setting) -> str:
 
 
 class _Rung(NamedTuple):
-    """A reference's answer, None where it failed; why it did; seconds of the processor; what it broke."""
+    """Outcome of the reference on one rung: its answer, None where it failed; the reason for that; processor seconds;
+    assumptions that it broke.
+    """
 
     answer: PricedRun | None
     failure: str
@@ -142,8 +151,9 @@ def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
 def _settled_answer(
     scene: PricedScene, ladder: SettingLadder, tolerance: float, duration: float, rung: int, executor: Executor | None
 ) -> tuple[PricedRun, int, float, float, dict[str, BrokenAssumption]]:
-    """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
-    seconds that it took; what it broke."""
+    """The first answer of the reference that the next finer rung changed by no more than a fraction of the tolerance;
+    with its rung, the change, the processor seconds and the assumptions that it broke.
+    """
     before: PricedRun | None = None
     change, failure = float("inf"), ""
     rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]

@@ -17,7 +17,8 @@ from models.vehicles.spatial_linear import Kinematics, slopes_at_rest
 
 
 def activity(full_scene: FullScene) -> dict[str, float]:
-    """Watts by element: springs, dampers, bars, tyres, and every body's inertia along and about each axis.
+    """Activity in watts by element: of springs, dampers, bars and tyres, and of every body's inertia along and about
+    each axis.
 
     A wheel that meets white noise through a damped tyre has an acceleration without variance: its inertia is inf.
     """
@@ -31,7 +32,9 @@ def activity(full_scene: FullScene) -> dict[str, float]:
     noise, watts = np.hstack([b[n : 2 * n] for b in system.B]), dict[str, float]()
 
     def elastic(name: str, k: float, c: float, row: np.ndarray, road: np.ndarray | float = 0.0) -> None:
-        """Add the watts of an elastic deflection: its row of coordinates, less a road height's."""
+        """Add the watts of a spring and damper whose deflection is ``row`` of the coordinates less the height of the
+        ``road``.
+        """
         u = np.concatenate([row, np.zeros(states - n)]) - road
         s_u, s_v = _deviation(u, P), _deviation(u @ A, P)
         if k:

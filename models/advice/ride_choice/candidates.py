@@ -31,7 +31,7 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def remembered(method: Method) -> Method:
-    """A method whose answers its object keeps by their arguments."""
+    """Decorator of a method whose answers are kept in its object, by their arguments."""
 
     @wraps(method)
     def answer(candidates: "Candidates", *asked: Any) -> Any:
@@ -44,7 +44,9 @@ def remembered(method: Method) -> Method:
 
 
 class Candidates:
-    """Effects of a scene at its speeds (m/s), for quantities (names of outputs, weighted ones too)."""
+    """Effects of a scene that may be left out, judged at its speeds (m/s) for quantities (names of outputs, also
+    weighted ones).
+    """
 
     def __init__(
         self, scene: ReducedScene, speeds: Sequence[float] | np.ndarray, quantities: Sequence[str], tolerance: float
@@ -71,36 +73,36 @@ class Candidates:
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
-        """Those of a scene that asks for a choice."""
+        """The candidates of a scene that asks for a choice."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
     def _plain(self, quantity: str) -> tuple[int, str]:
-        """Row of the vehicle's output, and its weighting or ""."""
+        """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
         weighted = {f"{name} {by}": (name, by) for name, by in self.scene.ride.weighting.items()}
         name, by = weighted.get(quantity, (quantity, ""))
         return [output.name for output in self.scene.vehicle.outputs].index(name), by
 
     @property
     def counts(self) -> dict[str, int]:
-        """Vehicles that were made, each with an eigenvalue problem, and Lyapunov equations that were solved."""
+        """Counts of the work: eigenvalue problems, one for each vehicle that was made, and Lyapunov equations."""
         return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
 
     @remembered
     def rest(self, omitted_effects: Set) -> ReducedScene:
-        """The scene less these effects."""
+        """The scene without these effects."""
         return without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
     @remembered
     def system(self, full_scene: FullScene, omitted_effects: Set) -> Reduced | None:
-        """The scene less these effects at a speed; None where nothing sensible is left."""
+        """The system of the scene without these effects at a speed; None where no meaningful system remains."""
         try:
             return full_scene.reduced(self.rest(omitted_effects))
         except InputError:
             return None
 
     def screen(self, full_scene: FullScene, omitted_effects: Set) -> Screen | None:
-        """Covariance and adjoints of the scene less the singular ones of these effects."""
+        """Covariance and adjoints of the scene without those of these effects that are singular."""
         base = frozenset(effect for effect in omitted_effects if effect.singular)
         needs = {name for effect in base for name in effect.needs}
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
@@ -116,7 +118,7 @@ class Candidates:
 
     @remembered
     def predicted(self, omitted_effects: Set) -> np.ndarray:
-        """Changes (quantities,) of the worst of the screened speeds; inf where there is no system."""
+        """Predicted changes (quantities,), each the largest over the screened speeds; inf where no system remains."""
         return largest_changes(
             np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
         )
@@ -126,7 +128,9 @@ class Candidates:
         return self._change(full_scene, omitted_effects, self._predict)
 
     def share(self, omitted_effects: Set) -> float:
-        """Largest predicted change by the tolerance; inf beyond it, by whichever speed shows so first."""
+        """Ratio of the largest predicted change to the tolerance. It is inf once any speed exceeds the tolerance; the
+        speed that did so last is tried first.
+        """
         worst = 0.0
         for i, full_scene in enumerate(self._suspects):
             share = float(abs(self._predicted_at(full_scene, omitted_effects)).max()) / self.tolerance
@@ -138,21 +142,24 @@ class Candidates:
 
     @remembered
     def confirm(self, omitted_effects: Set) -> np.ndarray:
-        """The same by the exact solve, of all listed speeds."""
+        """Changes (quantities,) by the exact solution, each the largest over all listed speeds."""
         return largest_changes(
             np.array([self._change(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes])
         )
 
     @remembered
     def solved(self, omitted_effects: Set) -> np.ndarray:
-        """What ``confirm`` finds, by the motions of what is left wherever they can be trusted."""
+        """Changes as ``confirm`` gives them, but computed from eigenmodes of the reduced system wherever these are
+        reliable.
+        """
         return largest_changes(
             np.array([self._change(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes])
         )
 
     def certified(self, omitted_effects: Set) -> bool:
-        """Whether the identity of covariance and adjoint, in extended precision, is exact at the screened speeds, and
-        what the motions said of them."""
+        """Whether at the screened speeds the identity of covariance and adjoint holds in extended precision, and agrees
+        with the variances from eigenmodes.
+        """
         return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened)
 
     def _exact(self, full_scene: FullScene, omitted_effects: Set) -> bool:
@@ -181,7 +188,9 @@ class Candidates:
     def _change(
         self, full_scene: FullScene, omitted_effects: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
     ) -> np.ndarray:
-        """Changes (quantities,) at a speed; inf where there is no system, or an unstable one."""
+        """Changes (quantities,) at a speed by the function ``variances``; inf where no system remains, or an unstable
+        one.
+        """
         reduced, full = self.system(full_scene, omitted_effects), self.full[self.full_scenes.index(full_scene)]
         left = np.full(len(full), inf)
         with suppress(InputError):  # unstable
@@ -190,7 +199,7 @@ class Candidates:
 
     @remembered
     def between(self, omitted_effects: Set) -> np.ndarray:
-        """Changes (quantities,) of the worst speed of the range; inf where there is no system."""
+        """Changes (quantities,), each the largest over all speeds of the range; inf where no system remains."""
         reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
@@ -198,7 +207,9 @@ class Candidates:
 
     @remembered
     def off(self, omitted_effects: Set) -> np.ndarray:
-        """The same with parameters off, in the corner that is worst for each quantity."""
+        """Changes (quantities,) over all speeds of the range if parameters are off, in the combination that is worst
+        for each quantity.
+        """
         rest = self.rest(omitted_effects)
         return largest_changes(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 
@@ -207,13 +218,15 @@ class Candidates:
         return bool((abs(changes) <= self.tolerance).all())
 
     def told(self, changes: np.ndarray) -> str:
-        """The largest of changes (quantities,) in words."""
+        """Text on the largest of changes (quantities,)."""
         worst = int(abs(changes).argmax())
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
     @remembered
     def cost(self, omitted_effects: Set) -> Cost:
-        """At the stable step of the dearest screened speed; without end where nothing sensible is left."""
+        """Cost without these effects in the largest stable step, at the screened speed where it is highest; infinite
+        where no meaningful system remains.
+        """
         rest = self.rest(omitted_effects)
         alike = of_speed(rest.vehicle, 0.0) is None
         costs = [self._cost(full_scene, rest) for full_scene in (self.screened[:1] if alike else self.screened)]
@@ -227,15 +240,17 @@ class Candidates:
 
     @remembered
     def accurate(self, omitted_effects: Set) -> Cost:
-        """At the longest step that keeps the tolerance at all screened speeds, what is left out and steps together."""
+        """Cost without these effects in the longest step with which reduction and steps together keep the tolerance at
+        all screened speeds.
+        """
         return self.at_step(omitted_effects, longest_step(self.marches(omitted_effects), self.exact(), self.tolerance))
 
     def exact(self) -> list[np.ndarray]:
-        """Standard deviations (quantities,) of the whole scene at the screened speeds."""
+        """Standard deviations (quantities,) of the full scene, for each of the screened speeds."""
         return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 
     def marches(self, omitted_effects: Set) -> list[March]:
-        """Runs at the screened speeds."""
+        """Marches of the scene without these effects, one for each of the screened speeds."""
         weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
         rest = self.rest(omitted_effects)
         return [
@@ -244,10 +259,10 @@ class Candidates:
         ]
 
     def at_step(self, omitted_effects: Set, step: float) -> Cost:
-        """Cost of runs in steps (s)."""
+        """Cost without these effects in steps of ``step`` (s)."""
         return Cost(self.cost(omitted_effects).states, step, STAGES / step if step else inf)
 
 
 def largest_changes(changes: np.ndarray) -> np.ndarray:
-    """Of changes (n, quantities) the largest of each quantity, with its sign."""
+    """The largest change of each quantity, with its sign, of changes (n, quantities)."""
     return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

@@ -43,12 +43,13 @@ Saved = Callable[[Set, Set], float]
 
 @dataclass(frozen=True)
 class RideChoice:
-    """Effects ``left_out`` of all ``candidates``; relative changes (quantities,) of standard deviations.
+    """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
+    standard deviations that result.
 
     predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
-    off : there with parameters that are off, where that is worst; within_tolerance : whether all of them are.
-    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, which no accuracy bounds.
-    rounds : choices that were confirmed. said : why promising effects were not left out.
+    off : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are.
+    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy.
+    rounds : choices that were confirmed. said : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
@@ -66,28 +67,29 @@ class RideChoice:
 
 
 class Chooser(Candidates):
-    """The choice among the candidates of a scene."""
+    """Search for candidates that can be left out of a scene."""
 
     @cached_property
     def refused(self) -> dict[Set, str]:
-        """Sets that kept the tolerance as they stood and were not taken all the same, and why."""
+        """Sets that kept the tolerance but were refused, with the reasons."""
         return {}
 
     @cached_property
     def uncertified(self) -> set[Set]:
-        """Sets that kept the tolerance and whose certificate was not exact."""
+        """Sets that kept the tolerance but whose certificate was not exact."""
         return set()
 
     @cached_property
     def singles(self) -> list[Set]:
-        """Sets of an effect with all effects that it needs."""
+        """For each effect, the set of this effect and of all effects that must be left out with it."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
     def within_tolerance(self, omitted_effects: Set) -> bool:
-        """Whether the tolerance holds without these effects, wherever and whatever of them is left out.
+        """Whether the tolerance holds without these effects: at all speeds of the range, with parameters off, and
+        without errors that cancel each other.
 
-        A certificate is asked of what is chosen at last, and once it failed, of all that it failed for.
+        A certificate is required of the final choice and, once one has failed, of all sets for which it failed.
         """
         if not omitted_effects:
             return True
@@ -102,8 +104,8 @@ class Chooser(Candidates):
         return not why and omitted_effects not in self.uncertified
 
     def _cancels(self, omitted_effects: Set) -> str:
-        """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
-        is none.
+        """Text on an effect whose removal alone, or return alone, breaks the tolerance that the whole choice keeps,
+        since errors cancel; "" if there is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
@@ -118,14 +120,14 @@ class Chooser(Candidates):
 
     @remembered
     def _by_run(self, omitted_effects: Set) -> Cost:
-        """``accurate``, with a step that a run confirms, at the middle one of the screened speeds."""
+        """Cost as from ``accurate``, in a step that a run at the middle one of the screened speeds confirms."""
         step, marches = self.accurate(omitted_effects).step, self.marches(omitted_effects)
         while step and not confirms(marches[len(marches) // 2], step):
             step *= STEP_FACTOR
         return self.at_step(omitted_effects, step)
 
     def choose(self) -> RideChoice:
-        """The greedy choice, confirmed, less what saves nothing at equal accuracy."""
+        """The greedy choice, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified()
         unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
         looks = (self.confirm, self.between, self.off)
@@ -146,7 +148,7 @@ class Chooser(Candidates):
         )
 
     def _certified(self) -> tuple[Set, int]:
-        """The choice that saves calls and is certified, and how many sets were put to the test for it."""
+        """The choice that saves calls and is certified, and the number of sets that were tested for it."""
         rounds = 0
         while rounds < ROUNDS:
             chosen, tested = self._greedy()
@@ -168,7 +170,7 @@ class Chooser(Candidates):
         )
 
     def _greedy(self) -> tuple[Set, int]:
-        """The set of effects to leave out, and how many sets were put to the test for it, failed ones too."""
+        """The set of effects to leave out, and the number of sets that were tested for it, also unsuccessfully."""
         kept, banned, rounds = [frozenset[Effect]()], set[Set](), 0
         while rounds < ROUNDS:
             path = self.path(kept, banned)
@@ -188,9 +190,9 @@ class Chooser(Candidates):
         return kept[-1], rounds
 
     def _worthwhile(self, omitted_effects: Set) -> Set:
-        """The choice without every effect that may come back for hardly more calls at equal accuracy, or without a
-        shorter stable step: calls that are fewer then are so because errors of what is left out and of steps make up
-        for each other."""
+        """The choice without effects whose return costs hardly any more calls at equal accuracy, or no shorter stable
+        step. Fewer calls without a longer stable step only mean that errors of reduction and of steps cancel.
+        """
         fewer = [omitted_effects - {effect} for effect in omitted_effects if not illegal(omitted_effects - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
             if self._costs_the_same(less, omitted_effects) and self.within_tolerance(less):
@@ -198,7 +200,9 @@ class Chooser(Candidates):
         return omitted_effects
 
     def _costs_the_same(self, less: Set, omitted_effects: Set) -> bool:
-        """Whether a smaller set has no shorter stable step than a larger one, or as few calls at equal accuracy."""
+        """Whether the smaller set ``less`` has no shorter stable step than the larger one, or about as few calls at
+        equal accuracy.
+        """
         stable = self.cost(less).step
         if stable >= self.cost(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return True
@@ -207,8 +211,9 @@ class Chooser(Candidates):
         return self.accurate(less).calls <= self.accurate(omitted_effects).calls * (1 + EQUAL_COST_LOG)
 
     def further(self, omitted_effects: Set) -> dict[Effect, float]:
-        """Largest confirmed change if an effect that stayed went, too, with what it needs: at a tolerance above, it
-        would no longer matter. Only legal and finite ones."""
+        """Largest confirmed change for each effect that stayed, if it were left out as well, with what it needs: with a
+        larger tolerance than this, it could be. Only legal sets and finite changes.
+        """
         changes = {
             effect: float(abs(self.solved(omitted_effects | step)).max())
             for effect, step in zip(self.effects, self.singles, strict=True)
@@ -217,7 +222,7 @@ class Chooser(Candidates):
         return {effect: change for effect, change in changes.items() if change < inf}
 
     def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
-        """The path that goes on from a kept one, step by step, as far as predictions allow.
+        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
@@ -227,7 +232,9 @@ class Chooser(Candidates):
         return path
 
     def _calls_saved(self, omitted_effects: Set, further: Set) -> float:
-        """Logarithm, of savings worth the tolerance they take."""
+        """Logarithm of the ratio by which leaving out more effects reduces the calls; 0 for ratios too small to spend
+        tolerance on.
+        """
         then = self.cost(further).calls
         saved = log(self.cost(omitted_effects).calls / then) if then < inf else 0.0
         return saved if saved > EQUAL_COST_LOG else 0.0
@@ -237,14 +244,17 @@ class Chooser(Candidates):
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _steps(self) -> list[Set]:
-        """The smallest sets that can be left out; those that let white noise pass, also with the tyres' damping,
-        through which it enters."""
+        """The smallest sets that can be left out. A set that lets white noise pass is also tried together with the
+        tyres' damping, through which this noise enters.
+        """
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
         return self.singles + [step | damping for step in white]
 
     def _best(self, omitted_effects: Set, banned: set[Set], saved: Saved) -> Set:
-        """The step that saves most for what it adds to the predicted error; empty if none is within the tolerance."""
+        """The step that saves the most for what it adds to the predicted error; empty if no step keeps the
+        tolerance.
+        """
         best, most, now = frozenset[Effect](), 0.0, self.share(omitted_effects)
         for step in self._steps():
             further = omitted_effects | step

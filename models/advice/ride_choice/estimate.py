@@ -23,7 +23,7 @@ SIZE, TIMES = 40, 9
 
 @dataclass(frozen=True)
 class Estimate:
-    """Counts of a choice, and processor time (s) by them, good to a factor of two."""
+    """Size of a choice in counts, and an estimate of its processor time (s), good to a factor of two."""
 
     effects: int
     speeds: int
@@ -32,7 +32,7 @@ class Estimate:
 
 
 def estimate(ride: RideScene) -> Estimate:
-    """Of a linear scene at constant speeds that asks for a choice."""
+    """Estimate for a linear scene at constant speeds that asks for a choice."""
     assert ride.speeds is not None
     with scene_errors(ride):
         scene = ReducedScene.complete(ride)
@@ -43,7 +43,7 @@ def estimate(ride: RideScene) -> Estimate:
 
 
 def _states(scene: ReducedScene, road: Excitation) -> int:
-    """Of vehicle and road."""
+    """Number of states of the vehicle and of the road's filters."""
     return 2 * len(scene.vehicle.coordinates()) + len(road.heights) * len(road.F)
 
 

@@ -35,7 +35,7 @@ ROADS_BYTES = 3e8
 
 
 class Samples(Strict):
-    """Number and length of the copies by a scene's [options]."""
+    """Number and duration of the copies, from a scene's [options]."""
 
     copies: int = Field(
         default=48, ge=FEWEST_COPIES, le=100_000, description="of the vehicle, each on a road of its own"
@@ -46,8 +46,9 @@ class Samples(Strict):
 
 @dataclass(frozen=True)
 class CopySteps:
-    """Time steps of the copies at a speed (m/s): the road's ``half`` step (s), steps before outputs count and while
-    they do, and how the bent springs of the whole vehicle move."""
+    """Time steps of the copies at a speed (m/s): the road's ``half`` step (s), the numbers of steps before and while
+    outputs count, and the motion of the whole vehicle's nonlinear springs.
+    """
 
     speed: float
     half: float
@@ -63,7 +64,7 @@ class CopySteps:
 
 @dataclass(frozen=True)
 class CopiesInTime:
-    """A scene's copies at all its speeds, less ``left_out``, with steps so many ``times`` as long."""
+    """The copies of a scene at all its speeds, without the effects ``left_out``, in steps ``times`` as long."""
 
     scene: ReducedScene
     samples: Samples
@@ -75,12 +76,12 @@ class CopiesInTime:
 
     @property
     def file(self) -> str:
-        """The scene's."""
+        """Name of the scene's file."""
         return self.scene.ride.file
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Effects that are there."""
+        """Names of the effects that have not been left out."""
         return tuple(effect.name for effect in self.effects if effect.name not in self.left_out)
 
     @property
@@ -115,11 +116,13 @@ class CopiesInTime:
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
     def longer(self, times: int) -> "CopiesInTime":
-        """The scene in steps so many times as long."""
+        """The scene in steps ``times`` as long as now."""
         return replace(self, times=self.times * times)
 
     def fewer(self, steps: int) -> "CopiesInTime":
-        """The scene with as many copies as take about so many steps, and no fewer than tell a standard error."""
+        """The scene with so few copies that these take about ``steps`` steps in all, but enough copies for a standard
+        error.
+        """
         copies = max(FEWEST_COPIES, -(-self.samples.copies * steps // self.steps))
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
@@ -128,16 +131,18 @@ class CopiesInTime:
         return self.scene.excitation()
 
     def vehicle(self, pace: CopySteps) -> SpatialVehicle:
-        """The vehicle without the effects at a speed; InputError where a run in time needs an effect."""
+        """The vehicle at a speed, without the effects that are left out; InputError where a run in time needs one of
+        them.
+        """
         return reduced_vehicle(self.scene, pace.springs)
 
     def roads(self, pace: CopySteps) -> np.ndarray:
-        """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
+        """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps."""
         roads = _roads(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
         return np.ascontiguousarray(roads[:: self.times])
 
     def squares(self, pace: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
-        """Outputs, and each copy's mean square (copies, p) about the mean of all."""
+        """Outputs of the vehicle, and for each copy the mean squares (copies, p) about the mean of all copies."""
         step = 2.0 * pace.half * self.times
         march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
         every = max(1, STEPS_PER_READING // self.times)
@@ -151,7 +156,9 @@ class CopiesInTime:
 
 
 def in_time(scene: ReducedScene) -> CopiesInTime:
-    """The copies in time of a whole scene; InputError for one that has a closed form, or that no copies answer."""
+    """The copies of a full scene, run in time; InputError for a scene with a closed form, or one that copies cannot
+    answer.
+    """
     _check(scene)
     speeds, options = scene.ride.speeds, scene.ride.options
     assert speeds is not None
@@ -181,7 +188,7 @@ def _pace(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
 
 
 def _may_go(scene: ReducedScene, effect: Effect) -> bool:
-    """Whether a run in time can do without an effect and all that it takes along."""
+    """Whether a run in time can do without an effect and the parts that leave with it."""
     rest = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in rest.rigid)
     return not rest.massless and not any(
@@ -190,7 +197,9 @@ def _may_go(scene: ReducedScene, effect: Effect) -> bool:
 
 
 def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of what is left; ``moving``: how bent springs move, for the gains of straight laws."""
+    """The vehicle of a reduced scene; ``moving`` : motion of the nonlinear springs, for the gains that replace their
+    laws.
+    """
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
 
@@ -209,7 +218,7 @@ def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> Spati
 
 
 def _straight(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
-    """Gains of statistical linearisation in place of these laws."""
+    """The spring with gains of statistical linearisation in place of these laws."""
     motion = moving.get(spring.name)
     if motion is None:
         return spring
@@ -229,7 +238,7 @@ _kept: dict[tuple[object, ...], np.ndarray] = {}
 
 
 def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
-    """Heights and rates (2 steps + 1, 2 w, copies); the last few that were asked for are kept."""
+    """Heights and rates (2 steps + 1, 2 w, copies) of the road; those that were requested last are kept."""
     road = path.excitation
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
     of_run = path.speed, path.half, steps, samples.copies, samples.seed

@@ -36,7 +36,9 @@ NEGLIGIBLE_SHARE = 1e-12
 
 @dataclass(frozen=True)
 class March:
-    """A system in its motions, its road at a speed (m/s): rows (q,) are the quantities, of weightings their names."""
+    """A reduced system in its eigenmodes, with its road at a speed (m/s). rows (q,) : of the quantities; weightings :
+    the names of their weightings, by row.
+    """
 
     reduced: Reduced
     speed: float
@@ -45,13 +47,15 @@ class March:
 
     @cached_property
     def vehicle(self) -> int:
-        """States of the vehicle, which stand first."""
+        """Number of states of the vehicle, which are the first ones of the system."""
         road = self.reduced.excitation
         return self.reduced.states - len(road.heights) * len(road.F)
 
     @cached_property
     def motions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rates (n,) in 1/s, quantities by motions (q, n), motions by the road's filters and noise (n, m + k)."""
+        """Eigenvalues (n,) in 1/s of the vehicle, the matrix (q, n) from its modes to quantities, and the matrix (n, m
+        + k) from the road's filters and noise to its modes.
+        """
         n, system, modes = self.vehicle, self.reduced.system, self.reduced.of_vehicle.modes
         rates, V = (modes.rates, modes.V) if modes else np.linalg.eig(system.A[:n, :n])
         back = modes.W if modes else np.linalg.inv(V)
@@ -60,7 +64,7 @@ class March:
 
     @cached_property
     def read(self) -> np.ndarray:
-        """Quantities by states (q, n + m), before their weightings."""
+        """Matrix (q, n + m) from the states to the quantities, before their weightings."""
         weighted, names = dict(self.weightings), self.reduced.system.names
         plain = [
             names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row for row in self.rows
@@ -69,11 +73,11 @@ class March:
 
     @cached_property
     def longest(self) -> float:
-        """Longest stable step (s)."""
+        """Longest step (s) at which the vehicle's march is stable."""
         return self.reduced.of_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (q,) of what a run in steps (s) samples."""
+        """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
         omega, weights, apart = self._frequencies(step)
         last, half = self._alike(step), np.exp(0.5j * step * omega)
         alike = np.arange(-last, last + 1)[:, None]
@@ -86,10 +90,11 @@ class March:
         return np.sqrt(weights @ (total * abs(self._heard(omega).T) ** 2) / np.pi)
 
     def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
-        """Quantities by the states of every axle's filter (w, q, m), for waves that turn by ``half`` in half a step,
-        and for those that turn by its opposite, which look alike at the steps.
+        """Gains (w, q, m) from the states of each axle's filter to the quantities, for waves whose phase turns by
+        ``half`` in half a step, and for waves that turn by the opposite and look the same at the steps.
 
-        White noise is read as its mean over a step, as the filters' states at its begin, middle and end tell it.
+        White noise enters as its mean over a step, computed from the filters' states at the step's begin, middle and
+        end.
         """
         rates, seen, forced = self.motions
         road, z, end = self.reduced.excitation, step * rates, half**2
@@ -113,13 +118,15 @@ class March:
             yield [moved[:, :, i] for i in range(axles)]
 
     def _mean_noise(self, half: np.ndarray, step: float) -> np.ndarray:
-        """Mean noise of a step by the states of a filter at its begin (w, k, m)."""
+        """Gains (w, k, m) from a filter's states at the begin of a step to the mean noise over this step."""
         road, at = self.reduced.excitation, half[:, None, None]
         slope = (at**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * ((1 + 4 * at + at**2) / 6)
         return np.asarray(np.linalg.pinv(self.speed**0.5 * road.G) @ slope)
 
     def _met(self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """Densities (w, q) of quantities by all ``waves`` (a, w) that look alike, each with its ``count`` (a, 1)."""
+        """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that look alike, each weighted
+        with its ``count`` (a, 1).
+        """
         road, speeds, total = self.reduced.excitation, np.array([self.speed]), 0.0
         late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
@@ -135,46 +142,50 @@ class March:
 
     @cached_property
     def filters(self) -> Filters:
-        """Of an axle."""
+        """Filters of an axle of the road."""
         return Filters(self.reduced.excitation)
 
     def _alike(self, step: float) -> int:
-        """Waves to either side up to which not all of them fall with their square."""
+        """Number of aliased waves to either side within which contributions need not fall with the square of the
+        distance.
+        """
         corner = self.speed * abs(np.linalg.eigvals(self.reduced.excitation.F)).max()
         return max(ALIKE, int(np.ceil(BEYOND * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
-        """Frequencies up to those with two steps per period."""
+        """Frequencies up to the one with two steps per period, with their weights."""
         highest = np.pi / step
         delay = max(self.reduced.excitation.lengths) / self.speed
         return frequencies(self.motions[0], delay, (LOWEST * highest, highest))
 
     def _heard(self, omega: np.ndarray) -> np.ndarray:
-        """Factors (q, w) of the weightings."""
+        """Factors (q, w) of the weightings at angular frequencies ``omega``."""
         names = dict(self.weightings)
         return weighting_factors([names.get(row, "") for row in self.rows], omega)
 
 
 class RunInSteps(Protocol):
-    """Runs in time of a scene at a speed, in steps (s)."""
+    """Runs in time of a scene at one speed, in steps (s) of any length."""
 
     @property
     def longest(self) -> float:
-        """Longest stable step (s)."""
+        """Longest step (s) at which the run is stable."""
 
     def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (q,) of what a run in steps (s) samples."""
+        """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
 
 
 def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], tolerance: float) -> float:
-    """Longest step (s) up to which runs at every speed keep quantities within a tolerance of ``exact`` deviations.
+    """Longest step (s) with which runs at every speed keep all quantities within a tolerance of their ``exact``
+    deviations.
 
-    exact : of the whole scene, (q,) for each march. 0 where the shortest step that is looked at breaks it.
+    exact : standard deviations of the full scene, (q,) for each march. The result is 0 where the shortest step that is
+    tried breaks the tolerance.
     """
     runs = list(zip(marches, exact, strict=True))
 
     def share(step: float) -> float:
-        """Logarithm of the largest error by the tolerance; of the first march that breaks it."""
+        """Logarithm of the ratio of the largest error to the tolerance, or that of the first march which breaks it."""
         worst = -np.inf
         for i, (march, deviations) in enumerate(runs):
             error = float(abs(march.deviations(step) / deviations - 1.0).max()) / tolerance
@@ -197,9 +208,9 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
 
 
 def _between(steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]) -> float:
-    """Longest of ``FINE`` logarithmically spaced steps (s) below the first one whose share is above 0.
+    """Longest of ``FINE`` logarithmically spaced steps (s) below the first one that breaks the tolerance.
 
-    An error grows as a power of the step, so that a line tells where to look next.
+    An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
     (low, high), (below, above) = (0, FINE), shares
     while high - low > 1:
@@ -214,8 +225,9 @@ def _between(steps: tuple[float, float], shares: tuple[float, float], share: Cal
 
 @dataclass(frozen=True)
 class Cost:
-    """``states`` of vehicle and road filters, without weightings; ``step`` (s), the largest at which the classical
-    Runge-Kutta method is stable for the vehicle; ``calls`` of its right-hand side per second of motion at that step.
+    """Cost of a run. states : of vehicle and road filters, without weightings; step (s) : the largest at which the
+    classical Runge-Kutta method is stable for the vehicle; calls : of its right-hand side per second of motion in this
+    step.
 
     The road's own poles do not bound the step: a time run reads heights from a table made beforehand. How fine a step
     must be to resolve the road or a quantity is another question, the same with and without an effect.
@@ -227,7 +239,7 @@ class Cost:
 
     @property
     def work(self) -> float:
-        """Calls times states, per second of motion."""
+        """Work per second of motion: calls times states."""
         return self.calls * self.states
 
 

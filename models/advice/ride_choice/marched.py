@@ -33,7 +33,9 @@ ALLOWED_STANDARD_ERRORS = 4.0
 
 @dataclass(frozen=True)
 class Marched:
-    """ratio (q,) of deviations of a run to those of one in shorter steps, its standard error (q,), calls per second."""
+    """Comparison of a run with one in shorter steps. ratio (q,) : of standard deviations; error (q,) : standard error
+    of the ratio; calls : per second of motion.
+    """
 
     ratio: np.ndarray
     error: np.ndarray
@@ -41,7 +43,7 @@ class Marched:
 
 
 def marched(march: March, step: float, copies: int = COPIES) -> Marched:
-    """Run a scene in steps (s)."""
+    """Run a scene in steps of ``step`` (s) and in shorter ones."""
     steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
     road = _states(march, step / REFINEMENT, steps * REFINEMENT, copies)
     coarse, calls = _squares(march, road[::REFINEMENT], step)
@@ -53,7 +55,9 @@ def marched(march: March, step: float, copies: int = COPIES) -> Marched:
 
 
 def confirms(march: March, step: float) -> bool:
-    """Whether a run in steps (s) finds what the closed form says that they do to deviations, before weightings."""
+    """Whether a run in steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed form
+    predicts.
+    """
     plain = replace(march, weightings=())
     run = marched(plain, step)
     said = plain.deviations(step) / plain.deviations(step / REFINEMENT)
@@ -66,7 +70,7 @@ def confirms(march: March, step: float) -> bool:
 
 
 def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
-    """States (2 steps + 1, a m, copies) of all axles' filters at half steps."""
+    """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps."""
     road = march.reduced.excitation
     axles, m = len(road.heights), len(road.F)
     each = tuple(np.kron(np.eye(axles)[:, [i]], np.eye(m)) for i in range(axles))
@@ -75,9 +79,10 @@ def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
 
 
 def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
-    """Mean squares (copies, q) of a run over a road at its half steps, and calls of the right-hand side.
+    """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of calls
+    of the right-hand side.
 
-    A step of a linear system is a matrix, which a step on the unit matrix tells.
+    A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
     n, steps, (_, m, copies) = march.vehicle, len(road) // 2, road.shape
     move, *weights = _step(march.reduced.system.A[:n, :n], step)
@@ -97,7 +102,9 @@ def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, i
 
 
 def _step(A: np.ndarray, step: float) -> list[np.ndarray]:
-    """What a step (s) makes of the state (n, n), and of forces at its begin, middle and end (n, n) each."""
+    """Matrices (n, n) of one step (s): how the new state depends on the old one, and on forces at the step's begin,
+    middle and end.
+    """
     n = len(A)
     columns = np.eye(n, 4 * n)
     acting = {share * step: np.roll(columns, (i + 1) * n, axis=1) for i, share in enumerate((0.0, 0.5, 1.0))}
@@ -105,9 +112,11 @@ def _step(A: np.ndarray, step: float) -> list[np.ndarray]:
 
 
 def _begin(march: March, road: np.ndarray) -> np.ndarray:
-    """States (n, copies) of the vehicle in its stationary ride, given those (m, copies) of the road.
+    """Initial states (n, copies) of the vehicle, drawn from its stationary ride for given states (m, copies) of the
+    road.
 
-    A short run would not reach it from rest."""
+    A short run would not reach it from rest.
+    """
     n, states, system = march.vehicle, march.reduced.states, march.reduced.system
     P = solve_continuous_lyapunov(system.A, -noise_of(system))[:states, :states]
     told = P[:n, n:] @ np.linalg.pinv(P[n:, n:], hermitian=True)
@@ -117,7 +126,7 @@ def _begin(march: March, road: np.ndarray) -> np.ndarray:
 
 
 def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
-    """Mean force (steps, n, copies) of white noise over each step, 0 where none reaches the vehicle."""
+    """Mean force (steps, n, copies) that white noise exerts over each step, 0 where no noise reaches the vehicle."""
     roads, n = march.reduced.excitation, march.vehicle
     into = np.hstack([b[:n] for b in march.reduced.system.B])
     if not into.any():

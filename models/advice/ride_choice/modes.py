@@ -25,14 +25,17 @@ STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
 
 @dataclass(frozen=True)
 class Modes:
-    """rates (n,) in 1/s; V (n, n) the state by the motions, W (n, n) its inverse."""
+    """Eigenmodes of a system. rates (n,) : eigenvalues in 1/s; V (n, n) : eigenvectors as columns; W (n, n) : inverse
+    of V.
+    """
 
     rates: np.ndarray
     V: np.ndarray
     W: np.ndarray
 
     def of(self, A: np.ndarray) -> "Modes | None":
-        """These, if they are those of A and no two are so much alike that they are of no use; else None.
+        """These modes, if they are the modes of A and no two eigenvectors are too nearly parallel to be of use; else
+        None.
 
         The states are scaled as they balance A, so that units have no part in it.
         """
@@ -43,21 +46,23 @@ class Modes:
         return self if off <= INVERSE and grows <= PARALLEL else None
 
     def moved(self, time: float, B: np.ndarray) -> np.ndarray:
-        """e^(A t) B (n, k), after a time (s)."""
+        """The product e^(A t) B (n, k) after a time t (s)."""
         return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
 
     def covariance(self, Q: np.ndarray) -> np.ndarray:
-        """P (n, n) of A P + P A' + Q = 0."""
+        """Solution P (n, n) of the Lyapunov equation A P + P A' + Q = 0."""
         inner = -(self.W @ Q @ self.W.conj().T) / (self.rates[:, None] + self.rates.conj())
         return np.asarray((self.V @ inner @ self.V.conj().T).real)
 
     def adjoint_of_motions(self, C: np.ndarray) -> np.ndarray:
-        """Z (p, n, n) of every output c (p, n): its adjoint, A' L + L A + c' c = 0, is L = W* Z W."""
+        """Adjoint Z (p, n, n) in modal coordinates for every output c (p, n). The adjoint L = W* Z W solves A' L + L A
+        + c' c = 0.
+        """
         y = C @ self.V
         return np.asarray(-(y.conj()[:, :, None] * y[:, None, :]) / (self.rates.conj()[:, None] + self.rates))
 
     def adjoints(self, C: np.ndarray) -> np.ndarray:
-        """L (p, n, n) of every output."""
+        """Adjoint L (p, n, n) in state coordinates for every output."""
         return np.asarray((self.W.conj().T @ self.adjoint_of_motions(C) @ self.W).real)
 
 
@@ -71,7 +76,9 @@ def modes_of(A: np.ndarray) -> Modes | None:
 
 
 def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | None) -> Modes | None:
-    """Motions of u' = A_u u, x' = A_x x + coupling u together, the state (u, x); None where they are not told apart."""
+    """Modes of the coupled system u' = A_u u, x' = A_x x + coupling u with state (u, x); None where an eigenvalue
+    belongs to both.
+    """
     if driver is None or system is None:
         return None
     apart = driver.rates - system.rates[:, None]
@@ -91,7 +98,7 @@ def _below(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarr
 
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
-    """Motions of a vehicle behind its axles' filters F (m, m), the state (x, f), A that of both."""
+    """Modes of a vehicle together with its axles' road filters F (m, m), for the state (x, f) and its matrix A."""
     n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
@@ -103,7 +110,7 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
 
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
-    """Motions of a system before the weightings of its outputs, the state (x, w), A that of both."""
+    """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A."""
     filters = _weightings(names)
     if system is None or filters is None:
         return None
@@ -131,7 +138,9 @@ def _weightings(names: tuple[str, ...]) -> Modes | None:
 
 
 def stable_step(values: np.ndarray) -> float:
-    """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
+    """Largest stable step (s) of the classical Runge-Kutta method: |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step
+    times every eigenvalue (1/s).
+    """
     values = values[(abs(values) > 0) & (values.imag >= 0)]  # those of a pair allow the same step
     z = values[:, None] / abs(values)[:, None] * STEP_TIMES_EIGENVALUE
     grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12

@@ -33,7 +33,9 @@ ROUNDING_SHARE = 1e-9
 
 
 def speeds_between(scene: ReducedScene, listed: np.ndarray) -> np.ndarray:
-    """The listed speeds (m/s) and as many between the first and the last as tell how the axles' delay goes on."""
+    """The listed speeds (m/s), and enough speeds between the slowest and the fastest to resolve the effect of the delay
+    between axles.
+    """
     low, high = float(listed.min()), float(listed.max())
     if low == high:
         return np.array([low])
@@ -45,14 +47,17 @@ def speeds_between(scene: ReducedScene, listed: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Spectra:
-    """Variances (speeds, quantities) of a scene, and what each parameter, so much off, adds to them (v, q, p)."""
+    """variances (speeds, quantities) of a scene; slopes (v, q, p) : first-order changes of these if each parameter is
+    off by itself.
+    """
 
     variances: np.ndarray
     slopes: np.ndarray
 
 
 class Neighbourhood:
-    """A scene's quantities (outputs with the names of their weightings, or "") at all speeds (m/s) of its range.
+    """Quantities of a scene at all speeds (m/s) of its range, and with parameters off. Quantities are outputs with the
+    names of their weightings, "" for none.
 
     off : vehicles with parameters off that were made.
     """
@@ -74,7 +79,9 @@ class Neighbourhood:
         self.whole, self.at_few = self._variances(scene, self.vehicles), self._slopes(scene)
 
     def changes(self, reduced_scene: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
-        """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
+        """Relative changes (v, q) of standard deviations from the full to the reduced scene; ``factors`` : of
+        parameters that are off in both.
+        """
         if not factors:
             return np.asarray(np.sqrt(self._variances(reduced_scene, self.vehicles) / self.whole) - 1.0)
         scene, reduced_scene = (
@@ -86,8 +93,9 @@ class Neighbourhood:
         return np.asarray(changes)
 
     def corners(self, reduced_scene: ReducedScene) -> list[dict[Parameter, float]]:
-        """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few
-        speeds."""
+        """For each quantity, factors of all parameters with which its change is the largest, to first order, at any of
+        a few speeds.
+        """
         left, full = self._slopes(reduced_scene), self.at_few
         ratio = np.sqrt(left.variances / full.variances)
         logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
@@ -97,7 +105,7 @@ class Neighbourhood:
         return [dict(zip(self.parameters, 1.0 + PARAMETER_ERROR * sign, strict=True)) for sign in signs]
 
     def _variances(self, scene: ReducedScene, vehicles: Vehicles) -> np.ndarray:
-        """Variances (v, q) at all speeds."""
+        """Variances (v, q) of a scene at all speeds."""
         groups = _alike(scene.vehicle, self.speeds)
         return np.concatenate([self._sum(scene, vehicles, speeds).variances for speeds in groups])
 
@@ -105,7 +113,7 @@ class Neighbourhood:
         return Sum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
-        """Variances of a scene at a few speeds, with the slopes of all parameters."""
+        """Variances of a scene at a few speeds, with their first-order changes by each parameter that is off."""
         variances, slopes = [], []
         for speeds in _alike(scene.vehicle, self.few):
             total, vehicle = self._sum(scene, self.vehicles, speeds), self.vehicles.of(scene, float(speeds[0]))
@@ -116,8 +124,9 @@ class Neighbourhood:
         return Spectra(np.concatenate(variances), np.concatenate(slopes))
 
     def _shifts_of(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
-        """What all parameters do to a vehicle; those of the whole one serve where only bars and the damping of tyres
-        are gone and no weight shifts."""
+        """Changes of a vehicle's matrices with all parameters. Those of the full vehicle are used where only bars and
+        the damping of tyres are removed and gravity is absent.
+        """
         whole = self.scene.vehicle
         if not whole.gravity and replace(vehicle, bars=whole.bars, tyres=whole.tyres) == whole:
             there = set(parameters(vehicle))
@@ -134,7 +143,7 @@ class Neighbourhood:
 
 
 class Sum:
-    """Sums over frequencies (w,) for what is left of a scene at speeds (m/s)."""
+    """Sums over frequencies (w,) for a reduced scene at speeds (m/s)."""
 
     def __init__(
         self, excitation: Excitation, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
@@ -149,21 +158,21 @@ class Sum:
 
     @property
     def variances(self) -> np.ndarray:
-        """Variances (v, q)."""
+        """Variances (v, q) of the quantities."""
         H = np.sqrt(self.weights)[..., None] * self.response.H
         rows = H.reshape(-1, H.shape[2])
         gains = [(rows @ heights).reshape(*H.shape[:2], -1) for heights in self.excitation.heights]
         return variances(gains, self.excitation, self.speeds, self.omega, self.apart)
 
     def heights(self) -> np.ndarray:
-        """Heights under the wheels by unit noises (v, w, wheels, k)."""
+        """Transfer functions (v, w, wheels, k) from unit noises to heights under the wheels."""
         each = filtered(self.excitation, self.speeds, self.omega)
         road = at_axles(each, self.excitation, self.speeds, self.omega, self.apart)
         return np.asarray(np.hstack(self.excitation.heights) @ road)
 
 
 def _signs(slopes: np.ndarray) -> np.ndarray:
-    """Of slopes (p,): 1 or -1, and 1 for those that vanish, whose sign would be that of rounding."""
+    """Signs of slopes (p,): 1 or -1; 1 also for slopes that vanish, whose sign would come from rounding."""
     return np.where(slopes < -ROUNDING_SHARE * abs(slopes).max(initial=0.0), -1.0, 1.0)
 
 
@@ -173,7 +182,7 @@ def _alike(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:
 
 
 def _rates(vehicle: LinearVehicle) -> np.ndarray:
-    """Rates (1/s) of all motions; a body without mass leaves fewer."""
+    """Eigenvalues (1/s) of a vehicle; with massless bodies there are fewer."""
     n = len(vehicle.mass)
     left = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), vehicle.mass]])
     right = np.block([[np.zeros((n, n)), np.eye(n)], [-vehicle.stiffness, -vehicle.damping]])

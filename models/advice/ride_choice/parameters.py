@@ -23,7 +23,7 @@ Parameter = tuple[str, str, str]
 
 
 def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
-    """All values that may be off."""
+    """All parameters of a vehicle that may be off: those with a value other than 0."""
     return [
         (group, part.name, key)
         for group, keys in PARAMETERS_OF_PARTS.items()

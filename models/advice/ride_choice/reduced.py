@@ -28,8 +28,10 @@ from models.vehicles.spatial_linear import free, limited, linearise, massless
 
 @dataclass(frozen=True)
 class ReducedVehicle:
-    """``linear`` M, D, K in what coordinates are left (M may be singular), N (n, r) to those of the whole vehicle,
-    ``states`` of first order, ``behind`` (r, n) a way back to r that keeps momentum."""
+    """A vehicle without some of its effects. linear : M, D, K in the remaining coordinates (M may be singular); N (n,
+    r) : from these to the full vehicle's; states : of first order; behind (r, n) : from the full coordinates back,
+    keeping momentum.
+    """
 
     linear: LinearVehicle
     N: np.ndarray
@@ -38,20 +40,21 @@ class ReducedVehicle:
 
     @cached_property
     def modes(self) -> Modes | None:
-        """Motions of the states; None where they cannot be told apart."""
+        """Eigenmodes of the states; None where eigenvectors are nearly parallel."""
         return modes_of(self.states.A)
 
     @cached_property
     def stable_step(self) -> float:
-        """Longest step (s) at which the classical Runge-Kutta method is stable; 0 for a motion that grows."""
+        """Longest step (s) at which the classical Runge-Kutta method is stable; 0 for a mode that grows."""
         return stable_step(self.modes.rates if self.modes else np.linalg.eigvals(self.states.A))
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """``of_vehicle`` what is left of it, ``excitation`` and ``system``; T (n, x) from its state to (q, q', f,
-    weightings) of the whole, ``left`` (x, n) a way back that keeps momentum; ``states`` of vehicle and road, before
-    those of the ``weightings`` (their names)."""
+    """A reduced vehicle, its road ``excitation``, and their ``system``. T (n, x) : from the reduced state to the full
+    (q, q', f, weightings); left (x, n) : back, keeping momentum; states : number of those of vehicle and road, which
+    precede those of the ``weightings`` (their names).
+    """
 
     of_vehicle: ReducedVehicle
     excitation: Excitation
@@ -63,38 +66,40 @@ class Reduced:
 
     @property
     def vehicle(self) -> LinearVehicle:
-        """M, D, K of what is left."""
+        """Matrices M, D, K of the reduced vehicle."""
         return self.of_vehicle.linear
 
     @cached_property
     def modes(self) -> Modes | None:
-        """Motions of the system; None where they cannot be told apart."""
+        """Eigenmodes of the system; None where eigenvectors are nearly parallel."""
         A, axles, m = self.system.A[: self.states, : self.states], len(self.excitation.heights), len(self.excitation.F)
         modes = behind_road(A, self.of_vehicle.modes, A[-m:, -m:], axles)
         return behind_weightings(self.system.A, modes, self.weightings) if self.weightings else modes
 
     @cached_property
     def noise(self) -> np.ndarray:
-        """What the noise of all axles adds to the covariance per second (x, x)."""
+        """Covariance (x, x) per second that the noise of all axles adds."""
         return noise_of(self.system, self.modes.moved if self.modes else None)
 
 
 class Numbers:
-    """Numbers of values, the same for equal values; an object that has been seen is known without its long hash."""
+    """Index numbers of values, the same for equal values. An object that was seen before is recognised by its identity,
+    without a long hash.
+    """
 
     def __init__(self) -> None:
         self._of_object: dict[int, tuple[object, int]] = {}
         self._of_value: dict[Hashable, int] = {}
 
     def of(self, thing: object, value: Callable[[], Hashable]) -> int:
-        """Number of the value of an object, which is kept: its identity stands for it."""
+        """Number of an object's value. The object is kept, so that its identity remains unique."""
         known = self._of_object.get(id(thing))
         if known is None:
             known = self._of_object[id(thing)] = thing, self._of_value.setdefault(value(), len(self._of_value))
         return known[1]
 
     def of_parts(self, thing: Any, *names: str) -> tuple[int, ...]:
-        """Numbers of attributes, of which most are the same objects in copies of a thing."""
+        """Numbers of an object's attributes; copies of an object share most attributes."""
         parts = [getattr(thing, name) for name in names]
         return tuple(self.of(part, partial(_same, part)) for part in parts)
 
@@ -108,19 +113,21 @@ PARTS_OF_VEHICLE = tuple(field.name for field in fields(SpatialVehicle))
 
 
 class Roads:
-    """Roads under what is left of a scene, made once for all speeds."""
+    """Roads of reduced scenes, each made once for all speeds."""
 
     def __init__(self) -> None:
         self._numbers = Numbers()
         self._made: dict[int, Excitation] = {}
 
     def number(self, scene: ReducedScene) -> int:
-        """What tells one road from another: effects of the road, and tables that add to it."""
+        """Number that is the same for scenes with the same road: the same effects of the road, and the same tables that
+        add to it.
+        """
         ride = scene.ride
         return self._numbers.of(ride, lambda: (ride.road, *tables_of(ride)))
 
     def of(self, scene: ReducedScene) -> Excitation:
-        """The road of a scene."""
+        """The road of a reduced scene, made when it is first requested."""
         number = self.number(scene)
         if number not in self._made:
             self._made[number] = scene.excitation()
@@ -128,7 +135,7 @@ class Roads:
 
 
 class Vehicles:
-    """What is left of a vehicle, made once: every choice keeps those that it has asked for; ``roads`` are theirs."""
+    """Reduced vehicles, each made once and kept for all choices that request it; ``roads`` : their roads."""
 
     def __init__(self, full_vehicle: SpatialVehicle, speed: float, roads: Roads | None = None) -> None:
         self.roads = roads or Roads()
@@ -143,7 +150,7 @@ class Vehicles:
         return len(self._made)
 
     def of(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
-        """The vehicle of a scene at a speed (m/s); InputError where nothing sensible is left."""
+        """The reduced vehicle of a scene at a speed (m/s); InputError where no meaningful vehicle remains."""
         key = self.number(scene.vehicle), scene.limits, of_speed(scene.vehicle, speed)
         made = self._made.get(key)
         if made is None:
@@ -151,11 +158,11 @@ class Vehicles:
         return made
 
     def number(self, vehicle: SpatialVehicle) -> int:
-        """What tells one vehicle from another."""
+        """Number that is the same for vehicles with the same parts."""
         return self._numbers.of(vehicle, lambda: self._numbers.of_parts(vehicle, *PARTS_OF_VEHICLE))
 
     def linear(self, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
-        """The vehicle without its limits."""
+        """The linearised vehicle without its limits, that is without massless, rigid or locked parts."""
         key = self.number(vehicle), of_speed(vehicle, speed)
         if key not in self._linear:
             self._linear[key] = linearise(vehicle, speed)
@@ -170,7 +177,7 @@ class Vehicles:
         return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
 
     def _mass_of(self, scene: ReducedScene) -> np.ndarray:
-        """The mass matrix (n, n) of a scene, which neither springs nor locks change."""
+        """The mass matrix (n, n) of a scene, which springs and locks do not change; made once."""
         names = scene.limits.massless
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
         if key not in self._masses:
@@ -178,7 +185,7 @@ class Vehicles:
         return self._masses[key]
 
     def _free_of(self, scene: ReducedScene) -> np.ndarray:
-        """N (n, r) of a scene, which bars, tyres and masses do not change."""
+        """The matrix N (n, r) of a scene, which bars, tyres and masses do not change; made once."""
         limits = scene.limits
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
         if key not in self._free:
@@ -187,12 +194,12 @@ class Vehicles:
 
 
 def of_speed(vehicle: SpatialVehicle, speed: float) -> float | None:
-    """The speed (m/s) on which a vehicle's matrices depend; None where they do not."""
+    """The speed (m/s) if the vehicle's matrices depend on it, else None."""
     return speed if vehicle.side_forces or vehicle.drags else None
 
 
 class FullScene:
-    """A scene with all its effects at a speed (m/s), from which systems without some of them are made."""
+    """A scene with all its effects at a speed (m/s), from which reduced systems are made."""
 
     def __init__(self, scene: ReducedScene, speed: float, vehicles: Vehicles | None = None) -> None:
         self.scene, self.speed = scene, speed
@@ -204,7 +211,7 @@ class FullScene:
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
-        """What is left of the scene; raises InputError where it is no system."""
+        """The system of the reduced scene; raises InputError where it is no system."""
         key = self.vehicles.number(scene.vehicle), self.vehicles.roads.number(scene), scene.limits
         made = self._made.get(key)
         if made is None:
@@ -221,7 +228,7 @@ class FullScene:
         return replace(reduced, system=system, T=T, left=left, weightings=names)
 
     def _make(self, scene: ReducedScene) -> Reduced:
-        """Before weightings."""
+        """The system of the reduced scene before the weightings of outputs are added."""
         vehicle, (excitation, Tf, left_f) = self.vehicles.of(scene, self.speed), self._heights(scene)
         states, N = vehicle.states, vehicle.N
         system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
@@ -234,11 +241,11 @@ class FullScene:
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
     def road(self, scene: ReducedScene) -> Excitation:
-        """The road that a scene has left."""
+        """The road of the reduced scene."""
         return self._heights(scene)[0]
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
-        """The road that is left, and ``_of_road`` of it."""
+        """The road of the reduced scene, and the matrices of ``_of_road`` for it."""
         key = self.vehicles.roads.number(scene)
         if key not in self._roads:
             excitation = self.vehicles.roads.of(scene)
@@ -249,7 +256,9 @@ class FullScene:
 def _of_road(
     scene: ReducedScene, full_road: Excitation, less: ReducedScene, reduced_road: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
+    """Matrices from the filter states of the reduced road to those of the full road, axle by axle, and back; states
+    that effects add are last.
+    """
     count, cutoff = full_road.G.shape[1], scene.ride.road.cutoff
     onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
     back: np.ndarray = onto

@@ -16,7 +16,7 @@ QUESTION_KEYS = ("quantities", "tolerance", "options")
 
 
 def write(reduced_scene: ReducedScene, folder: Path) -> Path:
-    """Write both into a folder; returns the scene's path."""
+    """Write the reduced scene and its vehicle into a folder; returns the path of the scene."""
     scene = own_table(reduced_scene.ride)
     whole = scene["vehicle"]["file"]
     vehicle = reduced(parse(vehicle_path(whole, reduced_scene.ride.folder)), reduced_scene)
@@ -39,7 +39,9 @@ def write(reduced_scene: ReducedScene, folder: Path) -> Path:
 
 
 def reduced(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any]:
-    """The tables of the whole vehicle less bars, damping of tyres and what the limits name."""
+    """The tables of the full vehicle without the bars and the damping of tyres that are left out, and with the limits
+    that reduce it.
+    """
     bars = {bar.name for bar in reduced_scene.vehicle.bars}
     undamped = {tyre.name for tyre in reduced_scene.vehicle.tyres if not tyre.damping}
     changed = dict(table)

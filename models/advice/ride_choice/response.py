@@ -17,14 +17,14 @@ RESPONSE_DIFFERENCE = 1e-7
 
 
 class Read(NamedTuple):
-    """Outputs that are asked for: by q, q', q'' (q, n), by heights and their rates (q, wheels)."""
+    """Factors of the requested outputs: of the motion q, q', q'' (q, n), and of heights and their rates (q, wheels)."""
 
     by_motion: tuple[np.ndarray, np.ndarray, np.ndarray]
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
     def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "Read":
-        """Outputs of these rows."""
+        """Factors of the vehicle's outputs with these rows."""
         read, at = vehicle.read, list(rows)
         return cls(
             (read.displacement_factors[at], read.rate_factors[at], read.acceleration_factors[at]),
@@ -33,7 +33,7 @@ class Read(NamedTuple):
 
 
 class Response:
-    """Outputs of rows by heights at frequencies (w,) in rad/s: H (w, q, wheels)."""
+    """Transfer functions H (w, q, wheels) from road heights to outputs at frequencies (w,) in rad/s."""
 
     def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
         self.vehicle, self.s, self.read = vehicle, 1j * omega, Read.of(vehicle.linear, rows)
@@ -42,12 +42,16 @@ class Response:
         self.H = self._between(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
 
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
-        """Responses of coordinates to heights (w, n, wheels), and of outputs to forces on coordinates (w, q, n)."""
+        """Transfer functions (w, n, wheels) from heights to coordinates, and (w, q, n) from forces on coordinates to
+        outputs.
+        """
         one = np.eye(len(self.vehicle.linear.mass))
         return self._between([one], self.by_heights), self._between(self.read.by_motion, [one])
 
     def _fractions(self) -> np.ndarray | None:
-        """1 / (s - rate) (w, motions); None where the solve is the way, or differs at the frequency of most motion."""
+        """Partial fractions 1 / (s - rate) (w, modes). None where the equations must be solved: without modes, or where
+        both differ at the frequency with the largest response.
+        """
         modes = self.vehicle.modes
         if modes is None:
             return None
@@ -60,7 +64,7 @@ class Response:
         return fractions if same else None
 
     def _between(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> np.ndarray:
-        """(w, i, j): polynomials in s of rows, left of the compliance, and of columns, right of it."""
+        """Product (w, i, j) of a polynomial in s of rows, the compliance, and a polynomial of columns."""
         if self.motions is None:
             return self._solved(left, right, self.s)
         return self._sum(self.motions, left, right, self.s)
@@ -78,7 +82,8 @@ class Response:
         return np.asarray(whole + polynomial(self._rest(left, right), s))
 
     def _rest(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Coefficients by power of s of what the fractions leave: s^k (s - A)^-1 = A^k (s - A)^-1 + sum s^(k-1-j) A^j.
+        """Coefficients, by power of s, of the polynomial that remains besides the partial fractions: s^k (s - A)^-1 =
+        A^k (s - A)^-1 + sum s^(k-1-j) A^j.
 
         The motions have no part in it, so that what vanishes does so without rounding.
         """
@@ -95,14 +100,14 @@ class Response:
         return rest
 
     def _solved(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
-        """The same by a solve at every frequency."""
+        """The product of ``_between``, by solving the equations at every frequency."""
         linear = self.vehicle.linear
         Z = polynomial((linear.stiffness, linear.damping, linear.mass), s)
         return np.asarray(polynomial(left, s) @ np.linalg.solve(Z, polynomial(right, s)))
 
 
 def polynomial(coefficients: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
-    """(w, i, j) of coefficients (i, j) by power of s (w,)."""
+    """Values (w, i, j) of a polynomial with coefficients (i, j), by power of s, at s (w,)."""
     total = np.zeros((len(s), *coefficients[0].shape), complex)
     for power, coefficient in enumerate(coefficients):
         if coefficient.any():

@@ -30,7 +30,9 @@ HARDLY, TRUSTED = 1e-7, 1e-10
 
 @dataclass(frozen=True)
 class Solved:
-    """Covariance P (n, n), adjoints L (quantities, n, n) and variances (quantities,), in extended precision."""
+    """Stationary solution in extended precision: covariance P (n, n), adjoints L (quantities, n, n) and variances
+    (quantities,).
+    """
 
     P: np.ndarray
     L: np.ndarray
@@ -38,7 +40,9 @@ class Solved:
 
 
 def solve(system: DelayedSystem, rows: list[int]) -> Solved:
-    """P and L of a system whose every motion dies out; InputError for one with a motion that nothing pulls back."""
+    """Covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a restoring
+    force.
+    """
     split = split_marginal(system.A)
     if split.marginal:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
@@ -53,7 +57,9 @@ def solve(system: DelayedSystem, rows: list[int]) -> Solved:
 
 
 class Screen:
-    """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
+    """Predictions for systems that are reduced further than ``base``, from the solution for ``base``. Quantities are
+    given by their rows of C.
+    """
 
     def __init__(self, base: Reduced, rows: list[int]) -> None:
         self.base, self.rows = base, rows
@@ -74,11 +80,11 @@ class Screen:
 
     @cached_property
     def solved(self) -> Solved:
-        """The base's solution in extended precision, for the certificate."""
+        """The solution for ``base`` in extended precision, for the certificate."""
         return solve(self.base.system, self.rows)
 
     def predicted(self, reduced: Reduced) -> np.ndarray:
-        """Variances (quantities,) of the reduced system; inf where it passes white noise."""
+        """Predicted variances (quantities,) of the reduced system; inf where white noise passes to a quantity."""
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
         half = system.A @ P
@@ -88,7 +94,9 @@ class Screen:
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
     def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
-        """Certificate: variances (quantities,) by the whole scene's P and the reduced L, and by the reduced P."""
+        """Two results for the variances (quantities,) that a certificate compares: from the P of ``base`` with the
+        reduced L, and from the reduced P.
+        """
         system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
         covariance = solve(system, self.rows)
         P = left @ self.solved.P @ left.T
@@ -100,12 +108,13 @@ class Screen:
 
 
 def has_undamped_motion(rates: np.ndarray, slowest: float = SLOWEST_DECAY) -> bool:
-    """Whether one of the eigenvalues (1/s) has no damping, or next to none."""
+    """Whether one of the eigenvalues (1/s) has no damping, or almost none."""
     return bool(rates.real.max(initial=-np.inf) > -slowest * abs(rates).max(initial=0.0))
 
 
 def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
-    """Variances (quantities,) by the motions of the reduced system; None where the exact solve must tell.
+    """Variances (quantities,) from the eigenmodes of the reduced system; None where only the exact solution is
+    reliable.
 
     J = C P C' + tr(L (A P + P A' + Q)), which is exact for any P: where the second term, of all outputs, is more than
     rounding, where noise reaches a quantity at once, or where a motion hardly dies out, motions are not to be trusted.
@@ -125,16 +134,18 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
 
 
 def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
+    """Variances (quantities,) by the exact solution of the reduced system, inf where a quantity has none. Raises
+    InputError.
+    """
     return row_variances(stationary(reduced.system), rows)
 
 
 def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,), inf where an output has none."""
+    """Variances (quantities,) of these rows, inf where an output has none."""
     return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
 
 def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """What ``confirmed`` finds, and variances (quantities,) up to which there is nothing but rounding."""
+    """Variances as from ``confirmed``, and levels (quantities,) below which variances are only rounding."""
     covariance = stationary(reduced.system)
     return row_variances(covariance, rows), silence(reduced.system.C[rows], covariance.P)

@@ -15,8 +15,10 @@ from models.vehicles.linear_vehicle import LinearVehicle
 
 @dataclass(frozen=True)
 class Shifts:
-    """How each of many parameters (p) moves a vehicle: differences of stiffness, damping and mass (p, n, n), of what
-    heights and their rates do (p, n, wheels), of outputs by q, q', q'' (p, q, n) and by heights and their rates."""
+    """Changes of a vehicle's matrices with each of p parameters: of stiffness, damping and mass (p, n, n), of forces by
+    heights and their rates (p, n, wheels), of output factors of q, q', q'' (p, q, n), and of those of heights and their
+    rates.
+    """
 
     stiffness: tuple[np.ndarray, ...]
     by_heights: tuple[np.ndarray, ...]
@@ -25,13 +27,13 @@ class Shifts:
 
     @classmethod
     def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
-        """Of other vehicles less this one, outputs of rows."""
+        """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these rows."""
         before, *after = ([*_matrices(each, rows)] for each in (vehicle, *other_vehicles))
         moved = [np.array([each[i] for each in after]) - matrix for i, matrix in enumerate(before)]
         return cls(tuple(moved[:3]), tuple(moved[3:5]), tuple(moved[5:8]), tuple(moved[8:]))
 
     def only(self, present: np.ndarray) -> "Shifts":
-        """With nothing but zeros for parameters that are not ``present`` (p,)."""
+        """The shifts, with zeros for parameters that are not ``present`` (p,)."""
         parts = (self.stiffness, self.by_heights, self.by_motion, self.by_road)
         return Shifts(*(tuple(each * present[:, None, None] for each in part) for part in parts))
 
@@ -43,8 +45,10 @@ def _matrices(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarra
 
 
 class Sensitivity:
-    """Slopes of variances at speeds (v,), from heights (v, w, wheels, k), weights (w, q) of the sum, and N (n, r) from
-    the response's coordinates to those of the vehicle whose parameters are off."""
+    """First-order changes of variances at speeds (v,) by parameters. They follow from heights (v, w, wheels, k),
+    weights (w, q) of the sum, and N (n, r) from the response's coordinates to those of the vehicle whose parameters are
+    off.
+    """
 
     def __init__(self, response: Response, heights: np.ndarray, weights: np.ndarray, N: np.ndarray) -> None:
         seen, powers = response.H @ heights, [response.s[:, None, None] ** k for k in range(3)]
@@ -58,7 +62,9 @@ class Sensitivity:
         self.by_road = [(met * s).sum(axis=1).real for s in powers[:2]]
 
     def slopes(self, shifts: Shifts, inert: np.ndarray) -> np.ndarray:
-        """What each shift adds to variances (v, q, p), to first order; mass only of what is ``inert`` (p,)."""
+        """Changes of variances (v, q, p) by each shift, to first order. A change of mass counts only for parameters
+        that are ``inert`` (p,).
+        """
         stiffness = (*shifts.stiffness[:2], shifts.stiffness[2] * inert[:, None, None])
         forces = [(self.by_force, stiffness, -1.0), (self.by_column, shifts.by_heights, 1.0)]
         outputs = [(self.by_row, shifts.by_motion), (self.by_road, shifts.by_road)]
@@ -75,7 +81,9 @@ class Sensitivity:
 
 
 def _sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Real part of sums over frequencies of back (w, q, i) times moved (v, w, q, j): (v, q, i, j)."""
+    """Real part (v, q, i, j) of the sums over frequencies w of products of ``back`` (w, q, i) and ``moved`` (v, w, q,
+    j).
+    """
     left = np.concatenate([back.real, -back.imag]).transpose(1, 2, 0)  # (q, i, 2 w)
     right = np.concatenate([moved.real, moved.imag], axis=1).transpose(0, 2, 1, 3)  # (v, q, 2 w, j)
     return np.asarray(left @ right)

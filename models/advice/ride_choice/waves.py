@@ -20,11 +20,11 @@ roads that know nothing of one another, for sums over quick turns vanish."""
 
 
 def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
-    """Angular frequencies (w,) in rad/s from 0 to the last end, weights (w,) of a sum that stands for the integral,
-    and where axles count as ``apart`` (w,).
+    """Angular frequencies (w,) in rad/s from 0 to the upper limit, weights (w,) of a sum that approximates the integral
+    over them, and whether axles are treated as independent, ``apart`` (w,).
 
-    rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; ends : of the panels that are equal
-    on a logarithmic axis; the first one goes on to 0.
+    rates : of the vehicle's motions, 1/s; delay : the longest one between axles, s; frequency_limits : of the panels
+    that are equal on a logarithmic axis; the first panel extends to 0.
     """
     low, high = frequency_limits
     swinging = rates[rates.imag > 0]
@@ -39,7 +39,7 @@ def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, 
 
 
 def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """States (v, w, m, k) of an axle's filter by unit noise, without delay, at speeds (v,) and frequencies (w,)."""
+    """States (v, w, m, k) of an axle's filter under unit noise, without delay, at speeds (v,) and frequencies (w,)."""
     corners, V = np.linalg.eig(excitation.F)
     driven = np.linalg.solve(V, excitation.G + 0j)
     waves = 1j * omega[:, None] - speeds[:, None, None] * corners
@@ -49,7 +49,7 @@ def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> n
 def at_axles(
     each: np.ndarray, excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
 ) -> np.ndarray:
-    """Input of all axles (v, w, axles m, noises): that of one axle (v, w, m, k), each after its delay.
+    """Filter states (v, w, axles m, noises) of all axles: those of one axle (v, w, m, k), delayed for each axle.
 
     Axles that are ``apart`` (w,), or independent, have noises of their own, axles k; all others share the first k.
     """
@@ -67,12 +67,14 @@ def at_axles(
 
 @dataclass(frozen=True)
 class CornerPair:
-    """Two corners (1/m) of an axle's filter."""
+    """Two corners (1/m) of an axle's filter, whose product contributes to the spectral density."""
 
     corners: tuple[complex, complex]
 
     def density(self, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Density (v, w) at speeds (v,) in m/s and frequencies (w,) in rad/s; real where both corners are one."""
+        """Spectral density (v, w) of the pair at speeds (v,) in m/s and frequencies (w,) in rad/s; real if both corners
+        are the same.
+        """
         first, second = (speeds[:, None] * corner for corner in self.corners)
         if self.corners[0] == self.corners[1] and not np.imag(self.corners[0]):
             return np.asarray(speeds[:, None] / (omega**2 + first.real**2))
@@ -80,8 +82,9 @@ class CornerPair:
 
 
 class Filters:
-    """An axle's filter in its motions, which meet pairs by pairs of corners; ``noises``: what unit noises give to the
-    filter's states through the motions of each corner (m, k)."""
+    """An axle's filter decomposed into its eigenmodes, one per corner, whose products are ``pairs``. noises : for each
+    corner, the states (m, k) that unit noises excite through its mode.
+    """
 
     def __init__(self, excitation: Excitation) -> None:
         corners, V = np.linalg.eig(excitation.F)
@@ -92,7 +95,9 @@ class Filters:
         self.noises = {complex(c): V[:, corners == c] @ driven[corners == c] for c in corners}
 
     def by_noises(self, gains: Sequence[np.ndarray]) -> dict[complex, list[np.ndarray]]:
-        """Of each corner the gains (w, q, k) of every axle by noises; gains : (w, q, m) by the filter's states."""
+        """For each corner, the gains (w, q, k) from noises to the quantities at every axle; ``gains`` (w, q, m) : from
+        the filter's states.
+        """
         rows = [gain.reshape(-1, gain.shape[2]) for gain in gains]
         return {
             corner: [(row @ noise).reshape(*gain.shape[:2], -1) for row, gain in zip(rows, gains, strict=True)]
@@ -103,8 +108,9 @@ class Filters:
 def together(
     gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, alone: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
-    """What a quantity makes of a pair's density: (w, q) of every axle for itself, and of every two axles, if not all
-    are ``alone``, before the delay between them. gains: of ``Filters.by_noises``."""
+    """Factors of a pair's density in the density of the quantities: (w, q) summed over single axles and, unless all are
+    ``alone``, for every two axles, before the delay between them. ``gains`` : of ``Filters.by_noises``.
+    """
     first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
     own = sum(_product(first[i], second[i]) for i in axles)
@@ -114,14 +120,15 @@ def together(
 
 
 def _product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Sum over noises of (w, q, k) and the conjugate of (w, q, k): (w, q)."""
+    """Product of (w, q, k) with the conjugate of (w, q, k), summed over the noises k: (w, q)."""
     return np.einsum("wqk,wqk->wq", first, second.conj())
 
 
 def variances(
     gains: Sequence[np.ndarray], excitation: Excitation, speeds: np.ndarray, omega: np.ndarray, apart: np.ndarray
 ) -> np.ndarray:
-    """Variances (v, q) at speeds (v,): sums over frequencies (w,) of what axles meet after their delays.
+    """Variances (v, q) at speeds (v,): sums over frequencies (w,) of the response to the road at all axles with their
+    delays.
 
     gains : (w, q, m) of every axle, of its filter's states, with the root of the weights of the sum. Axles that are
     ``apart`` (w,), or independent, know nothing of one another.
@@ -142,6 +149,6 @@ def variances(
 
 
 def weighting_factors(weightings: Sequence[str], omega: np.ndarray) -> np.ndarray:
-    """Factors (q, w) of weightings by their names, 1 for "", at angular frequencies (rad/s)."""
+    """Factors (q, w) of frequency weightings, by their names, at angular frequencies (rad/s); 1 for the name ""."""
     frequency = omega / (2 * np.pi)
     return np.array([WEIGHTINGS[name].response(frequency) if name else np.ones(len(omega)) for name in weightings])

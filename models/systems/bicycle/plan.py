@@ -9,7 +9,7 @@ from models.systems.bicycle.scene import BicycleScene
 
 
 def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, parameters that are no bicycle."""
+    """Check the effects and parameters of a bicycle scene before any file is written; raises InputError."""
     check_effects(scene)
     if set(engines) != {REFERENCE}:
         try:
@@ -20,7 +20,7 @@ def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
 
 
 def _upright(scene: BicycleScene) -> str:
-    """Whether a small lean dies out at the speed of the run, by the linear equations."""
+    """Text that says whether a small lean dies out or grows at the run's speed, by the linear equations."""
     speed = scene.run.speed
     growth = float(scene.whipple.eigenvalues(speed, scene.control).real.max())
     if growth <= 0.0:

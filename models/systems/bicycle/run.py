@@ -67,7 +67,7 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
 
 
 def assumptions(scene: BicycleScene) -> list[Assumption]:
-    """What a run takes for granted."""
+    """Assumptions of a run, with the limits within which they hold."""
     return [
         Assumption(
             "upright",
@@ -82,8 +82,9 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
 
 
 def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
-    """Run the bicycle on tyres in an engine with a step (s); rows are at most ROWS_APART steps apart, the work counts
-    all steps."""
+    """Run the bicycle on its tyres in an engine with a step (s). Recorded rows are at most ROWS_APART (s) apart, while
+    the work counts all steps.
+    """
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
     path = model.run(*straight(rolling.bicycle, run.speed, run.lean_rate))
@@ -104,7 +105,7 @@ def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None
 
 
 def ideal(scene: BicycleScene) -> Ride:
-    """The run with ideal rolling, rows ROWS_APART apart."""
+    """Run the bicycle with ideal rolling, which is without slip; rows of the result are ROWS_APART (s) apart."""
     rolling, run = scene.rolling(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
     rows = max(3, round(run.duration / ROWS_APART) + 1)
@@ -112,7 +113,7 @@ def ideal(scene: BicycleScene) -> Ride:
 
 
 def _with_step_error(run: Result, scene: BicycleScene) -> Result:
-    """The result with the error of its steps."""
+    """The result with the error that its finite time steps cause, estimated by runs in longer steps."""
     ride, engine = run.detail, run.data.attrs["engine"]
 
     def series(ride: Ride) -> Series:
@@ -128,7 +129,9 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
 
 
 def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
-    """(8, 8): rates of lateral place, yaw, lean, steer and of their rates about straight rolling at a speed (m/s)."""
+    """State matrix (8, 8) of an engine's model, linearised about straight rolling at a speed (m/s). The state holds
+    lateral position, yaw, lean and steer, then their rates.
+    """
     q, v = straight(rolling.bicycle, speed)
     matrix = np.eye(8, 8, 4)
     for j in range(8):
@@ -142,9 +145,11 @@ def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> n
 
 
 def engine_eigenvalues(engine: str, rolling: RollingBicycle, speed: float) -> np.ndarray:
-    """(4,) 1/s: those of the bicycle on its tyres that are nearest to the ones of the linear equations, in their order.
+    """Four eigenvalues (1/s) of the bicycle on its tyres in an engine. Each is the one nearest to an eigenvalue of the
+    linear equations, in the order of these.
 
-    The tyres' own two decay far faster, and place and yaw have a double zero.
+    The other four are left out: two decay far faster and belong to the tyres, and position and yaw give a double
+    zero.
     """
     values = np.linalg.eigvals(lateral_matrix(free_model(engine, rolling.driven), rolling, speed))
     kept = np.sort(np.argsort(np.abs(values))[2:])  # without the double zero

@@ -56,7 +56,7 @@ class BicycleScene(SceneFile):
 
     @cached_property
     def whipple(self) -> Whipple:
-        """The bicycle of the linear equations."""
+        """Parameters of the bicycle for the linear (Whipple) equations."""
         return load_bicycle(self.bicycle.parameters, self.folder, self.file, "bicycle.parameters")
 
     def rolling(self) -> RollingBicycle:

@@ -41,7 +41,7 @@ BELOW_LOCK = (1.0, 0.98, 0.96)
 
 
 class NoAdhesion(RunFailed):
-    """The procedure does not give a figure for this vehicle on this surface."""
+    """The test procedure gives no adhesion coefficient for this vehicle on this surface."""
 
     def __init__(self, reason: str) -> None:
         super().__init__("adhesion utilisation", f"not found: {reason}")
@@ -49,7 +49,9 @@ class NoAdhesion(RunFailed):
 
 @dataclass(frozen=True)
 class Adhesion:
-    """k of the front and of the rear axle on one surface, and of both axles of the trailer if there is one."""
+    """Adhesion coefficients k on one surface: of the front axle, of the rear axle, and of the trailer's axles if there
+    is one.
+    """
 
     front: float
     rear: float
@@ -58,7 +60,7 @@ class Adhesion:
 
 @dataclass(frozen=True)
 class Utilised:
-    """Braking rate z with the system on, k_M of the vehicle, and how much of it is used, epsilon = z / k_M.
+    """Braking rate z with the anti-lock system on, adhesion k_M of the vehicle, and their ratio epsilon = z / k_M.
 
     With a trailer all three are those of the train.
     """
@@ -69,13 +71,14 @@ class Utilised:
 
     @property
     def epsilon(self) -> float:
-        """Adhesion utilisation by the anti-lock system: at least 0.75 of a category 1 system; above 1 calls for k to be
-        measured again."""
+        """Adhesion utilisation by the anti-lock system. Category 1 requires at least 0.75; above 1, k must be measured
+        again.
+        """
         return self.z / self.k_vehicle
 
 
 def axles(scene: BrakingScene) -> Axles:
-    """Loads and lengths of the scene's vehicle."""
+    """Axle loads, wheelbase and height of the centre of mass of the scene's vehicle."""
     truck = vehicle_of(scene)
     weight = truck.mass * GRAVITY
     front = weight * -truck.rear.x / truck.wheelbase
@@ -89,13 +92,17 @@ def trailer_loads(vehicle: Braked, z: float) -> np.ndarray:
 
 
 def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
-    """The scene's vehicle with its trailer, if no change takes that away, on one surface everywhere."""
+    """The scene's vehicle on the same surface everywhere; ``changes`` replace values of the scene, for example its
+    trailer.
+    """
     road = RoadTable(stretches=[Stretch(left=surface)])
     return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
 
 
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
-    """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
+    """Adhesion k of both axles on a surface: each axle is braked alone from 50 km/h without locking. Raises
+    NoAdhesion.
+    """
     vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axles(scene)
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
@@ -109,8 +116,9 @@ def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
 
 
 def _by_system(scene: BrakingScene, name: str, vehicle: Braked, speeds: tuple[float, float, float]) -> float:
-    """z between the last two of three speeds (km/h), braked from the first with the scene's controller, or what stands
-    behind its port, which logs nothing."""
+    """Braking rate z between the last two of three speeds (km/h), braked from the first one. The scene's controller
+    brakes, or what is connected to its port, which writes no log.
+    """
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
     lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST})})
     begin, high, low = speeds
@@ -119,7 +127,7 @@ def _by_system(scene: BrakingScene, name: str, vehicle: Braked, speeds: tuple[fl
 
 
 def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
-    """z of the fastest runs with one axle braked, from 40 to 20 km/h."""
+    """Braking rate z with one axle braked, from the mean time of the fastest runs between 40 and 20 km/h."""
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
     def run(pressure: float) -> BrakingPath:
@@ -144,14 +152,17 @@ def _locks(path: BrakingPath) -> bool:
 
 
 def _between(path: BrakingPath, high: float, low: float) -> float:
-    """Time (s) from one speed to another, in km/h; not a number if the vehicle does not get there."""
+    """Time (s) in which the vehicle slows from one speed to another (km/h); not a number if it never reaches the
+    second.
+    """
     stop = Stop(path)
     return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)
 
 
 def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
-    """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
-    its name."""
+    """Adhesion utilisation epsilon of the scene's anti-lock system on a surface. z is measured from 45 to 15 km/h after
+    braking from 55 km/h; ``name`` is the name of the run at the port.
+    """
     lengths, k = axles(scene), k or adhesion(scene, surface)
     train = vehicle_on_one_surface(scene, surface)
     z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
@@ -175,7 +186,9 @@ class Split:
 
 
 def split_adhesion(scene: BrakingScene, name: str) -> Split:
-    """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
+    """Braking rate z of a split procedure, braked from 50 km/h and measured between 40 and 20 km/h. The adhesion k_M of
+    the vehicle is that on each of the two surfaces of the first stretch.
+    """
     procedure, alone = scene.procedures[name], scene.model_copy(update={"trailer": None})
     both = [adhesion(alone, surface) for surface in sides(procedure, scene.road.stretches[0])]
     z = _by_system(alone, name, braked(alone, procedure), (50.0, 40.0, 20.0))
@@ -185,7 +198,7 @@ def split_adhesion(scene: BrakingScene, name: str) -> Split:
 def merits(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
     """Figures of merit of a procedure, by name and unit; none where they have no meaning.
 
-    Nor are there any that need runs of their own where a client that connects once, or a log, is behind the port, or
+    Figures that need further runs are left out where a client that connects once, or a log, is behind the port, and
     where the pressures were measured.
     """
     procedure, port = scene.procedures[name], scene.port

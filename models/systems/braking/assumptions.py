@@ -47,7 +47,7 @@ CORNERING = 1e-3
 
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
-    """Assumptions of a braking procedure, with the vehicle that drives it."""
+    """Assumptions of a braking procedure with a given vehicle."""
     parts = (
         _of_loads(scene),
         _of_bodies(scene, vehicle),
@@ -58,7 +58,9 @@ def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[As
 
 
 def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
-    """Assumptions on the loads of a plane vehicle; springs carry their loads as they are."""
+    """Assumptions on the wheel loads of a plane vehicle; none for a vehicle on its suspension, whose springs carry the
+    loads.
+    """
     if scene.vehicle.file is not None:
         return
     if scene.load_transfer is None:
@@ -82,8 +84,9 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
 
 
 def _loads(run: Result) -> np.ndarray:
-    """Loads (n, W) in N, without those of the sample in which the vehicle comes to rest: what ends its motion there
-    within a step is no force of a tyre."""
+    """Wheel loads (n, W) in N, NaN in the sample in which the vehicle comes to rest: what ends its motion within that
+    step is no force of a tyre.
+    """
     loads = np.array(run["load"])
     if run.detail.stands:
         loads[-1] = np.nan
@@ -91,7 +94,9 @@ def _loads(run: Result) -> np.ndarray:
 
 
 def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
-    """Shares of load that accelerations of the truck would move, as its height has them, along and across."""
+    """Shares of the load of the truck and of the trailer that the truck's accelerations would move, along and across
+    the vehicle, because the centre of mass is above the road.
+    """
     states, times = run.detail.states, run.detail.times
     rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(times), 1e-9)[:, None]
     heading = states[1:, 0, 2]
@@ -160,7 +165,9 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
 
 
 def _stopless(vehicle: Braked) -> bool:
-    """Whether a spring of a vehicle on its suspension has no stop."""
+    """Whether a vehicle on its suspension has any spring without stops: a joint element, or a spring without
+    travel_force.
+    """
     whole = vehicle.sprung.handling.vehicle
     return bool(whole.joint_elements) or any(spring.travel_force is None for spring in whole.springs)
 
@@ -176,7 +183,9 @@ def _hitches(run: Result) -> Watched:
 
 
 def _by_hook(scene: BrakingScene, run: Result) -> Watched:
-    """Share of the load of the trailer's lighter axle that the truck's pull moves: by the truck's balance along it."""
+    """Share of the load on the trailer's lighter axle that the pull at the hook moves. The pull follows from the
+    balance of longitudinal forces on the truck.
+    """
     trailer, path = scene.trailer, run.detail
     assert trailer is not None
     heading, slowed = path.states[1:, 0, 2], np.diff(path.states[:, 1, :2], axis=0)
@@ -195,7 +204,7 @@ def _lean(run: Result) -> Watched:
 
 
 def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
-    """Assumptions on the tables of friction and of the slip angles by which they are read."""
+    """Assumptions on the friction tables, and on the slip angles at which these are read."""
     tables = tables_of(scene).values()
     largest = min(table.loads[-1] * (TIMES if table.loads.size == 1 else 1.0) for table in tables)
     yield Assumption(
@@ -228,7 +237,9 @@ def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
 
 
 def _regular(vehicle: Braked, run: Result) -> Watched:
-    """Speed (m/s) below which steps mistake slip angles, at the times when there are some."""
+    """Least speed (m/s) at which the steps resolve slip angles, at the samples where tyres corner below this speed; NaN
+    elsewhere.
+    """
     lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
     least = vehicle.slope * lively * vehicle.sample / vehicle.substeps
     angles = np.nanmax(np.nan_to_num(np.abs(run["slip_angle"])), axis=1)
@@ -236,7 +247,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
 
 
 def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator[Assumption]:
-    """Assumptions on pressures, torques and the valves behind them."""
+    """Assumptions on brake pressures, brake torques and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
@@ -286,7 +297,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator
 
 
 def _heat(run: Result) -> Watched:
-    """Work (n, W) of the brakes so far."""
+    """Work (n, W) in J that each wheel's brake has done up to each sample."""
     power = run["torque"] * np.abs(run["turning"])
     steps = np.diff(run.times)[:, None] * 0.5 * (power[1:] + power[:-1])
     return _of_wheels(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
@@ -328,8 +339,9 @@ def _steer(vehicle: Braked, run: Result) -> Watched:
 
 
 def _air(scene: BrakingScene, mass: float, run: Result) -> Watched:
-    """Work of the drag on a box as wide as the track and twice as high as the centre of mass, by the first energy of
-    the whole mass (kg)."""
+    """Work of the air's drag divided by the initial kinetic energy of the whole mass (kg). The drag is that of a box as
+    wide as the track and twice as high as the centre of mass.
+    """
     truck, stop = vehicle_of(scene), Stop(run.detail)
     drag = 0.5 * AIR * DRAG * truck.front.track * 2.0 * truck.height
     work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
@@ -337,15 +349,15 @@ def _air(scene: BrakingScene, mass: float, run: Result) -> Watched:
 
 
 def _of_wheels(values: np.ndarray) -> Watched:
-    """Columns (n, W) by the wheels' names."""
+    """The columns of values (n, W) by the name of the wheel."""
     return dict(zip(wheel_names(values.shape[1]), values.T, strict=True))
 
 
 def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
-    """Values (n, W) of a vehicle that moves, others no numbers."""
+    """Values (n, W) at the samples in which the vehicle is faster than SLOWEST, NaN at the others."""
     return np.where(Stop(run.detail).speed[:, None] > SLOWEST, values, np.nan)
 
 
 def _begun(values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) of the samples before all rows but the first."""
+    """Values (n, ...) after a row of NaN, which makes a row for every sample: the first sample has no value."""
     return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))

@@ -47,9 +47,10 @@ switching otherwise; among them 11 of the 12 whose true pressures, in 25 times a
 
 
 class OtherRuns(NamedTuple):
-    """rerun : the same stop with so many steps to a sample, up to a time (s), which raises InputError or RunFailed;
-    answered : what the controller says to speeds of turning (n - 1, W) in rad/s and of the vehicle (n - 1,) in m/s at
-    the samples of a run."""
+    """Functions that repeat a stop. rerun : the stop with a number of steps per sample, up to a time (s); raises
+    InputError or RunFailed. answered : the controller's commands to speeds of turning (n - 1, W) in rad/s and speeds of
+    the vehicle (n - 1,) in m/s at the samples of a run.
+    """
 
     rerun: Callable[[int, float], BrakingPath]
     answered: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
@@ -59,7 +60,7 @@ Channels = dict[str, np.ndarray]
 
 
 def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
-    """The stop with the errors of its motion and of its distance, or with the reason why there is no number.
+    """The stop with the estimated errors of its motion and of its distance, or with the reason why none is estimated.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
@@ -87,32 +88,40 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
 
 
 def rocks(scene: BrakingScene) -> bool:
-    """Whether the vehicle comes to rest on springs of its tyres or axles: whether a step finds it there, or it rocks on
-    for a second, does not converge, and some centimetres of the stopping distance with it."""
+    """Whether the vehicle comes to rest on springs of its tyres or axles. One step may find it at rest while another
+    lets it rock on for a second: this, and some centimetres of the stopping distance, do not converge with the step.
+    """
     return scene.relaxation is not None or scene.vehicle.file is not None
 
 
 def repeatable(scene: BrakingScene) -> bool:
-    """Whether the stop can be run again: not where a client connects once, a log is played or a clock is kept to."""
+    """Whether the stop can be run again. It cannot where a client connects once, a log is replayed or a clock sets the
+    pace.
+    """
     port = scene.port
     return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
 
 
 def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
-    """Whether a controller in the loop, or something unknown behind the port, has let pressures fall."""
+    """Whether pressures fall in a run because a controller in the loop, or something unknown at the port, released
+    brakes.
+    """
     none = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
     return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
 def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
-    """Whether the controller has acted alike in two runs."""
+    """Whether the controller acted alike in two runs: the pressures' root mean square difference is at most the share
+    ALIKE.
+    """
     pressures = _columns_at(path.times, other_path, other_path.pressures)
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
 def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
-    """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps:
-    of valves another state of any, of pressures what is not alike."""
+    """Whether the controller's commands change if the signals of a run are shifted by as much as longer steps shift
+    them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than ALIKE.
+    """
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _columns_at(times, longer, longer.turning)
@@ -124,7 +133,7 @@ def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherR
 
 
 def channels(path: BrakingPath, times: np.ndarray) -> Channels:
-    """Motion at times (n,) in s, after its end as it was there."""
+    """Channels of the motion at times (n,) in s; after the end of the run they keep their last values."""
     places, rates = path.states[:, 0], path.states[:, 1]
     motion = {"x": places[:, 0], "y": places[:, 1], "yaw": places[:, 2], "speed": np.hypot(rates[:, 0], rates[:, 1])}
     if "heading_1" in path.coordinates:
@@ -133,12 +142,14 @@ def channels(path: BrakingPath, times: np.ndarray) -> Channels:
 
 
 def motion_and_distance(path: BrakingPath, times: np.ndarray) -> Channels:
-    """Motion, and the stopping distance (1,) of a run that stands."""
+    """Channels of the motion, and the stopping distance (1,) if the vehicle comes to rest."""
     return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
 
 
 def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
-    """Runs with half of the steps, and over a part with a quarter of them; of a single one, with two over a part."""
+    """The stop with half as many steps per sample and, over its first part, with a quarter, if commands stay alike. A
+    stop with a single step per sample is repeated with two over its first part.
+    """
     last = float(path.times[-1])
     if steps == 1:
         return [rerun(2, FINE_WINDOW * last)]
@@ -147,8 +158,9 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
 
 
 def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:
-    """Error estimates by runs in half and a quarter of the steps; the stopping distance errs by no less than the motion
-    along the road."""
+    """Error estimates by runs with half and a quarter of the steps. The error of the stopping distance is at least that
+    of the motion along the road.
+    """
     fine, coarse, counts = (
         motion_and_distance(path, path.times),
         motion_and_distance(finer_runs[0], path.times),
@@ -171,7 +183,9 @@ def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step
 
 
 def observed(fine: float, coarse: float, counts: list[int]) -> float:
-    """Order, up to ORDER, with which differences of neighbouring runs fall, of steps so many to a sample."""
+    """Observed order of convergence, at most ORDER: from the differences of neighbouring runs, fine and coarse, whose
+    steps per sample are ``counts``.
+    """
     if not (fine > 0.0 and coarse > 0.0):
         return CAREFUL
     orders = np.linspace(LEAST_ORDER, ORDER, 61)
@@ -181,8 +195,9 @@ def observed(fine: float, coarse: float, counts: list[int]) -> float:
 
 
 def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[str, Estimate]:
-    """Error estimates by a run in twice as many steps over the first part, whose share of error is taken for that of
-    the whole."""
+    """Error estimates by a run with twice as many steps over the first part of the stop. The relative error of this
+    part is taken for the whole stop.
+    """
     part = path.times <= other_path.times[-1]
     fine, finer, told = channels(path, path.times), channels(other_path, path.times[part]), {}
     for name, values in fine.items():
@@ -193,12 +208,12 @@ def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[s
 
 
 def _columns_at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.ndarray:
-    """Columns (n, W) of a run at times (m,) in s."""
+    """Columns (n, W) of a run, interpolated at times (m,) in s."""
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 
 
 def _size(name: str, values: np.ndarray, share: float = 1.0) -> float:
-    """Size of a channel that its error is stated as a share of; over a part of a run in proportion to that part."""
+    """Size of a channel by which its error is divided, at least LEAST; ``share`` reduces LEAST for a part of a run."""
     return max(size_of(values), share * LEAST.get(name, 0.0))
 
 

@@ -8,7 +8,7 @@ from models.systems.handling.export import AXES, of_handling
 
 
 def exported(scene: BrakingScene, engine: str) -> Exported:
-    """The vehicle on its suspension; InputError for one in the plane, which no engine has."""
+    """Export the vehicle on its suspension; InputError for a vehicle in the plane, of which engines have no model."""
     if scene.vehicle.file is None:
         allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)

@@ -29,9 +29,9 @@ class BrakingPath:
     """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest;
-    coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
-    clock on the wall told of overruns, if the run kept to it.
+    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest; coordinates : names
+    of those of the states, the first three always x, y (m) and heading (rad); clock : report of the real-time clock on
+    overruns, if the run kept to one.
     """
 
     times: np.ndarray
@@ -46,8 +46,9 @@ class BrakingPath:
 
 
 class Start(NamedTuple):
-    """State from which a run continues: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in
-    rad/s."""
+    """State from which a run continues: positions and rates (2, 2 + U), and the wheels' speeds of turning (W,) in
+    rad/s.
+    """
 
     state: np.ndarray
     turning: np.ndarray
@@ -88,7 +89,7 @@ class Braked:
         return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
 
     def rolling(self, speed: float) -> Start:
-        """Steady rolling along x at a speed (m/s)."""
+        """Start state of steady rolling along x at a speed (m/s)."""
         state = np.zeros((2, len(self.coordinates)))
         state[1, 0] = speed
         return Start(state, speed / self.plane.radius)
@@ -138,13 +139,15 @@ class Braked:
 
     @property
     def on_road(self) -> OnRoad:
-        """The vehicle on its road as compiled functions take them."""
+        """The vehicle and its road in the form that compiled functions take."""
         return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
 
     def _moving(
         self, commands: Commands, record: Record, row: Row, motion: PlaneMotion
     ) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``row`` and in ``motion``, moved on sample by sample; see ``samples``."""
+        """Start the loop that moves the vehicle sample by sample from the state in ``row`` and ``motion``; see
+        ``samples``.
+        """
         air = resting_chambers(self.chambers, self.sample)._replace(pressure=row.pressure, torque=row.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
@@ -163,7 +166,7 @@ class Braked:
 def on_tyres(
     plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = UNIFORM_ROAD, **more: Any
 ) -> Braked:
-    """A vehicle whose wheels point straight ahead, all with the same kind of tyre where no other is named.
+    """A vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
 
     tyres : tables, surface by surface and kind by kind; more : as of ``Braked``.
     """
@@ -183,7 +186,7 @@ def _tell(commands: Commands, command: Command, braked: bool) -> None:
 
 
 def _take(rows: list[np.ndarray], record: Record) -> None:
-    """Put what was recorded to the rows."""
+    """Append a copy of the recorded rows to ``rows``, and empty the record."""
     rows.append(record.rows[: record.left[0]].copy())
     record.left[0] = 0
 

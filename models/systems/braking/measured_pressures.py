@@ -20,14 +20,14 @@ FASTEST = 150.0
 
 
 def wheel_names(wheels: int) -> tuple[str, ...]:
-    """fl, fr, rl, rr of a truck; of more axles 1l, 1r, 2l ... in their order."""
+    """Names of the wheels: fl, fr, rl, rr of a vehicle with two axles; 1l, 1r, 2l and so on of one with more."""
     axles = ("f", "r") if wheels == 4 else tuple(str(axle + 1) for axle in range((wheels + 1) // 2))
     return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheels))
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPressures:
-    """A controller that takes no notice of its wheels: pressures by time, each the mean over its sample.
+    """A controller that ignores the wheel speeds and commands measured pressures, each averaged over its sample.
 
     times (n,) : s, rising from 0; pressures (n, W) : bar; speeds (n, W) : m/s of the wheels' rims, None if they were
     not measured. After the last row the last pressures stay.
@@ -39,7 +39,7 @@ class MeasuredPressures:
     period: float = SAMPLE
 
     def sample(self, sample: Sample) -> Command:
-        """Pressures (W,) whose impulse over the sample is the measured one."""
+        """Command the pressures (W,) that are the means of the measured ones over the sample."""
         start, end = sample.time * 1e-9, sample.time * 1e-9 + self.period
         inside = self.times[(self.times > start) & (self.times < end)]
         at = np.concatenate(([start], inside, [end]))
@@ -47,9 +47,10 @@ class MeasuredPressures:
         return Command(pressures=np.trapezoid(rows, at, axis=0) / self.period)
 
     def rms(self, times: np.ndarray, rims: np.ndarray) -> np.ndarray:
-        """Root mean square (W,) of rims (m, W) at times (m,) less the measured speeds, as long as these last.
+        """Root mean square difference (W,), m/s, between computed rim speeds ``rims`` (m, W) at times (m,) and measured
+        ones.
 
-        In m/s; not a number where none were measured.
+        Only the time of the measurement counts; not a number where no speeds were measured.
         """
         if self.speeds is None:
             return np.full(rims.shape[1], np.nan)
@@ -86,7 +87,7 @@ def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, 
 def _within(
     path: str | Path, table: dict[str, np.ndarray], heading: str, names: tuple[str, ...], largest: float, unit: str
 ) -> np.ndarray:
-    """Columns (n, W) of one quantity, from 0 to the largest value that it can have."""
+    """Columns (n, W) of one quantity for all wheels; InputError for a value that is not from 0 to ``largest``."""
     for name in names:
         column = table[f"{heading}_{name}"]
         wrong = np.flatnonzero((column < 0.0) | (column > largest))
@@ -97,7 +98,9 @@ def _within(
 
 
 def _header(path: str | Path) -> str:
-    """First line that is no remark, "" if the file cannot be read: what is wrong with it ``read_table`` tells."""
+    """First line of a file that is no comment, "" if the file cannot be read: ``read_table`` then says what is
+    wrong.
+    """
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):

@@ -30,7 +30,7 @@ SPRUNG_ENGINE = "mujoco"
 
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
-    """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
+    """The scene's vehicle with its brakes on the road of a procedure; InputError for parts that are inconsistent."""
     plane, known = plane_of(scene), (*NAMES, *scene.tyres.files)
     for name, scale in scene.tyres.scale.items():
         if name not in known:
@@ -62,7 +62,9 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
 
 
 def _check_lags(scene: BrakingScene, vehicle: Braked, shortest: float) -> None:
-    """Refuse steps at which the vehicle would rock up at rest on its tyres, which relax over a length (m) or more."""
+    """Refuse steps so long that the vehicle at rest would start to rock on its tyres, whose slip angles lag over the
+    relaxation length ``shortest`` (m) or more.
+    """
     from models.brake.relaxation import longest_step
 
     lively = GRAVITY if vehicle.engine is None else vehicle.engine.liveliness
@@ -74,7 +76,7 @@ def _check_lags(scene: BrakingScene, vehicle: Braked, shortest: float) -> None:
 
 
 def plane_of(scene: BrakingScene) -> Plane:
-    """Numbers of the truck, or of the truck and its trailer, or of a vehicle on its suspension with what it tows."""
+    """Plane model of the truck, of truck and trailer, or of a vehicle on its suspension together with what it tows."""
     transfer = scene.load_transfer is not None
     if scene.vehicle.file is not None:
         plane: Plane = sprung_of(scene).in_plane(transfer)
@@ -95,7 +97,7 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
 
 
 def sprung_of(scene: BrakingScene) -> Any:
-    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
+    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
     from models.brake.sprung import sprung
 
     return sprung(spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
@@ -113,8 +115,9 @@ def on_springs(engine: str, vehicle: Any) -> Any:
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:
-    """Parameters of the scene's vehicle with what the scene overrides; for a vehicle with suspension, those of its
-    plane model."""
+    """Parameters of the scene's vehicle, with the scene's overrides; a vehicle on its suspension has those of its plane
+    model.
+    """
     if scene.vehicle.file is not None:
         plane: Truck = sprung_of(scene).plane
         return plane
@@ -148,7 +151,7 @@ def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def sides(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
-    """Surfaces left and right of the line on a stretch, as the procedure has them."""
+    """Names of the surfaces left and right of the line on a stretch; the procedure may name the right one."""
     return stretch.left, procedure.right or stretch.right or stretch.left
 
 
@@ -158,7 +161,7 @@ def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
 
 
 def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
-    """Road of a procedure, its surfaces by their places in ``names``."""
+    """Road of a procedure; its surfaces are numbered by their index in ``names``."""
     stretches = [Numbered(s.x, *(names.index(name) for name in sides(procedure, s))) for s in scene.road.stretches]
     try:
         return road(stretches, scene.road.line, len(kinds_of(scene)))
@@ -167,12 +170,12 @@ def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road
 
 
 def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
-    """Kinds of tyres: whether each is the rear one."""
+    """Kinds of tyres in use: False for the front tyre and, if the rear wheels have another tyre, True for that."""
     return (False, True) if scene.tyres.own_rear else (False,)
 
 
 def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
-    """Tyre table of a surface, from the scene's file if it has one, its friction scaled as the scene says."""
+    """Tyre table of a surface, from the scene's file if it has one; the scene may scale its friction."""
     scale = scene.tyres.scale.get(name, 1.0)
     if not SCALES[0] < scale <= SCALES[1]:
         raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
@@ -186,13 +189,13 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
 
 
 def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
-    """Tables by name of all surfaces under all procedures, a rear tyre of its own beside the front one."""
+    """Tyre tables, by name, of all surfaces under all procedures; a different rear tyre has the name SURFACE/rear."""
     names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
     return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
 
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
-    """Brake of one axle's wheels."""
+    """Law of the brakes on one axle's wheels."""
     brake: BrakeTable = getattr(scene.brakes, axle)
     return read(
         Brake,
@@ -208,7 +211,7 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
 
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
-    """Chambers of all wheels; without dynamics their time constants are zero."""
+    """Brake chambers of all wheels; without the table [pressure] their time constants are zero."""
     pressure, none = scene.pressure, np.zeros(wheels)
     if pressure is None:
         return Chambers(none, none, scene.brakes.supply)

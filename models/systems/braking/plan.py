@@ -31,7 +31,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Tyres, brakes, road, controller and port, without a step of the vehicle."""
+    """Check tyres, brakes, road, controller and port without marching the vehicle; raises InputError."""
     for name, procedure in scene.procedures.items():
         known = (*NAMES, *scene.tyres.files)
         if procedure.right is not None and procedure.right not in known:
@@ -46,7 +46,7 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
-    """Refuse several drives that would write into one log."""
+    """Refuse a name of the log under which several procedures or engines would write into the same file."""
     drives = {"procedure": len(scene.procedures), "engine": engines}
     for key, several in drives.items():
         if several > 1 and f"{{{key}}}" not in log:
@@ -55,7 +55,9 @@ def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
 
 
 def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse an engine on its own where a study computes by the reference, and a log of its many drives."""
+    """Refuse --engine without the reference, and a log at the port, where a study makes many drives by the
+    reference.
+    """
     if engines and "reference" not in engines:
         allowed = f"the study {scene.study!r} computes by the reference: leave it out"
         raise InputError("--engine", "", engines[0], allowed)
@@ -65,7 +67,7 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: BrakingScene) -> tuple[Finding, ...]:
-    """Queries about the vehicle."""
+    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
     if scene.vehicle.file is not None:
         return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
     return tuple(query for query in _queries(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
@@ -77,7 +79,7 @@ RADIUS = 0.1, 1.5
 
 
 def _queries(truck: Truck) -> Iterator[Finding]:
-    """Queries on implausible parameters of a vehicle that brakes in the plane."""
+    """Doubts about implausible parameters of a vehicle that brakes in the plane."""
     gyration, span = (truck.yaw_inertia / truck.mass) ** 0.5, tuple(g * truck.wheelbase for g in GYRATION["rz"])
     looks = [
         ("mass", "mass", truck.mass, MASS),
@@ -124,8 +126,9 @@ def describe(scene: BrakingScene) -> str:
 
 
 def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
-    """Which forces of a suspended vehicle engines compute by native elements, which all engines share, and which are
-    independent."""
+    """Lines on the forces of a suspended vehicle: those that engines compute by native elements, those that all engines
+    share, and those that the reference computes independently.
+    """
     from models.engines.free_vehicle import ENGINES, native_share
     from models.engines.towed_springs import divided
 
@@ -142,7 +145,9 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
 
 
 def _towed(scene: BrakingScene) -> list[tuple[str, str]]:
-    """Lines on what a suspended vehicle tows; places are ahead of the vehicle's centre of mass."""
+    """Lines on the bodies that a suspended vehicle tows; hitch positions are measured forward from its centre of
+    mass.
+    """
     from models.vehicles.towing import hitch_line
 
     handling = sprung_of(scene).handling
@@ -154,7 +159,7 @@ def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:
 
 
 def user_code(scene: BrakingScene) -> str:
-    """Code of the user's that a run of the scene executes, "" if there is none."""
+    """Name of the user's own code that a run of the scene executes, "" if there is none."""
     named = [key for key in ("callable", "command", "fmu") if getattr(scene.port, key, None) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
 

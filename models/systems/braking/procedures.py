@@ -34,7 +34,7 @@ STEADY = 1e-6
 
 
 def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
-    """Vehicle and start of a procedure; InputError for a circle that tyres cannot hold."""
+    """Vehicle and start of a procedure; InputError for a circle that the tyres' side forces cannot hold."""
     procedure = scene.procedures[name]
     vehicle = braked(scene, procedure)
     try:
@@ -52,14 +52,14 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
 
 
 def steering_of(procedure: Procedure, vehicle: Braked) -> Steering:
-    """The driver's steering from time 0 on; a single angle is there at once."""
+    """The driver's steering from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     times, angles = np.array(knots, float).T
     return Steering(times, angles, steered(vehicle, 1.0))
 
 
 def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
-    """Step response of a J-turn's yaw rate without brakes; None where no yaw rate is steady."""
+    """Response of the yaw rate to the steering step of a J-turn without brakes; None where it does not settle."""
     vehicle, start = ready(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
     path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED)
@@ -67,9 +67,9 @@ def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
 
 
 def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
-    """Engines that were asked for; where none were, the usual one.
+    """The requested engines, or the usual engine if none was requested.
 
-    On a suspension the reference, which takes minutes for a stop, is used only where nothing else was asked for.
+    The reference takes minutes for a stop on a suspension: there it is used only if no other engine is requested.
     """
     if scene.vehicle.file is None:
         return requested or ("reference",)
@@ -81,8 +81,9 @@ def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ..
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> BrakingPath:
-    """One run from a start with the scene's controller in the loop, or with what stands behind the port instead; of
-    the engine only the name is needed, for files."""
+    """One run from a start, with the scene's controller in the loop or with what is connected to the port. ``engine``
+    is only a name, for files.
+    """
     usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
         return vehicle.run(usual, start, scene.run.duration)
@@ -94,8 +95,9 @@ def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine
 def answers(
     scene: BrakingScene, name: str, vehicle: Braked, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
 ) -> np.ndarray:
-    """Commands of a run's controller to given speeds of rims (n, W) and of the vehicle
-    (n,), in m/s at times (n,) in s, though nothing moves: valves or pressures (n, W)."""
+    """Commands (n, W), of valves or pressures, with which a run's controller answers given speeds (m/s) of rims (n, W)
+    and of the vehicle (n,) at times (n,) in s. No vehicle is simulated.
+    """
     usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
     with ExitStack() as stack:
         if scene.port is not None:
@@ -109,7 +111,7 @@ def answers(
 
 
 def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> ControllerRun:
-    """Facts of a run for the port; a log is that of a vehicle and its drive, whatever answered."""
+    """Facts of a run that the port needs. A log belongs to a vehicle and its drive, whatever controller answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
     return ControllerRun(
@@ -131,7 +133,7 @@ def steered(vehicle: Braked, angle: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SteadyTurn:
-    """A steady circle: steer angles (W,) in rad, and the state with which the first unit heads along x."""
+    """A steady circle: steer angles (W,) in rad, and a start state in which the first unit heads along x."""
 
     steer: np.ndarray
     start: Start
@@ -139,7 +141,8 @@ class SteadyTurn:
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """Motion of a vehicle whose first unit's centre of mass goes round a circle (m, positive to the left) at a speed.
+    """Motion of a vehicle at a speed (m/s) whose first unit's centre of mass follows a circle (radius in m, positive to
+    the left).
 
     All wheels roll freely: the drive that holds the speed (m/s) is not there, so that the vehicle slows down by the
     drag of its slip angles. Unknown (n - 1,) are the steer angle, the side slip (rad) and all n coordinates but the
@@ -152,14 +155,14 @@ class Circle:
     sprung: bool = False
 
     def state(self, unknown: np.ndarray) -> np.ndarray:
-        """Positions and rates (2, n)."""
+        """Positions and rates (2, n) for these unknowns."""
         both = np.zeros((2, unknown.size + 1))
         both[0, 3:], both[1, 2 : 3 if self.sprung else None] = unknown[2:], self.speed / self.radius
         both[1, :2] = self.speed * np.cos(unknown[1]), self.speed * np.sin(unknown[1])
         return both
 
     def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and speeds of turning (W,) of the wheels."""
+        """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
         vehicle, state, steer = self.vehicle, self.state(unknown), steered(self.vehicle, unknown[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
@@ -167,25 +170,27 @@ class Circle:
         return motion
 
     def left(self, unknown: np.ndarray) -> np.ndarray:
-        """Residual accelerations (n - 1,), zero on a steady circle: across the path, then of the other coordinates."""
+        """Residual accelerations (n - 1,), zero on a steady circle: first that across the path, then those of the other
+        coordinates.
+        """
         rates, _ = self.motion(unknown)
         across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
     def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
-        """The unknowns of a steady circle from a guess, and whether they are steady."""
+        """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
         from scipy.optimize import root
 
         unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
 
     def turn(self, unknown: np.ndarray) -> SteadyTurn:
-        """The steady turn with which a procedure begins."""
+        """The steady turn, with which a procedure begins, for these unknowns."""
         return SteadyTurn(steered(self.vehicle, unknown[0]), Start(self.state(unknown), self.motion(unknown)[1]))
 
 
 def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
-    """The steady ``Circle`` of a vehicle; None if there is none.
+    """The steady circle (see ``Circle``) of a vehicle; None if there is none.
 
     That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
     """
@@ -209,7 +214,7 @@ def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | No
 
 
 def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
-    """Speeds of turning (W,) of wheels without slip."""
+    """Speeds of turning (W,) in rad/s of wheels that roll without slip."""
     headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
     ahead = np.column_stack((np.cos(headings), np.sin(headings)))
     aside = np.column_stack((-ahead[:, 1], ahead[:, 0]))
@@ -221,7 +226,9 @@ def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
 
 
 def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (2 + U,) of a plane vehicle whose wheels roll without brakes, and their speeds of turning (W,)."""
+    """Accelerations (2 + U,) of a plane vehicle whose unbraked wheels roll freely, and the wheels' speeds of turning
+    (W,).
+    """
     plane, none, turning = vehicle.plane, np.zeros((2, vehicle.plane.wheels)), _rolling(vehicle.plane, state, steer)
     motion, ground = motion_of(state.copy(), turning.copy()), surfaces(plane.wheels)
     motion.accelerations[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])

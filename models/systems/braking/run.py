@@ -21,7 +21,8 @@ REPORTS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle
 
 
 def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bool = False) -> Result:
-    """Drive a procedure, the first of the scene's if none is named, whatever stands behind the port.
+    """Drive one of the scene's procedures, by default the first, with its controller or with what is connected to the
+    port.
 
     engine : the usual one of such a vehicle if none is named; error : whether that of the steps is estimated, by
     further runs. What the run assumes is judged always. The result's detail is its ``BrakingPath``. Raises InputError,
@@ -45,7 +46,7 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
 
 
 def marched_by(vehicle: Braked, engine: str) -> Braked:
-    """The vehicle marched by an engine; by its own steps in the plane, which are the reference's."""
+    """The vehicle with the engine that marches it. In the plane, "reference" means the vehicle's own steps."""
     if vehicle.sprung is not None:
         return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
     if engine == "reference":
@@ -56,7 +57,7 @@ def marched_by(vehicle: Braked, engine: str) -> Braked:
 
 
 def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str) -> OtherRuns:
-    """The procedure in other steps, none of which is written to a log."""
+    """Functions that repeat the procedure in other steps and write no log."""
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
@@ -71,7 +72,9 @@ def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, e
 
 
 def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
-    """Motion by coordinate, and by wheel its turning, pressure and torque, with its forces, load and slips."""
+    """Result with the motion of each coordinate and with the turning, pressure, torque, forces, load and slips of each
+    wheel.
+    """
     units = ", ".join("rad" if place.split()[-1][0] in "hr" else "m" for place in path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
     moving, wheel = ("time", "coordinate"), ("time", "wheel")

@@ -229,7 +229,7 @@ def _of_procedure(procedure: Procedure) -> Refusals:
 
 
 def _of_vehicle(scene: BrakingScene) -> Refusals:
-    """A vehicle on its suspension has all that its file says."""
+    """Refusals of keys that repeat what vehicle.file defines, and of keys that have no meaning without this file."""
     vehicle = scene.vehicle
     if vehicle.file is None:
         if vehicle.spin_inertia is not None:
@@ -245,7 +245,7 @@ def _of_vehicle(scene: BrakingScene) -> Refusals:
 
 
 def _of_brakes(scene: BrakingScene) -> Refusals:
-    """A supply that no vehicle has, and torques that no brake gives."""
+    """Refusals of a supply pressure that no vehicle has, and of torques that no brake gives."""
     supply = scene.brakes.supply
     if supply > LARGEST_PRESSURE:
         yield "brakes.supply", supply, f"must be at most {LARGEST_PRESSURE:g} bar"

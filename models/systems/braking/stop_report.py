@@ -27,13 +27,13 @@ LIMITS = (0.2, 0.5)
 
 
 def wheel_names(count: int) -> tuple[str, ...]:
-    """Names of the wheels of a vehicle that has so many with those of what it tows."""
+    """Names of a vehicle's ``count`` wheels, those of towed vehicles included."""
     return (*WHEELS, *TOWED_WHEELS[count - len(WHEELS)])
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Quantities over time of a run: of the first unit's centre of mass, along and across its path.
+    """Time histories of a braking run, for the first unit's centre of mass, along and across its path.
 
     times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
     """
@@ -52,25 +52,25 @@ class Stop:
 
     @property
     def speed(self) -> np.ndarray:
-        """(n,) m/s."""
+        """Speed (n,) of the first unit's centre of mass in m/s."""
         return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
 
     @property
     def way(self) -> np.ndarray:
-        """Length (n,) of the path so far in m."""
+        """Distance (n,) in m along the path since the start."""
         steps = np.diff(self.path.states[:, 0, :2], axis=0)
         return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
 
     @property
     def side_slip(self) -> np.ndarray:
-        """Angle (n,) from the vehicle's x axis to its velocity in rad; 0 where it is slower than SLOWEST."""
+        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where it is slower than SLOWEST."""
         course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
         angle = np.remainder(course - self.path.states[:, 0, 2] + np.pi, 2.0 * np.pi) - np.pi
         return np.where(self.speed > SLOWEST, angle, 0.0)
 
     @property
     def across(self) -> np.ndarray:
-        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, to the left."""
+        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, positive to the left."""
         before, after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
         size = np.maximum(self.speed[:-1], 1e-9)
         change = (after - before) / np.maximum(self.lengths, 1e-12)[:, None]
@@ -99,12 +99,14 @@ class Stop:
 
     @property
     def lean(self) -> np.ndarray | None:
-        """Roll to the right and pitch nose down (n, 2) in rad of a vehicle on its suspension, None of a plane one."""
+        """Angles (n, 2) in rad of a vehicle on its suspension: roll to the right, and pitch nose down; None for a plane
+        vehicle.
+        """
         places = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
         return self.path.states[:, 0, places] if places else None
 
     def of_body(self) -> dict[str, float]:
-        """Results of the sprung body over a stop, by name and unit; none of a plane vehicle."""
+        """Results for the sprung body over a stop, by name and unit; empty for a plane vehicle."""
         if self.lean is None:
             return {}
         roll, pitch = np.degrees(self.lean).T
@@ -116,7 +118,9 @@ class Stop:
 
     @property
     def units(self) -> np.ndarray:
-        """Positions (n, 2 + U): of the first unit's centre (m), and the headings (rad) of all, on a suspension too."""
+        """Positions (n, 2 + U): of the first unit's centre (m), then the headings (rad) of all units; also for a
+        vehicle on its suspension.
+        """
         places = self.path.states[:, 0]
         if self.lean is None:
             return places
@@ -125,12 +129,14 @@ class Stop:
 
     @property
     def hitch(self) -> np.ndarray | None:
-        """Angle (n,) in rad, positive to the left, of what is towed first against the vehicle; None without a train."""
+        """Angle (n,) in rad from the towing vehicle to the first towed unit, positive to the left; None without a
+        train.
+        """
         units = self.units
         return units[:, 3] - units[:, 2] if units.shape[1] > 3 else None
 
     def of_hitch(self) -> dict[str, float]:
-        """Results of a train's hitch over a stop, by name and unit; none of a vehicle that tows nothing."""
+        """Results for the hitch of a train over a stop, by name and unit; empty for a vehicle that tows nothing."""
         hitch = self.hitch
         if hitch is None:
             return {}
@@ -158,7 +164,8 @@ class Stop:
         }
 
     def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
-        """Results ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
+        """Results at ``time`` (s) after the brake is applied on a circle (radius in m, positive to the left), by name
+        and unit.
 
         Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
         """
@@ -177,10 +184,10 @@ class Stop:
         }
 
     def locks(self) -> Locks:
-        """Locks of the wheels above 15 km/h."""
+        """Table of the wheels' locks above 15 km/h."""
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
 def _peak(values: np.ndarray) -> int:
-    """Where the largest magnitude is."""
+    """Index of the value with the largest magnitude."""
     return int(np.argmax(np.abs(values)))

@@ -31,7 +31,8 @@ COURSE = {"aside": 1.0, "yaw": 5.0}
 @dataclass(frozen=True)
 class Stops:
     """Ensemble of stops: path i brakes from speed (1 + spread e_i), where e_i is standard normal and depends on the
-    seed and i alone. ``table`` is the scene's."""
+    seed and i alone. ``table`` : the scene's tables.
+    """
 
     table: Mapping[str, Any]
     file: str
@@ -90,7 +91,9 @@ def scatter(values: np.ndarray) -> Scatter:
 
 
 def chances(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
-    """Standard errors of the means, as shares of these or of a course that is told apart."""
+    """Statistical errors of the mean results: the standard error divided by the mean, or by COURSE where the mean is
+    smaller.
+    """
     units = {key: label.partition("[")[2][:-1] for key, label in KEPT.items()}
     return {
         key: by_chance(scatter.error, max(abs(scatter.mean), COURSE.get(key, 0.0)), units[key], scatter.count)

@@ -75,7 +75,7 @@ def answer_table(
     executor: Executor | None = None,
     store: Store | None = None,
 ) -> dict[str, int]:
-    """Answer the table at ``path`` into ``output_path``; returns how many rows there are and how many were wrong.
+    """Answer the table at ``path`` into ``output_path``; returns the numbers of all rows and of refused rows.
 
     errors : whether the answer has columns of errors, which take the forces again on half the cells. executor :
     computes the blocks of rows; store : keeps those that are finished (see ``models.ensemble.runner``). Raises
@@ -108,14 +108,16 @@ def compile_first(build: Build, method: Method) -> None:
 
 
 def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
-    """``forces`` (rows, columns) of a block, the rows (m,) that are ``wrong``, and ``why`` (m,)."""
+    """Answers to a block of rows: ``forces`` (rows, columns), the numbers ``wrong`` (m,) of refused rows, and reasons
+    ``why`` (m,).
+    """
     columns = len(HEADER) - 2 - (0 if errors else ERRORS.stop - ERRORS.start)
     forces, wrong = _answered(block, partial(_forces, build=build, method=method, errors=errors), columns)
     return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
 def _answered(block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:
-    """Answers (rows, columns), NaN where a row is wrong, and what is wrong there."""
+    """Answers (rows, columns), NaN in refused rows, and the reason for each refusal by the number of its row."""
     answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.wrong)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
     answers[good], refused = _sound({name: column[good] for name, column in block.values.items()}, solve, columns)
@@ -125,7 +127,9 @@ def _answered(block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns
 def _sound(
     values: dict[str, Array], solve: Callable[[dict[str, Any]], Array], columns: int
 ) -> tuple[Array, dict[int, str]]:
-    """Answers of all rows; rows that are refused are found by halving, and the others answered without them."""
+    """Answers to all rows, and reasons by row where the theory refuses one. Refused rows are found by halving the
+    block.
+    """
     count = len(next(iter(values.values())))
     if count == 0:
         return np.empty((0, columns)), {}
@@ -143,7 +147,7 @@ def _sound(
 
 
 def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
-    """Answers (rows, columns); raises InputError if a row is out of what the theory takes."""
+    """Answers (rows, columns); raises InputError if a row is outside the range of the theory."""
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
     touching = build(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
@@ -168,7 +172,9 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
 
 
 def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Array, method: Method) -> list[Array]:
-    """Errors of cells and of theory, of the forces (N) and of the moments (N m); limit : mu N; share : of spin."""
+    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; limit : mu N; share : spin's
+    share of the creepage.
+    """
     most = limit * np.maximum(a, b)
     relative, other = (
         np.divide([creep.fx, creep.fy, creep.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
@@ -182,7 +188,7 @@ def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Arr
 
 
 def _line(line_number: int, row: list[float], wrong: str | None) -> str:
-    """A row of the answer's file; text that says what is wrong stands within quotation marks."""
+    """One row of the answer's file; a text that says what is wrong is put into quotation marks."""
     if wrong is None:
         numbers, errors, status = SOUND
         return (numbers + (errors if len(row) > ERRORS.start else "") + status).format(line_number, *row)
@@ -191,7 +197,9 @@ def _line(line_number: int, row: list[float], wrong: str | None) -> str:
 
 
 def sizes(path: Path) -> dict[str, dict[str, Any]]:
-    """Largest magnitude and rms of every column of an answer, over its sound rows; read block by block."""
+    """Largest magnitude and rms of every column of an answer, with its unit, over the rows without error; read block by
+    block.
+    """
     with path.open(newline="") as file:
         rows = csv.reader(file)
         heads = [_name_and_unit(head) for head in next(rows)[1:-1]]

@@ -23,7 +23,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: ContactScene) -> tuple[Finding, ...]:
-    """A doubt about every radius that is not large beside the contact."""
+    """A doubt for every radius of curvature that is not large compared with the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
     from models.systems.contact.run import hertz_of
@@ -67,7 +67,7 @@ def describe(scene: ContactScene) -> str:
 
 
 def _assumed(scene: ContactScene) -> list[Assumption]:
-    """Assumptions of the scene's contact; none where the contact cannot be pressed."""
+    """Assumptions of the scene's contact; none where its normal problem has no solution."""
     from models.systems.contact.assumptions import assumptions, table_assumptions
 
     with suppress(InputError, RunFailed):
@@ -80,7 +80,7 @@ def _assumed(scene: ContactScene) -> list[Assumption]:
 
 
 def _values(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
-    """Keys, values and units of a table, without what is not given."""
+    """Text of a table: its keys, values and units, without keys that are not given."""
     model = type(table)
     parts = []
     for name, value in table:  # type: ignore[attr-defined]

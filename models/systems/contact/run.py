@@ -74,7 +74,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Built:
-    """Data of a contact that effects may extend before its normal problem is solved: bodies, friction, load or
+    """Data of a contact before its normal problem is solved, which effects may extend: bodies, friction, load or
     approach.
 
     pair : elastic constants; friction : its coefficient; load (N) or approach (m): the other one is None.
@@ -92,9 +92,9 @@ class Built:
 
 @dataclass(frozen=True)
 class Rolls:
-    """A contact with its forces at every motion, and their errors if they were asked for.
+    """A contact with its forces at every motion, and their errors if these were requested.
 
-    pressing : seconds that it took to press the bodies; rolling : (n,) to roll them at each motion, errors included.
+    pressing : seconds that the normal problem took; rolling (n,) : seconds for each motion, errors included.
     """
 
     contact: RollingContact
@@ -114,7 +114,7 @@ def run(
     answers: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Result:
-    """Forces of a scene at every creepage, with ``Rolls`` as detail; or of its table of cases.
+    """Compute the forces of a scene at every creepage, with ``Rolls`` as detail; or answer its table of cases.
 
     error : whether to state how far forces are off, which takes another evaluation of each on half the cells; what is
     assumed is judged always. fields : whether the
@@ -184,7 +184,7 @@ def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
 
 
 def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: bool) -> Result:
-    """The first rows of the answers, which the file has in full."""
+    """Answer the scene's table of cases into its file; the result has the first rows."""
     built = partial(table_contacts, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
@@ -197,7 +197,9 @@ def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: boo
 
 
 def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress, error: bool) -> dict[str, int]:
-    """Numbers of rows; a table of many blocks is answered by the scene's crew, and what is finished is kept."""
+    """Answer a table of cases and count its rows. A table of many blocks is solved by the scene's worker processes, and
+    finished blocks are stored.
+    """
     file = scene.cases_file()
     rows, several = _rows_of(file), file.stat().st_size > LARGE
     count = partial(_count, progress, rows)
@@ -210,7 +212,7 @@ def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress
 
 
 def _rows_of(file: Path) -> int:
-    """Lines of a file, about."""
+    """Number of line ends in a file, which is about its number of rows."""
     with file.open("rb") as lines:
         return sum(part.count(b"\n") for part in iter(partial(lines.read, 1 << 20), b""))
 
@@ -236,7 +238,7 @@ def scene_contact(scene: ContactScene) -> Built:
 
 
 def contact(scene: ContactScene) -> RollingContact:
-    """The contact of a scene, pressed, by the theory that the scene names."""
+    """The scene's contact after its normal problem is solved, with the theory that the scene names."""
     method, built = scene.method, scene_contact(scene)
     friction, pair = built.friction, built.pair
     if built.falling is not None and method.name != "fastsim":
@@ -267,14 +269,16 @@ def creepages(scene: ContactScene) -> list[Motion]:
 
 
 def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN) -> NormalContact:
-    """An ellipse as the theory of 1983 finds it, with room for more than its area."""
+    """The contact of an ellipse, pressed by the simplified theory of 1983, on a rectangle that is larger than the
+    ellipse.
+    """
     A, B = float(hertz.A), float(hertz.B)
     x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
     return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), options=options)
 
 
 def touches(scene: ContactScene, built: Built) -> list[TouchingPlace]:
-    """Where the profiles of a scene touch."""
+    """Places at which the wheel's and the rail's profile touch."""
     p = scene.profiles
     assert p is not None
     return wheel_on_rail(
@@ -299,7 +303,7 @@ def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProf
 
 
 def hertz_of(scene: ContactScene) -> Hertz:
-    """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
+    """Hertz' contact from semi-axes, curvatures or radii, under a load or at an approach."""
     built = scene_contact(scene)
     load, approach, pair = built.load, built.approach, built.pair
     if scene.ellipse is not None:

@@ -49,7 +49,7 @@ class Radii(Strict):
     rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
 
     def curvatures(self, file: str) -> tuple[float, float]:
-        """A and B (1/m); raises InputError for a radius of zero or bodies that do not touch on an ellipse."""
+        """Curvatures A and B (1/m); InputError for a radius of zero, or bodies that do not touch on an ellipse."""
         for name, radius in self:
             if radius == 0:
                 raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
@@ -131,7 +131,7 @@ class Method(Strict):
 
     @property
     def order(self) -> float:
-        """Power of the size of a cell with which the error of the forces falls."""
+        """Order of convergence: the power of the cell's size with which the error of the forces falls."""
         return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
 
     @property
@@ -169,7 +169,7 @@ class ContactScene(SceneFile):
         return next(name for name in GEOMETRIES if getattr(self, name) is not None)
 
     def cases_file(self) -> Path:
-        """The file of cases."""
+        """Path of the file with the table of cases."""
         assert self.cases is not None
         return self.path(self.cases.file, "cases.file")
 
@@ -199,7 +199,9 @@ def _refuse(scene: ContactScene, *checks: Callable[[ContactScene], Wrong]) -> No
 
 
 def _geometry(scene: ContactScene) -> Wrong:
-    """One geometry; a turned or mirrored rail, and a wheel in mm, are told as what they are."""
+    """Refusals of several geometries or none, and of a turned or mirrored rail and a wheel in mm, which are
+    recognised.
+    """
     tables = [name for name in GEOMETRIES if getattr(scene, name) is not None]
     if len(tables) != 1:
         known = ", ".join(GEOMETRIES)
@@ -249,7 +251,7 @@ def _contact(scene: ContactScene) -> Wrong:
 
 
 def _sizes(scene: ContactScene) -> Wrong:
-    """The theories refuse what is larger, but know neither the file nor the key."""
+    """Refusals of values beyond LARGEST: the theories refuse these, too, but do not know the file and the key."""
     for place, most in LARGEST.items():
         table, key = place.split(".")
         values = {place: getattr(getattr(scene, table), key, None)}
@@ -278,7 +280,7 @@ ON_PROFILES = ("simplified", "exact")
 
 
 def _method(scene: ContactScene) -> Wrong:
-    """No key that the theory would not read, and no theory that the geometry does not fit."""
+    """Refusals of keys that the theory does not read, and of a theory that does not suit the geometry."""
     method = scene.method
     for key in sorted(method.model_fields_set & method.unread()):
         yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
@@ -289,7 +291,7 @@ def _method(scene: ContactScene) -> Wrong:
 
 
 def _friction(scene: ContactScene) -> Wrong:
-    """Friction falls in FASTSIM marched to second order, and not in a table of cases."""
+    """Refusals of falling friction in a table of cases, and in a march that is not of second order."""
     march = scene.method.march
     if scene.falling_friction is None:
         return

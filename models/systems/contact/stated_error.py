@@ -16,10 +16,10 @@ BANDS = "which 95 % of such contacts keep to"
 
 
 def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
-    """The result with the root mean squares over its motions of the errors of force and moment.
+    """The result with the errors of force and moment, each as the root mean square over the result's motions.
 
-    Shares are of the root mean square of the force, for the moment times the contact's lever: a moment may vanish.
-    Raises RunFailed where the cells are too few.
+    Relative errors refer to the root mean square of the force; for the moment, which may vanish, to that times the
+    contact's lever. Raises RunFailed where the cells are too few.
     """
     force = rms(np.hypot(run["fx"], run["fy"]))
     sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
@@ -35,8 +35,9 @@ def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: S
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
-    """The result of a table of cases with the errors of the rows that it keeps, with what at least 95 % of them keep
-    to."""
+    """The result of a table of cases with the errors of the rows that it keeps: root mean squares of the error of the
+    cells and of that of the theory, which at least 95 % of cases keep to.
+    """
     force = rms(np.hypot(table["fx"], table["fy"]))
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
     stated(table, {"force": by_cells(rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)}, HALF)
@@ -44,7 +45,7 @@ def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
 
 
 def rms(values: np.ndarray) -> float:
-    """Root mean square of what is a number, 0 of nothing."""
+    """Root mean square of the finite values, 0 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 

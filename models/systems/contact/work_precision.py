@@ -50,10 +50,11 @@ Roll = Callable[[Motion], Any]
 
 @dataclass(frozen=True)
 class ContactCase:
-    """One contact of semi-axes a and b (m). fx, fy divided by mu N; mz divided by mu N sqrt(ab); error: of the exact
-    grid, divided by mu N.
+    """One contact with semi-axes a and b (m), and its exact forces: fx, fy divided by mu N; mz divided by mu N
+    sqrt(ab); error of the exact theory's grid, divided by mu N.
 
-    parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
+    parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : size of the
+    creepage.
     """
 
     a: float
@@ -71,12 +72,14 @@ class ContactCase:
 
     @property
     def limit(self) -> float:
-        """mu N (N)."""
+        """Largest tangential force mu N in N."""
         return self.friction * self.load
 
     @property
     def motion(self) -> Motion:
-        """xi_x, xi_y and spin (1/m): ``level`` 1 is where a single creepage reaches mu N by the linear theory."""
+        """Creepages xi_x and xi_y, and spin (1/m). At ``level`` 1 a single creepage reaches mu N by the linear
+        theory.
+        """
         c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
         parts = np.array(self.parts)
         unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
@@ -84,16 +87,16 @@ class ContactCase:
 
     @property
     def force(self) -> Array:
-        """Exact force divided by mu N, (2,)."""
+        """Exact force (2,) divided by mu N: fx and fy."""
         return np.array([self.fx, self.fy])
 
     def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
-        """The contact by a theory of the ellipse."""
+        """The contact as an object of ``theory``, one of the theories of an ellipse."""
         return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
 def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = FINEST) -> ContactCase:
-    """The case with its forces: the error of the grid is taken out, and what is left of it stated.
+    """The case with its exact forces. They are extrapolated to vanishing cells, and the error that remains is stated.
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
     """
@@ -114,10 +117,11 @@ def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = FINEST) -> Co
 
 
 def without_grid(grids: list[Array]) -> tuple[Array, float]:
-    """Answers (fx, fy, mz) of three grids, each with cells half as long, led on to none, and the error of fx and fy.
+    """Answers (fx, fy, mz) extrapolated to vanishing cells, and the error of fx and fy. ``grids`` are the answers on
+    three grids, each with cells half as long as the one before.
 
-    The error of the cells is of first order where much sticks and of second where all slips: taken is the order by
-    which the two coarser grids foretell the same as the two finer ones, and the difference is the error.
+    The error of the cells is of first order where much sticks and of second where all slips. The order is chosen with
+    which the extrapolations from the two coarser and the two finer grids agree best; their difference is the error.
     """
     coarse, middle, fine = grids
     told = [(fine + (fine - middle) / part, middle + (middle - coarse) / part) for part in (1.0, 3.0)]
@@ -127,7 +131,9 @@ def without_grid(grids: list[Array]) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class TheorySettings:
-    """A theory with its choices: ``rolled(case, cells)`` gives a function of the motion, all else computed before."""
+    """A theory with its choices. ``rolled(case, cells)`` computes all that needs no motion, and returns a function of
+    the motion.
+    """
 
     name: str
     cells: tuple[int, ...]
@@ -172,9 +178,9 @@ WAYS = (
 
 @dataclass(frozen=True)
 class TheoryPoint:
-    """A theory on a number of cells. errors : (cases,) divided by mu N. seconds : of one evaluation, median over the
-    cases;
-    range : the least and the most of them."""
+    """Accuracy and time of a theory with a number of cells. errors (cases,) : divided by mu N; seconds : of one
+    evaluation, median over the cases; range : least and largest of the cases' seconds.
+    """
 
     name: str
     cells: int
@@ -189,12 +195,14 @@ class TheoryPoint:
 
     @property
     def most(self) -> float:
-        """Error divided by mu N that 95 of 100 cases keep to."""
+        """Error divided by mu N that 95 of 100 cases do not exceed."""
         return float(np.quantile(self.errors, 0.95))
 
 
 def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeats: int = 3) -> TheoryPoint:
-    """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
+    """Errors of a theory in all cases, and its seconds: the median of ``repeats`` in each case, then the median over
+    the cases.
+    """
     errors, seconds = [], []
     for case in cases:
         answer, taken = _timed(theory.rolled(case, cells), case.motion, repeats)
@@ -204,7 +212,7 @@ def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeat
 
 
 def force_of(answer: Any) -> Array:
-    """Force (2,) in N of what a way rolls: forces and moment, or what has its force."""
+    """Force (2,) in N of an answer, which is either a tuple of forces and moment or an object with ``force``."""
     return np.array(answer[:2]) if isinstance(answer, tuple) else answer.force
 
 
@@ -226,7 +234,7 @@ def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
 
 
 def cheapest(points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]) -> TheoryPoint | None:
-    """The fastest of all whose error is at most ``target``; None if there is none."""
+    """The fastest of the points whose error is at most ``target``; None if there is none."""
     meets = [point for point in points if error(point) <= target]
     return min(meets, key=lambda point: point.seconds, default=None)
 
@@ -240,7 +248,7 @@ def ellipse_cases(
     levels: tuple[float, ...],
     kinds: dict[str, Parts] = KINDS,
 ) -> list[ContactCase]:
-    """All kinds and levels on one ellipse, without their forces."""
+    """Cases of every kind and level on one ellipse, their exact forces not yet computed."""
     return [
         ContactCase(a, b, load, friction, material_pair, kind, parts, level)
         for (kind, parts), level in product(kinds.items(), levels)
@@ -279,8 +287,9 @@ TARGETS = (0.05, 0.02, 0.01, 0.005)
 
 
 def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
-    """For every target error: the cheapest theory that meets it in the mean, and the cheapest that does in 95 of 100
-    cases."""
+    """For every target error: the cheapest theory whose mean error meets it, and the cheapest whose error does in 95 of
+    100 cases.
+    """
     errors = attrgetter("mean"), attrgetter("most")
     return [
         (f"{100 * target:g} %", *(_point_text(cheapest(points, target, error), error) for error in errors))

@@ -87,7 +87,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
 
 
 def _unbuilt_stops(handling: Handling) -> list[Assumption]:
-    """Assumptions on coordinates whose stops are not built."""
+    """Assumptions that coordinates stay within their stops, for stops that the model does not have."""
     places = handling.vehicle.coordinates()
     return [
         Assumption(
@@ -104,8 +104,9 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
 
 
 def _travels(handling: Handling) -> list[Assumption]:
-    """Assumptions on springs that carry a wheel alone: within their curves, or where they have none, before the stops
-    of a car."""
+    """Assumptions on springs that alone carry a wheel: travel stays within the spring's curve or, without one, within
+    the usual stops of a car.
+    """
     carrying = {chassis_of(handling.given).name, *handling.given.towed}
     bodies = {tyre.body for tyre in handling.given.tyres}
     listed = []
@@ -153,17 +154,19 @@ def _lean(run: Result, handling: Handling) -> Watched:
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
-    """Share of the weight on tyres that slide faster than SLIDING and SLIP."""
+    """Share of the vehicle's weight that is carried by tyres which slide faster than SLIDING and than SLIP of their
+    speed.
+    """
     fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING, SLIP * _contact_speed(run))
     weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
     return np.sum(run["load"] * fast, axis=1) / weight
 
 
 def _contact_speed(run: Result) -> np.ndarray:
-    """Speed (m/s) of every wheel over the road, rolling and sliding."""
+    """Speed (m/s) of every wheel's contact over the road, from rolling and sliding together."""
     return np.hypot(run["tread"] + run["slip_x"], run["slip_y"])
 
 
 def _carcass_lag(run: Result) -> np.ndarray:
-    """Steering (rad) within the way that a carcass takes to follow."""
+    """Change of the steer angle (rad) while a wheel covers the distance over which its carcass follows."""
     return np.gradient(run["steer"], run.times, axis=0) * LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)

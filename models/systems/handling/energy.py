@@ -9,14 +9,17 @@ from models.systems.handling.run import Drive, joint_travel
 
 
 def energy(drive: Drive) -> np.ndarray:
-    """(m,) J: kinetic energy, weights, springs and tyres, by the rigid bodies' own velocities."""
+    """Energy (m,) of a drive in J: kinetic energy from the rigid bodies' own velocities, and potential energy of
+    weights, springs and tyres.
+    """
     run = drive.run
     motion = np.array([bodies_energy(drive.handling, q, v) for q, v in zip(run.positions, run.rates, strict=True)])
     return motion + drive.ledger[:, at.POTENTIAL]
 
 
 def unaccounted(drive: Drive) -> np.ndarray:
-    """(m,) J: energy less what it was at the start and less what was put in and taken out since, by Simpson's rule.
+    """Energy (m,) in J that does not balance: energy less its initial value and less the work done since, by Simpson's
+    rule.
 
     Rows lie at every second step: the middle one of three belongs to the rule.
     """
@@ -26,7 +29,9 @@ def unaccounted(drive: Drive) -> np.ndarray:
 
 
 def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """Kinetic energy and that of weights (J), body by body by the written-out motion: without any engine."""
+    """Kinetic energy and energy of the weights (J), summed over the bodies. Velocities come from the reference's
+    written-out motion, from no engine.
+    """
     total, motions = 0.0, SpatialReference(handling.vehicle).motions_of(q, v)
     for body in handling.vehicle.bodies:
         motion = motions[body.name]

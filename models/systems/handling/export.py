@@ -9,7 +9,7 @@ AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll 
 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
-    """The vehicle of the first manoeuvre in "mujoco" or "exudyn" without springs, tyres and driver."""
+    """Export the vehicle of the first manoeuvre to "mujoco" or "exudyn", without springs, tyres and driver."""
     handling = scene.car(next(iter(scene.manoeuvres)))
     return of_handling(
         engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]
@@ -19,6 +19,8 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
 def of_handling(
     engine: str, handling: Handling, export_subject: ExportSubject, further_omissions: list[str]
 ) -> Exported:
-    """A vehicle on a carrier; ``further_omissions`` says what else it leaves out."""
+    """Export a vehicle of the handling system; ``further_omissions`` lists what the model leaves out besides the
+    vehicle's own parts.
+    """
     left_out = [*parts_left_out(handling.vehicle), *further_omissions]
     return export_free_vehicle(engine, driven_by(handling), export_subject, left_out)

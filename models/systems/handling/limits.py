@@ -23,7 +23,7 @@ yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."
 
 
 def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
-    """Refuse a run whose car turns over or whose train jackknifes: the model does not hold from there on."""
+    """Refuse a run in which the car turns over or the train jackknifes, as the model is invalid from then on."""
     for body, freedoms, most, what in _bounds(h):
         columns = [
             i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
@@ -34,7 +34,9 @@ def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine:
 
 
 def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
-    """Turns of a body that have a largest angle (rad), and what it means to go beyond."""
+    """Limits of the bodies' rotations: the body, its rotational freedoms, the largest angle (rad), and what exceeding
+    it means.
+    """
     yield SWAY, ("rx", "ry"), UPRIGHT, f"the car turns over: it leans by more than {UPRIGHT} rad"
     for name in h.vehicle.towed:
         beside = f"by more than {{}} rad beside what tows it: {name!r}"
@@ -43,7 +45,9 @@ def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]
 
 
 def check_step(drive: "Drive", engine: str) -> None:
-    """Bristles that hold damp a wheel at C / u, u the speed of the tread: refuse a step that lets it swing up."""
+    """Refuse a step that is too long for the tyres: sticking bristles damp a wheel with C / u, u the speed of the
+    tread, and a longer step lets it swing up.
+    """
     h, times = drive.handling, drive.run.times
     step, force = float(times[1] - times[0]), np.hypot(drive["fx"], drive["fy"])
     for i, tyre in enumerate(h.vehicle.tyres):

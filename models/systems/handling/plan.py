@@ -20,7 +20,7 @@ def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: HandlingScene) -> tuple[Finding, ...]:
-    """Queries about the vehicle."""
+    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
     return plausible(scene.car(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
@@ -58,7 +58,9 @@ def describe(scene: HandlingScene) -> str:
 
 
 def _native_shares(handling: Handling) -> list[tuple[str, str]]:
-    """What of the springs is native in each engine, and why no more: heads and texts."""
+    """Lines, head and text, on the springs that each engine computes by native elements, and on why it does not compute
+    the others.
+    """
     divisions = {engine: divided(handling, engine) for engine in ENGINES}
     native = {engine: division.native for engine, division in divisions.items()}
     reasons = [

@@ -80,8 +80,9 @@ MOTION = {
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A run (times, positions, rates) and its reports: tyres (m, w, REPORTED) and ledgers (m, LEDGER) of ``forces``;
-    CPU seconds of the march."""
+    """A simulated drive. run : times, positions and rates; tyres (m, w, REPORTED) and ledger (m, LEDGER) : reports of
+    ``forces``; seconds : CPU time of the march.
+    """
 
     handling: Handling
     run: Trajectory
@@ -90,16 +91,18 @@ class Drive:
     seconds: float = 0.0
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """(m, w): a channel of REPORTS."""
+        """A channel (m, w) of REPORTS by its name, with a column for each tyre."""
         return self.tyres[:, :, REPORTS[channel][0]]
 
     @property
     def path(self) -> np.ndarray:
-        """(m, 3): x, y (m) of the chassis' place on the road, and yaw (rad)."""
+        """Path (m, 3) of the chassis on the road: x, y (m) and yaw (rad)."""
         return self.run.positions[:, :3]
 
     def velocity(self) -> np.ndarray:
-        """(m, 3): velocities ahead and to the left (m/s) below the chassis' centre, yaw rate (rad/s)."""
+        """Motion (m, 3) of the point below the chassis' centre: velocities forward and to the left (m/s), and yaw rate
+        (rad/s).
+        """
         yaw, rates = self.run.positions[:, 2], self.run.rates
         place = chassis_of(self.handling.given).position
         ahead = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * place[1]
@@ -107,36 +110,38 @@ class Drive:
         return np.column_stack([ahead, aside, rates[:, 2]])
 
     def lateral_acceleration(self) -> np.ndarray:
-        """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
+        """Acceleration (m,) in m/s^2 of the point below the chassis' centre, positive to the vehicle's left."""
         ahead, aside, turning = self.velocity().T
         return np.gradient(aside, self.run.times) + ahead * turning
 
     def motion(self) -> dict[str, np.ndarray]:
-        """(m,) of each channel of MOTION."""
+        """The channels (m,) of MOTION by name."""
         ahead, aside, turning = self.velocity().T
         return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
 
     def slip_angles(self) -> np.ndarray:
-        """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
+        """Slip angles (m, w) in rad: direction in which each wheel's contact moves relative to the wheel's plane,
+        positive to the right.
+        """
         return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
 
     def grip(self) -> np.ndarray:
-        """(m, w) N: mu N, the largest horizontal force of each tyre."""
+        """Largest horizontal force (m, w) of each tyre in N, mu N."""
         return self.handling.tyres.friction * self["load"]
 
     def friction_used(self) -> np.ndarray:
-        """(m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
+        """Utilised friction (m, w): horizontal force of each tyre divided by mu N, 0 in the air."""
         return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
 
     def power(self) -> np.ndarray:
-        """(m,) W: of all that the ledgers tell and of the tyres' creep forces."""
+        """Power (m,) in W of everything that the ledgers report and of the tyres' creep forces."""
         ledger = self.ledger
         power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
         return power + self["power"].sum(axis=1)
 
 
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
-    """A manoeuvre, the first where none is named, in "exudyn", "mujoco" or "reference"; its detail is the Drive.
+    """Run a manoeuvre, by default the first, in "exudyn", "mujoco" or "reference"; the result's detail is the Drive.
 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
@@ -151,7 +156,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
 
 
 def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
-    """A drive as the result of a scene's manoeuvre, which says what assumptions it breaks."""
+    """The result of a scene's manoeuvre from its drive, with the assumptions that the drive breaks."""
     vehicle = drive.handling.vehicle
     channels = {
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
@@ -172,7 +177,9 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
-    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
+    """The result with errors of its motion and of its tyres' forces, estimated by longer steps and by other grids of
+    the patch.
+    """
     rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
@@ -188,7 +195,9 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvreRerun:
-    """Reruns of a drive in an engine, from a speed (m/s), with other steps or another mesh of the tyre's patch."""
+    """Function that repeats a drive in an engine, from a speed (m/s), with other steps or another grid of the tyres'
+    patches.
+    """
 
     engine: str
     drive: Drive
@@ -201,7 +210,7 @@ class ManoeuvreRerun:
 
     @cached_property
     def in_double_step(self) -> Series:
-        """The manoeuvre in twice the step; raises RunFailed."""
+        """Series of the manoeuvre in twice the step; raises RunFailed."""
         return self._with_net(self.drive.handling.tyres.cells, 2.0)
 
     def _with_net(self, cells: int, factor: float) -> Series:
@@ -225,10 +234,10 @@ class ManoeuvreRerun:
         return principal(read_run(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
-        """Errors of the net, by a run in the same steps with a third of its cells.
+        """Errors of the patch's grid, estimated by a run in the same steps with a third of its cells.
 
-        A net's error does not fall evenly: how many times as large the difference of both runs is as the error, their
-        creep forces at the same states tell, beside those of a net with twice as many cells.
+        The error does not fall evenly with the number of cells. The ratio of the difference of both runs to the error
+        is estimated from creep forces at the same states, compared with those of a grid with twice as many cells.
         """
         cells = self.drive.handling.tyres.cells
         other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
@@ -247,7 +256,7 @@ class ManoeuvreRerun:
         return told
 
     def _creep(self, cells: int) -> np.ndarray:
-        """Creep forces (m, w, 2) in N at some states of the drive, by a net of so many cells."""
+        """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
         times, positions, rates = (
@@ -259,13 +268,13 @@ class ManoeuvreRerun:
 
 
 def principal(drive: Drive, start_time: float = 0.0) -> Series:
-    """Channels whose error is told, of a drive that begins at a time (s)."""
+    """Channels whose error is estimated, over the time of a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNITS, drive.velocity().T, strict=False))
     return Series(start_time + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
 
 
 def _later(handling: Handling, start_time: float) -> Handling:
-    """A copy of the manoeuvre that starts at a time (s)."""
+    """The same manoeuvre with time counted from ``start_time`` (s)."""
 
     def moved(control: Control) -> Control:
         return tuple((time - start_time, value) for time, value in control)
@@ -283,7 +292,7 @@ def _later(handling: Handling, start_time: float) -> Handling:
 
 
 def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
+    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
         return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
     division, whole = divided(handling, engine), driven_by(handling)
@@ -298,8 +307,9 @@ def _plain(handling: Handling) -> "PlainRolling":
 
 
 def driven_by(handling: Handling) -> Driven:
-    """The car as engines build it: the bodies, what acts along their coordinates, and the compiled forces with their
-    whole table."""
+    """The car as engines build it: its bodies, the elements along its coordinates, and the compiled forces with their
+    whole table.
+    """
     parts = joint_parts(handling.vehicle)
     return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
@@ -325,8 +335,9 @@ def driven_adaptively(engine: str, handling: Handling, speed: float, settings: S
 
 @contextmanager
 def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
-    """Report that a failed march failed because its car turned over: engines cannot integrate the motion that
-    follows."""
+    """Context in which a march fails with the message that the car turned over, where that is the reason: engines
+    cannot integrate the motion that follows.
+    """
     try:
         yield
     except RunFailed as error:
@@ -336,7 +347,9 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
 
 
 def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """``reported`` for a run with fixed steps; RunFailed where the steps are too long for the motion."""
+    """The drive from a run in fixed steps, as from ``reported``; RunFailed where the steps are too long for the
+    motion.
+    """
     drive = reported(handling, run, engine, seconds)
     check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
@@ -344,7 +357,9 @@ def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
 
 
 def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """Reports of a run; RunFailed where a tyre's force is not finite, or the car turns over."""
+    """The drive from a run, with the reports of its tyres; RunFailed where a tyre's force is not finite, or the car
+    turns over.
+    """
     report, ledger = _reports(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
@@ -353,7 +368,9 @@ def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: flo
 
 
 def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
-    """Tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; the reference has its own."""
+    """Reports of the tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; for the reference they come from its own
+    equations.
+    """
     if engine == REFERENCE:
         return _plain(handling).report(run.times, run.positions, run.rates)
     count, tyres = len(run.times), len(handling.vehicle.tyres)
@@ -368,7 +385,7 @@ def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarr
 
 
 def joint_travel(handling: Handling, element: JointElement, values: np.ndarray) -> np.ndarray:
-    """(m,) of the d of a joint element, or of its rate, by positions or rates (m, n)."""
+    """Displacement d (m,) of a joint element from positions (m, n), or its rate from rates."""
     places = handling.vehicle.coordinates()
     columns = [places.index(place) for place in element.coordinates]
     return np.asarray(values[..., columns] @ np.array(element.factors))

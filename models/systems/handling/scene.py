@@ -99,7 +99,7 @@ class Manoeuvre(Strict):
     rough: bool = Field(default=False, description="on the rough road of [road], else on a flat one")
 
     def controls(self) -> Controls:
-        """Steering and drive of the driver over time."""
+        """Steering, brakes and drive of the driver over time."""
         steer, brake, drive = (
             tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
         )
@@ -122,13 +122,13 @@ class HandlingScene(SceneFile):
     """Controls of the measured drives that were driven."""
 
     def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
-        """How an engine that picks its own steps marches a manoeuvre; None for Runge-Kutta 4."""
+        """Settings with which an engine marches a manoeuvre in steps that it picks itself; None for Runge-Kutta 4."""
         adaptive = self.engines.get(engine)
         duration = self.manoeuvres[manoeuvre].duration
         return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
     def handling(self, name: str) -> Handling:
-        """Vehicle, tyres, road and controls of one manoeuvre; a measured drive is marched for its torques, once."""
+        """Vehicle, tyres, road and controls of one manoeuvre. A measured drive is marched once, to find its torques."""
         car = self.car(name)
         if not self.manoeuvres[name].measured:
             return car
@@ -139,7 +139,7 @@ class HandlingScene(SceneFile):
         return car.changed(controls=self._along[name])
 
     def car(self, name: str) -> Handling:
-        """Vehicle, tyres and road of one manoeuvre, and its controls as far as the scene says them."""
+        """Vehicle, tyres and road of one manoeuvre, and those of its controls that the scene gives."""
         manoeuvre, road = self.manoeuvres[name], self.road
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
@@ -148,7 +148,7 @@ class HandlingScene(SceneFile):
         return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
 
     def drive(self, name: str) -> "MeasuredDrive":
-        """The measured drive of a manoeuvre, as long as the manoeuvre; InputError for a file that holds none."""
+        """The measured drive of a manoeuvre, cut to the manoeuvre's duration; InputError for a file that holds none."""
         from models.measured.drive import read_drive
 
         manoeuvre = self.manoeuvres[name]
@@ -160,11 +160,11 @@ class HandlingScene(SceneFile):
         return replace(read, **{key: getattr(read, key)[:count] for key in ("times", "steer", "speed")})
 
     def begins(self, name: str) -> float:
-        """Time (s) at which results of a manoeuvre begin: that of the measured file, or else 0."""
+        """Time (s) at which the results of a manoeuvre begin: the start of its measured file, or else 0."""
         return float(self.drive(name).times[0]) if self.manoeuvres[name].measured else 0.0
 
     def given(self) -> SpatialVehicle:
-        """The vehicle of the file with what it tows, its cornering stiffness as [tyres] says."""
+        """The vehicle of the file and the bodies that it tows, with its cornering stiffness scaled as in [tyres]."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file", towing=True)
         if not (ratios := self.tyres.cornering):
             return vehicle
@@ -190,7 +190,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
 
 
 def _with_measured(scene: HandlingScene) -> HandlingScene:
-    """The scene with speed and duration of its measured drives; refuses a manoeuvre that has no speed."""
+    """The scene with the speed and duration of each measured drive filled in; refuses a manoeuvre that has no speed."""
     filled = dict[str, Manoeuvre]()
     for name, manoeuvre in scene.manoeuvres.items():
         if manoeuvre.measured:
@@ -203,7 +203,7 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
 
 
 def _measured(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
-    """A measured drive with its speed and duration; refuses what contradicts the file."""
+    """A manoeuvre with the speed and duration of its measured drive; refuses keys that contradict the measured file."""
     file, place, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
     for control in LIMITS:
         if getattr(manoeuvre, control) != AT_REST:
@@ -230,7 +230,7 @@ def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None
 
 
 def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
-    """Refuse times that do not rise, values beyond the limits, and a change that no step of the run sees."""
+    """Refuse times that do not rise, values beyond the limits, and changes that are too fast for the run's step."""
     (times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")

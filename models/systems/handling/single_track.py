@@ -22,7 +22,7 @@ from models.vehicles.spatial import SpatialVehicle, hitch_of
 
 @dataclass(frozen=True)
 class SteadyTurn:
-    """Yaw rate (rad/s) and lateral velocity at the centre of mass of all (m/s) per rad of steer.
+    """Steady turn per rad of steer: yaw rate (rad/s), and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
     ``headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
@@ -35,7 +35,7 @@ class SteadyTurn:
 
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
-    """Closed form of the vehicle at a speed (m/s), at its static wheel loads."""
+    """Steady turn in closed form at a speed (m/s), for the static wheel loads."""
     free = handling.vehicle
     mass = sum(body.mass for body in free.bodies)
     centre = sum(body.mass * body.position[0] for body in free.bodies) / mass
@@ -62,8 +62,9 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
 
 
 def _balances(free: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
-    """(2 + towed,) each: how a side force on a body at x (m), and a moment about the vertical, enter the balances of
-    side forces, of moments about the centre, and of moments about the hitch of each body that is towed."""
+    """Coefficients (2 + towed,) with which a side force on a body at x (m), and a moment about the vertical, enter the
+    equilibrium: of side forces, of moments about the centre, and of moments about the hitch of each towed body.
+    """
     chain = free.chain(body)
     behind = np.array([float(name in chain) for name in free.towed])
     hitches = np.array([free.body(hitch_of(name)).position[0] for name in free.towed])

@@ -34,17 +34,18 @@ vertical speed (m/s) that a rough road may leave between the ends of a run."""
 
 
 def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
-    """Assumptions of a run that is held by a method, or goes over the road (ON_TYRES).
+    """Assumptions of a run whose roll and pitch ``method`` holds, or of one on its tyres over the road (ON_TYRES).
 
-    angles : as measured, beside which a run is judged; None to list only.
+    angles : measured angles that the run is compared with; None to list the assumptions only.
     """
     listed = _on_tyres(vehicle) if method == ON_TYRES else _on_forces(scene, vehicle, method, angles)
     return [*listed, *inside(vehicle, lambda run: travels(vehicle, run.detail), _SMOOTHER)]
 
 
 def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
-    """Assumptions on springs, mounts and bars without stops, whose travels (m, rad) are told by name: a travel_force is
-    one."""
+    """Assumptions that springs, mounts and bars without stops keep within usual travels. ``travel`` gives the travels
+    (m, rad) by name; a travel_force counts as a stop.
+    """
     kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
     listed = []
     for kind, of, unit, most in kinds:
@@ -59,7 +60,7 @@ def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str
 
 
 def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
-    """Assumptions on linear tyres on two tracks."""
+    """Assumptions of a vehicle on linear tyres that run along two tracks."""
     return [
         *_pressing(vehicle, PUSHES),
         Assumption(
@@ -86,7 +87,9 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
 
 
 def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
-    """Assumptions on tyres that may pull by so much (N) at their edge; nothing of those that only push."""
+    """Assumption that linear tyres never pull at the road by more than ``pull`` (N); none for tyres that can only
+    push.
+    """
     lifting = Assumption(
         "tyres press",
         "the linear tyres of the measurement stay on the road",
@@ -99,7 +102,7 @@ def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
 
 
 def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:
-    """Assumptions on a cut vehicle."""
+    """Assumptions of a cut vehicle that measured hub forces drive."""
     listed = [
         Assumption(
             "upright",
@@ -142,7 +145,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
 
 
 def _balanced(vehicle: CutVehicle) -> Assumption:
-    """Assumption that measured forces carry the vehicle."""
+    """Assumption that the measured vertical forces carry the vehicle's weight on average."""
     return Assumption(
         "balance",
         "over the run the vertical forces carry the weight",
@@ -159,13 +162,15 @@ def _balanced(vehicle: CutVehicle) -> Assumption:
 
 
 def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
-    """(1,): mean of the vertical forces (n,), N, by the weight, less what may have changed the vertical speed."""
+    """Ratio (1,) of the mean of vertical forces (n,), N, to the weight. A deviation from 1 is reduced by what a change
+    of the vertical speed could explain.
+    """
     excess = forces.mean() / vehicle.loads.sum() - 1.0
     return np.array([1.0 + np.sign(excess) * max(abs(excess) - RISING / (GRAVITY * duration), 0.0)])
 
 
 def _sampled(scene: HubScene, road: Road) -> Assumption:
-    """Assumption on the sampling of a virtual measurement."""
+    """Assumption that a virtual measurement samples fast enough for the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
     other = ' or use forces.interpolation = "smooth",' if rule != "smooth" else ""
@@ -180,7 +185,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
 
 
 def _angle_differences(run: Result, angles: Angles | None) -> Watched:
-    """Differences of roll and pitch from the measured angles."""
+    """Roll and pitch of the run less the measured angles, rad."""
     assert angles is not None
     times = angles.period * np.arange(len(angles.samples))
     return {
@@ -189,5 +194,5 @@ def _angle_differences(run: Result, angles: Angles | None) -> Watched:
 
 
 def _at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
-    """Forces (n,), N, along an axis of every hub, as they were put in."""
+    """Applied forces (n,), N, along one axis, by the name of the hub."""
     return {hub: run.detail.wrenches[:, i, axis] for i, hub in enumerate(vehicle.hubs)}

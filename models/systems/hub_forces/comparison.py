@@ -24,7 +24,7 @@ DRIFTED = 0.05
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measurement, its runs by their names, why others failed, and the true run, None where nobody knows it."""
+    """A measurement, its runs by name, reasons why other runs failed, and the true run, None where it is not known."""
 
     measurement: Measurement
     runs: dict[str, Result]
@@ -33,18 +33,18 @@ class Comparison:
 
     @property
     def beside(self) -> str:
-        """Text that names the run against which errors and damages are taken."""
+        """Text that names the run to which errors and damages refer."""
         return "the true run" if self.truth is not None else "the run with the filter; the true one is not known"
 
     @property
     def results(self) -> dict[str, Result]:
-        """The true run, where it is known, and all others, by their names."""
+        """All results by name: the true run, if it is known, and all other runs."""
         return {**({"true": self.truth} if self.truth else {}), **self.runs}
 
     def errors(self, run: Result) -> np.ndarray:
-        """Errors (m, 6) of roll, pitch, heading (rad), x, y, z (m) against the true run.
+        """Errors (m, 6) of a run relative to the true run: roll, pitch, heading (rad), x, y, z (m).
 
-        Where that is not known, those of roll and pitch against the filter's estimate, the others NaN.
+        Without a true run, errors of roll and pitch are relative to the filter's estimate, and the others NaN.
         """
         if self.truth is not None:
             return np.column_stack([run[name] - self.truth[name] for name in MOTION])
@@ -55,18 +55,22 @@ class Comparison:
         return off
 
     def damages(self, forces: np.ndarray) -> dict[str, float]:
-        """Damage of every element by section forces (m, e), divided by that of the true run, or of the filter's."""
+        """Damage of every element from section forces (m, e), divided by that in the true run or, without one, in the
+        filter's run.
+        """
         true = (self.truth or self.runs[FILTER])["section_force"]
         names = (element.name for element in self.measurement.vehicle.elements)
         return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
     def drift_off(self, run: Result) -> float:
-        """First time (s) at which roll or pitch is off by DRIFTED; infinite if never."""
+        """First time (s) at which the error of roll or pitch exceeds DRIFTED; infinite if it never does."""
         off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFTED
         return float(run.times[np.argmax(off)]) if off.any() else float("inf")
 
     def answer(self) -> dict[str, Any]:
-        """Per run: largest errors, rms of the stabiliser's moments, damage of every element; all against ``beside``."""
+        """For each run: largest errors, rms of the stabiliser's moments, damage of every element, all relative to the
+        run that ``beside`` names.
+        """
         out: dict[str, Any] = {"beside": self.beside}
         out |= {name: {"failed": text} for name, text in self.failed.items()}
         for name, run in self.runs.items():
@@ -78,7 +82,9 @@ class Comparison:
         return out
 
     def engines_apart(self) -> float:
-        """Largest difference of any coordinate or rate between the engines, before drift-off, of what several ran."""
+        """Largest difference between engines in any coordinate or rate before drift-off, for the method with the most
+        runs.
+        """
         kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHODS]
         alike = max(kinds, key=len)
         first, times = alike[0].detail.states, alike[0].times
@@ -87,7 +93,7 @@ class Comparison:
 
 
 def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Comparison:
-    """All runs: by the scene's own method in every engine, by the others in the last one, which is the fastest.
+    """Run the scene's own method in every engine, and the other methods in the last engine, which is the fastest.
 
     Raises RunFailed where even the filter cannot hold the vehicle, or where the step is too long for its springs.
     """
@@ -109,7 +115,7 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
 
 
 def _true_run(measurement: Measurement, engine: str) -> Result | None:
-    """The labelled run that gave a virtual measurement, with the error that was told of it."""
+    """The true run of a virtual measurement as a labelled result, with the errors that were estimated for it."""
     if measurement.truth is None:
         return None
     run = labelled(measurement, measurement.truth, engine)
@@ -117,7 +123,9 @@ def _true_run(measurement: Measurement, engine: str) -> Result | None:
 
 
 def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
-    """Method and engine of every run by its name; those of a stabiliser in the last engine need none beside theirs."""
+    """Method and engine of every run by its name. A stabiliser's run in the last engine has a name without the
+    engine.
+    """
     return {
         name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
         for name, method in METHODS.items()

@@ -12,14 +12,16 @@ AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose 
 
 
 def exported(scene: HubScene, engine: str) -> Exported:
-    """The cut vehicle in "mujoco" or "exudyn" without hub forces and stabiliser."""
+    """Export the cut vehicle to "mujoco" or "exudyn", without hub forces and stabiliser."""
     vehicle = scene.cut_vehicle()
     held = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
     return of_cut(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), held)
 
 
 def of_cut(engine: str, vehicle: CutVehicle, export_subject: ExportSubject, further_omissions: list[str]) -> Exported:
-    """A cut vehicle; ``further_omissions`` says what else it leaves out."""
+    """Export a cut vehicle; ``further_omissions`` lists what the model leaves out besides hub forces and some
+    elements.
+    """
     division = divide(vehicle.tree, vehicle.elements, engine)
     weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
     driven = Driven(vehicle.tree, weight, np.zeros(1), None, None, division.native)

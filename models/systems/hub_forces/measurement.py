@@ -15,7 +15,8 @@ from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
 @dataclass(frozen=True)
 class HubForces:
-    """Measured hub forces: samples (m, 6 h), N and N m hub by hub, the first at t = 0, ``period`` (s) apart.
+    """Measured hub forces. samples (m, 6 h) : N and N m hub by hub, the first at t = 0; period : time (s) between
+    samples.
 
     frame : "hub", axes of what carries the wheel; "body", of the chassis; "inertial", of the space. x forward, y
     left, z up; the force acts on the hub from outside, the moment about the hub.
@@ -26,7 +27,7 @@ class HubForces:
     frame: str
 
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
-        """Hub inputs at half steps."""
+        """Hub forces as a run's inputs, sampled at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
         return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
@@ -38,7 +39,9 @@ class HubForces:
 
 @dataclass(frozen=True)
 class Angles:
-    """Measured roll, pitch and their rates (m, 4), rad and rad/s, every ``period`` (s) from t = 0 on."""
+    """Measured angles. samples (m, 4) : roll, pitch (rad) and their rates (rad/s), the first at t = 0; period : time
+    (s) between samples.
+    """
 
     samples: np.ndarray
     period: float
@@ -52,7 +55,9 @@ class Angles:
 def two_tracks(
     vehicle: CutVehicle, left: RoadProfile, right: RoadProfile, speed: float, step: float, steps: int
 ) -> HubInputs:
-    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
+    """Heights and rates of the road under the wheels at half steps. The front axle is at s = v t, and axles behind it
+    reach the same place later.
+    """
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.uncut.axles)
     heights, rates = [], []
     for tyre in vehicle.uncut.tyres:
@@ -64,13 +69,14 @@ def two_tracks(
 
 
 def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step: float, duration: float) -> HubRun:
-    """The vehicle on its tyres, its hub forces in a frame."""
+    """Run the vehicle on its tyres; its hub forces are expressed in ``frame``."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
 
 def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
-    """Travel (m,) of every spring, mount and bar from the design position by name, m (rad of a bar), positive in
-    compression, along a run."""
+    """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
+    positive in compression.
+    """
     gauges = tuple(element.gauge() for element in vehicle.elements)
     still = HubInputs(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
@@ -94,5 +100,5 @@ def model(
     duration: float,
     interpolation: Interpolation = "linear",
 ) -> HubModel:
-    """The cut vehicle on measured hub forces, free."""
+    """Model of the cut vehicle under measured hub forces, without a stabiliser."""
     return build(engine, vehicle, forces.hub_inputs(step, round(duration / step), interpolation), step, duration)

@@ -51,7 +51,7 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: HubScene) -> tuple[Finding, ...]:
-    """Queries about the vehicle, and doubts about measured forces."""
+    """Doubts about implausible parameters of the vehicle, and about measured forces."""
     vehicle = scene.cut_vehicle()
     doubts = doubts_about_files(scene, vehicle) if scene.forces.file is not None else ()
     return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
@@ -95,7 +95,7 @@ def describe(scene: HubScene) -> str:
 
 
 def doubts(scene: HubScene) -> tuple[str, ...]:
-    """Objections of the Kalman filter to the measured files; a virtual measurement is not made for it."""
+    """The Kalman filter's objections to the measured files. A virtual measurement has none yet: it is not made here."""
     if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING):
         return ()
     from models.systems.hub_forces.run import Measurement
@@ -105,7 +105,7 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
 
 
 def _frames(vehicle: CutVehicle) -> str:
-    """Text on the bodies in whose axes the elements' axes are fixed."""
+    """Text that names the bodies to which the axes of the elements are fixed."""
     others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
     return "; ".join(["in the chassis' axes", *others])
 
@@ -126,7 +126,7 @@ def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
 
 
 def _noise(scene: HubScene) -> str:
-    """Text on the noise of every sample, stated of files or added to a virtual measurement."""
+    """Text on the noise of every sample: stated for files, or added to a virtual measurement."""
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
@@ -139,7 +139,7 @@ def _line(label: str, text: str) -> str:
 
 
 def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
-    """Doubts about the files of a scene; InputError for what cannot be, unless the scene accepts it."""
+    """Doubts about the measured files of a scene; InputError for impossible values that the scene does not accept."""
     from models.measured.checks import check
 
     findings = [
@@ -166,7 +166,7 @@ def _of_file(text: str) -> str:
 
 
 def _recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
-    """Both files as a recording; noise of angles is as the scene states."""
+    """Both measured files as a recording; the noise of the angles is the one that the scene states."""
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 

@@ -47,10 +47,10 @@ MOTION = {name: (column, "rad") for name, column in ANGLES.items()} | {"x": (X, 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measurement that drives the runs of a scene: hub forces and angles, and the true run (None) where both are
-    virtual.
+    """Measurement that drives the runs of a scene: hub forces and angles, and the true run, None where they come from
+    files.
 
-    errors : of the steps of the true run, where they were asked for.
+    errors : of the steps of the true run, where they were requested.
     """
 
     scene: HubScene
@@ -62,7 +62,7 @@ class Measurement:
 
     @cached_property
     def tilt(self) -> "Tilt":
-        """The Kalman filter's estimate; InputError where the measurement contradicts itself."""
+        """The Kalman filter's estimate of roll and pitch; InputError where the measurement contradicts itself."""
         from models.systems.hub_forces.tilt_filter import Deviations, estimate
 
         scene = self.scene
@@ -70,7 +70,7 @@ class Measurement:
         return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def hub_inputs(self, method: Method, step: float, steps: int) -> HubInputs:
-        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` guides roll and pitch.
+        """Measured inputs for a run of ``steps`` steps of ``step`` (s); ``method`` holds roll and pitch.
 
         Raises InputError.
         """
@@ -84,7 +84,9 @@ class Measurement:
         return free
 
     def start(self, hub_inputs: HubInputs) -> np.ndarray:
-        """Initial state (2 n,): at rest in the design position; an enforced tilt begins where its file does."""
+        """Initial state (2 n,): at rest in the design position; enforced roll and pitch begin with the values of their
+        file.
+        """
         n = self.vehicle.size
         start = np.zeros(2 * n)
         if hub_inputs.guide is not None and hub_inputs.pull is None:
@@ -93,13 +95,13 @@ class Measurement:
 
 
 def enforced(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
-    """Hub inputs with measured angles enforced, once through a low-pass of ``smoothing`` (Hz); raises InputError."""
+    """Hub inputs with measured roll and pitch enforced, after a low-pass of ``smoothing`` (Hz); raises InputError."""
     quiet = smoothed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
     return with_angles(hub_inputs, quiet, angles.period, step)
 
 
 def with_angles(hub_inputs: HubInputs, angles: np.ndarray, period: float, step: float) -> HubInputs:
-    """The hub inputs with roll and pitch (m, 2), rad, enforced: a quintic spline through the samples."""
+    """Hub inputs with enforced roll and pitch (m, 2), rad, interpolated by a quintic spline through the samples."""
     motion = Smooth(angles, period, derivatives=2, degree=5)
     return replace(hub_inputs, guide=motion.sample(0.0, step / 2, len(hub_inputs.hubs)))
 
@@ -125,9 +127,10 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
 def on_road(
     vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, Settings, Route], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
-    """The vehicle on its tyres over a road, its hub forces in a frame; and errors of the run, where they are asked for.
+    """Run the vehicle on its tyres over a road. Returns the run, with hub forces in a frame, and its errors if they are
+    requested.
 
-    march : engine, its integrator with step and duration, and whose the forces of springs are.
+    march : engine, its integrator with step and duration, and the route by which the springs' forces are computed.
     """
     engine, settings, kind = march
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
@@ -149,8 +152,9 @@ def errors_of_steps(
 ) -> tuple[dict[str, Estimate], str]:
     """Estimated errors of the channels that ``principal`` lists, by name, and the method of the estimate.
 
-    hub_inputs : inputs for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
-    divide it, or they would take the samples' noise for motion; forces : whose those of springs are.
+    hub_inputs : function of a step (s) and a number of steps; period : of its samples (s), 0 for none: longer steps
+    must divide it, or they would take the samples' noise for motion; forces : route by which the springs' are
+    computed.
     """
     step, steps = float(run.times[1]), len(run.times) - 1
 
@@ -178,13 +182,15 @@ def errors_of_steps(
 
 
 def principal(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
-    """Channels whose error is told, of a run that begins at a time (s): forces of all elements, roll and pitch."""
+    """Channels whose error is estimated, over the time of a run that begins at ``start_time`` (s): forces of all
+    elements, roll and pitch.
+    """
     channels = {element.name: run.elements[:, i] for i, element in enumerate(vehicle.elements)}
     return Series(start_time + run.times, channels | {"roll": run.states[:, ROLL], "pitch": run.states[:, PITCH]})
 
 
 def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Channels whose values are more than a small share of the largest channel's in the same unit."""
+    """Channels that vary by more than a small share of the variation of the largest channel with the same unit."""
     change = {name: float(np.std(values)) for name, values in channels.items()}
     most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
     largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)
@@ -203,7 +209,8 @@ def run(
     measurement: Measurement | None = None,
     error: bool = False,
 ) -> Result:
-    """The cut vehicle on its hub forces; the result's detail is the HubRun. Raises InputError, Refused, RunFailed.
+    """Run the cut vehicle under its hub forces; the result's detail is the HubRun. Raises InputError, Refused,
+    RunFailed.
 
     method : what holds roll and pitch, the scene's own where none is named; measurement : of the scene, where it was
     made before, as for runs in several engines; else this engine makes it. error : whether the error of the steps is
@@ -233,7 +240,9 @@ def run(
 def labelled(
     measurement: Measurement, path: HubRun, engine: str, method: str = ON_TYRES, seconds: float = 0.0
 ) -> Result:
-    """A run of the measurement's vehicle: motion of its chassis, section forces, moments that hold roll and pitch."""
+    """The result of a run of the measurement's vehicle: chassis motion, section forces, and the moments that hold roll
+    and pitch.
+    """
     channels = {name: Channel("time", path.states[:, column], unit) for name, (column, unit) in MOTION.items()}
     channels |= {
         "section_force": Channel(("time", "element"), path.elements, "N", "compression; of bars a moment, N m"),

@@ -117,18 +117,20 @@ class HubScene(SceneFile):
 
     @property
     def steps(self) -> int:
-        """Steps of every run."""
+        """Number of steps in every run."""
         return round(self.run.duration / self.run.step)
 
     def settings(self, engine: str) -> Settings:
-        """How an engine marches: by Runge-Kutta 4, or by an integrator that picks its own steps."""
+        """Settings of an engine's march: Runge-Kutta 4, or an integrator that picks its own steps."""
         step, duration, adaptive = self.run.step, self.run.duration, self.engines.get(engine)
         if adaptive is None:
             return Settings(FIXED, step, duration)
         return Settings(adaptive.integrator, step, duration, adaptive.tolerance)
 
     def forces_with(self, method: Method) -> Route:
-        """Route springs a run has: an enforced tilt needs all forces in one place, whatever the scene says."""
+        """Route by which a run computes spring forces. Enforced roll and pitch need compiled forces, whatever the scene
+        says.
+        """
         return "compiled" if method == "prescribed" else self.run.forces
 
     def cut_vehicle(self) -> CutVehicle:
@@ -137,7 +139,7 @@ class HubScene(SceneFile):
         return cut(extended(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
-        """Standard deviations (6 h,) of the samples, N and N m."""
+        """Standard deviations (6 h,) of the noise on each sample of hub forces, N and N m."""
         return np.tile(np.repeat([self.forces.force_deviation, self.forces.moment_deviation], 3), len(vehicle.hubs))
 
     def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:

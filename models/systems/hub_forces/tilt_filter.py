@@ -39,8 +39,10 @@ REMEDY = "check signs, units, order of the hubs and frame, or state larger devia
 
 @dataclass(frozen=True)
 class Tilt:
-    """Estimated roll, pitch and rates (m, 4), their standard deviations, and the mean of the normalised innovation
-    squared per measured value: 1 where the stated deviations are right. doubts : what contradicts the measurement."""
+    """Output of the tilt filter. states (m, 4) : estimated roll, pitch and their rates; deviations : their standard
+    deviations; surprise : mean of the normalised innovation squared per measured value, 1 where the stated deviations
+    are right; doubts : objections to the measurement.
+    """
 
     states: np.ndarray
     deviations: np.ndarray
@@ -51,9 +53,10 @@ class Tilt:
 
 @dataclass
 class FilterState:
-    """State of the tilt filter after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
-    squared and their count, the squares (2, 2) of unexplained and of whole rates of roll and pitch, and the sums (5, 4)
-    of innovations that ``tilt_march.march`` keeps."""
+    """State of the tilt filter after a sample. x (4,) : estimate; p (4, 4) : its covariance; surprise : sum and count
+    of the normalised innovations squared; rates (2, 2) : sums of the variances of the unexplained and of the measured
+    rates of roll and pitch; sums (5, 4) : of innovations, as ``tilt_march.march`` keeps them.
+    """
 
     x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))
     p: np.ndarray = field(default_factory=lambda: np.full((4, 4), np.nan))
@@ -64,8 +67,9 @@ class FilterState:
 
 @dataclass(frozen=True)
 class Deviations:
-    """Stated standard deviations: forces (6 h,), N and N m, of each sample; angles, rad, and rad/s of their rates;
-    model, rad/s^2, of the acceleration of a rigid vehicle."""
+    """Stated standard deviations. forces (6 h,) : of each sample, N and N m; angles : of the angles (rad) and of their
+    rates (rad/s); model : of the acceleration that a rigid vehicle does not have (rad/s^2).
+    """
 
     forces: np.ndarray
     angles: tuple[float, float]
@@ -73,7 +77,9 @@ class Deviations:
 
 
 class TiltFilter:
-    """Filters angles sampled with the forces, every ``period`` (s), block by block."""
+    """Kalman filter of roll and pitch, whose angles are sampled with the forces, every ``period`` (s). Works block by
+    block.
+    """
 
     def __init__(self, vehicle: CutVehicle, frame: str, period: float, deviations: Deviations, file: str = "") -> None:
         _check(frame, period, deviations)
@@ -86,7 +92,8 @@ class TiltFilter:
         self.state = FilterState()
 
     def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Estimates (n, 4) and deviations at samples of hub forces (n, 6 h) and angles (n, 4), NaN where not measured.
+        """Estimates (n, 4) and their standard deviations at samples of hub forces (n, 6 h) and angles (n, 4), which are
+        NaN where not measured.
 
         The first sample is the last one of the block before. Raises InputError where angles and forces contradict
         one another, or are infinite.
@@ -120,8 +127,8 @@ class TiltFilter:
     def biases(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
 
-        The springs of the vehicle, which the filter takes for noise, make innovations that hang together: by their
-        correlation with the one before as many fewer are independent.
+        The springs of the vehicle, which the filter takes for noise, make successive innovations correlated. The number
+        of independent ones is reduced according to the correlation of each innovation with the one before.
         """
         count, total, squares, products, _ = self.state.sums
         number = np.maximum(count, 1.0)
@@ -130,8 +137,9 @@ class TiltFilter:
         return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
 
     def doubts(self) -> tuple[str, ...]:
-        """Objections to the measurement by the filter's innovations: too large, or with a mean; an angle that is wrong
-        by a constant leaves no trace in them."""
+        """Objections to the measurement because innovations are too large or have a mean. A constant error of an angle
+        leaves no trace in them.
+        """
         large = (
             f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
             f"to {SURPRISED:g} is not said): {REMEDY}"
@@ -146,7 +154,7 @@ class TiltFilter:
         return (*([large] if self.surprise > SURPRISED else []), *biased)
 
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
-        """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
+        """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
 
         A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
         stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
@@ -171,7 +179,9 @@ class TiltFilter:
 
 
 def _check(frame: str, period: float, deviations: Deviations) -> None:
-    """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
+    """Refuse an unknown frame, and periods and deviations that are not above 0 and finite: no value is without
+    error.
+    """
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
     told = {"period": (period,), "angle_deviations": deviations.angles, "model": (deviations.model,)}
@@ -181,7 +191,9 @@ def _check(frame: str, period: float, deviations: Deviations) -> None:
 
 
 def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
-    """Refuse forces that are no numbers, and infinite angles; an angle of NaN was not measured."""
+    """Refuse forces that are not finite, and infinite angles. NaN is allowed: it marks an angle that was not
+    measured.
+    """
     for name, wrong in (("forces", ~np.isfinite(wrenches)), ("angles", np.isinf(angles))):
         if wrong.any():
             row = int(np.flatnonzero(wrong.any(axis=1))[0])
@@ -189,7 +201,7 @@ def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
 
 
 def _level_line(values: np.ndarray) -> np.ndarray:
-    """Values (n, k) without their straight lines."""
+    """Values (n, k) without the linear trend of each column."""
     line = np.linspace(-1.0, 1.0, len(values))
     return values - np.outer(line, line @ values / (line @ line))
 
@@ -208,7 +220,7 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
 
 
 def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Wrenches (m, 6 h) of the space in axes that roll and pitch by angles (m, 2 and more), rad."""
+    """Wrenches (m, 6 h) turned from the axes of space into axes that roll and pitch by angles (m, 2 or more), rad."""
     (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
     turned = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
     return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), turned).reshape(wrenches.shape)
@@ -217,7 +229,9 @@ def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
 def pulled(
     hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
 ) -> HubInputs:
-    """Hub inputs with moments towards the estimate: wc = 2 pi ``bandwidth`` (Hz), damping ``ratio``, rigid inertia."""
+    """Hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as a spring and damper:
+    natural angular frequency 2 pi times ``bandwidth`` (Hz), damping ratio ``ratio``, inertia of the rigid vehicle.
+    """
     rows, corner = len(hub_inputs.hubs), 2 * math.pi * bandwidth
     wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)
     roll, pitch, _ = np.diag(rigid(vehicle).inertia)

@@ -8,8 +8,9 @@ from models.machine.compiled import njit
 
 
 class Noise(NamedTuple):
-    """Noise settings of the tilt filter: dt (s), a step; process (4, 4), what the covariance gains in it; variances
-    (4,) of measured values."""
+    """Noise settings of the tilt filter: step dt (s); process noise (4, 4), which the covariance gains in a step;
+    variances (4,) of the measured values.
+    """
 
     dt: float
     process: np.ndarray
@@ -18,7 +19,8 @@ class Noise(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def march(x, p, turning, measured, noise, sums, kept):
-    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0, both left at the last.
+    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0; both are overwritten by
+    those at the last sample.
 
     turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was. Adds to sums (5, 4), of
     every value's normalised innovations: how many, their sum, that of their squares, that of their products with the
@@ -53,10 +55,11 @@ def march(x, p, turning, measured, noise, sums, kept):
 
 @njit(cache=True, error_model="numpy")
 def _learn(p, gain, j, variance, kept):
-    """Covariance after value j, in Joseph's form: what is subtracted from itself might leave less than nothing.
+    """Update the covariance with value j in Joseph's form, which no rounding makes negative.
 
-    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation. What the value's own error
-    leaves in another state, gain^2 variance, is left there even where rounding is larger than that.
+    kept : ratio of the value's variance to the innovation's, which is 1 - gain[j] computed without cancellation. The
+    variance gain^2 variance that the value's own error causes in another state is the least that remains there, even
+    where rounding is larger.
     """
     for m in range(4):
         before = p[j, m]
@@ -78,7 +81,9 @@ def _learn(p, gain, j, variance, kept):
 
 @njit(cache=True, error_model="numpy")
 def _predict(x, p, turning, noise):
-    """One step of angles by their rates and of rates by an acceleration."""
+    """Predict one step: the angles change by their rates, the rates by an acceleration, and the covariance
+    accordingly.
+    """
     dt = noise.dt
     for k in range(2):
         x[k] += dt * (x[2 + k] + 0.5 * dt * turning[k])

@@ -21,9 +21,10 @@ PULL = 0.2
 def assumptions(
     scene: MeasuredScene, vehicle: CutVehicle | None, examination: "Examination | None" = None
 ) -> list[Assumption]:
-    """Assumptions of the run whose forces are handed on; exam : of it, None to list only.
+    """Assumptions of the run whose section forces are handed on; examination : of this run, None to list the
+    assumptions only.
 
-    Of the pitch plane (vehicle None) its own system says the rest.
+    The pitch plane (vehicle None) has further assumptions, which its own system lists.
     """
     return [_in_range(examination), *([] if vehicle is None else _in_space(scene, vehicle, examination))]
 
@@ -32,7 +33,7 @@ def _in_range(examination: "Examination | None") -> Assumption:
     """Assumption that transducers stay within their ranges."""
 
     def clipped() -> Watched:
-        """Share of samples at an extreme where they pile up, of every channel that is put in."""
+        """Share of the samples that pile up at an extreme value, for every channel that drives the run."""
         assert examination is not None
         values = {
             s.name: examination.recording.samples(s) for s in examination.recording.signals if examination.put_in(s)
@@ -50,7 +51,7 @@ def _in_range(examination: "Examination | None") -> Assumption:
 
 
 def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
-    """Assumptions on a cut vehicle, by the answers of its run."""
+    """Assumptions of a cut vehicle, judged by the channels that its run computes."""
 
     def read(name: str) -> np.ndarray:
         assert examination is not None and examination.outcome is not None
@@ -109,7 +110,9 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
 
 
 def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examination | None") -> list[Assumption]:
-    """Assumptions on a free run on forces that keep their directions, where roll or pitch were measured."""
+    """Assumption that a free run has the measured roll and pitch, where forces keep their directions in space and roll
+    or pitch were measured.
+    """
     if scene.stabilise.method != "none" or examination is None:
         return []
     frames = {s.frame for s in examination.recording.signals if s.at in vehicle.hubs and examination.put_in(s)}

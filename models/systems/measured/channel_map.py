@@ -19,7 +19,7 @@ AXES: dict[Quantity, tuple[str, ...]] = {
 
 
 def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
-    """Signals in the order of the scene; ``sources`` are its files, opened, in theirs.
+    """Signals in the order of the scene; ``sources`` are the scene's opened files, in the scene's order.
 
     What is measured at a connector, and any strain, is only compared with. Raises InputError at the first channel that
     is not in its file, is there or in the map twice, or whose unit, place, component or frame makes no sense.
@@ -70,7 +70,7 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
 
 
 def find(source: Source, name: str, file: str, place: str) -> Channel:
-    """The one channel of a file with this name; InputError that offers the nearest ones."""
+    """The channel of a file with this name; InputError, with the most similar names, if there is not exactly one."""
     alike = [channel for channel in source.channels if channel.name == name]
     if len(alike) == 1:
         return alike[0]
@@ -83,7 +83,7 @@ def find(source: Source, name: str, file: str, place: str) -> Channel:
 
 
 def _similar_channels(name: str, source: Source) -> str:
-    """Phrase with the channels of a file that are most like a name, or else the first ones."""
+    """Text with the channels of a file whose names are most similar to ``name``, or else with its first channels."""
     plain = {channel.name.casefold(): channel.name for channel in source.channels}
     close = [plain[each] for each in get_close_matches(name.casefold(), plain, n=3, cutoff=0.6)]
     if close:
@@ -93,7 +93,7 @@ def _similar_channels(name: str, source: Source) -> str:
 
 
 def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> None:
-    """Refuse what is not a place for this quantity, and a component that it does not have there."""
+    """Refuse a place where the quantity cannot be measured, and a component that the quantity does not have there."""
     kinds = places.of(row.quantity)
     every = tuple(name for names in kinds.values() for name in names)
     if kinds and row.at not in every:

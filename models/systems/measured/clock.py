@@ -39,7 +39,7 @@ FAST = 60e3
 
 @dataclass(frozen=True)
 class ClockGroup:
-    """Mapped signals of one group of one file, with their timing on the common time.
+    """Mapped signals of one group of channels in a file, with their sample times on the recording's common time.
 
     The file's clock was slowed down by its drift, and its shift added.
     """
@@ -50,18 +50,18 @@ class ClockGroup:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Channels, in the file's words."""
+        """Names of the channels as the file has them."""
         return tuple(signal.channel for signal in self.signals)
 
     def si(self, values: np.ndarray) -> np.ndarray:
-        """Values (n, signals) of the file in SI."""
+        """Values (n, signals) of the file, converted to SI units."""
         zeros, factors = np.array([(signal.zero, signal.sign * signal.factor) for signal in self.signals]).T
         return (values - zeros) * factors
 
 
 @dataclass(frozen=True)
 class ClockGrid:
-    """Times start + i period, i < count, s of the common time."""
+    """Equally spaced sample times start + i period, i < count, in s of the common time."""
 
     start: float
     period: float
@@ -73,7 +73,7 @@ class ClockGrid:
         return self.start + self.period * np.arange(self.count)
 
     def places(self, times: np.ndarray) -> np.ndarray:
-        """Nearest index of each time, which may lie outside."""
+        """Index of the sample nearest to each time; it may lie outside the recording."""
         return np.rint((times - self.start) / self.period).astype(np.int64)
 
 
@@ -85,7 +85,8 @@ def record(
     folder: Path,
     progress: Progress = no_progress,
 ) -> Recording:
-    """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
+    """Bring mapped signals of opened files onto one clock, store them as columns in ``folder``, and apply the scene's
+    effects.
 
     hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
     Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
@@ -119,7 +120,9 @@ def record(
 
 
 def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
-    """Moments about points above or below hubs, brought to the hubs: (Mx - r Fy, My + r Fx) of a point r above."""
+    """Convert moments that were measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r
+    Fx) for a point r above.
+    """
     for hub, lever in scene.levers.items():
         of_component = {(s.quantity, s.component): s.name for s in signals if s.at == hub and not s.check}
         for axis, across, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
@@ -145,7 +148,7 @@ def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Fi
 
 
 def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
-    """Shift of each file's times (s), the date at which the common time is 0, and findings on both."""
+    """Shift (s) of each file's times, the date at which the common time is 0, and findings on both."""
     offsets = [file.offset for file in scene.files]
     known = [source.start for source in sources if source.start is not None]
     if len(known) == len(sources):
@@ -159,7 +162,7 @@ def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[f
 
 
 def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
-    """Groups of a file of which any channel is mapped."""
+    """Groups of a file that have mapped channels, with their times shifted to the common time."""
     of = {channel.name: channel.group for channel in source.channels}
     mapped = dict[int, list[Signal]]()
     for signal in (signal for signal in signals if signal.file == source.path.name):
@@ -173,7 +176,7 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
 
 
 def _of_group(group: ClockGroup) -> Iterator[Finding]:
-    """Findings on the times of a group, and on whether they seem to be in another unit."""
+    """Findings on the times of a group, for example that these seem to be in another unit."""
     yield from group.timing.findings
     clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
     slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)
@@ -192,7 +195,9 @@ def _of_group(group: ClockGroup) -> Iterator[Finding]:
 
 
 def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
-    """Times of the recording; InputError for a clock that the wheel forces do not bear out."""
+    """Sample times of the recording. InputError where the wheel forces do not overlap in time, or do not allow the
+    settings of [clock].
+    """
     settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
     fastest = min(timings, key=lambda timing: timing.period)
     period = 1.0 / settings.rate if settings.rate else fastest.period
@@ -218,7 +223,7 @@ def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
 
 
 def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> Iterator[Finding]:
-    """Say, or refuse, that a group does not cover the recording."""
+    """Report, or refuse, that a group has no data in part of the recording's time."""
     begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
     late, early = begin - grid.start, end - group.timing.end
     place = f"{name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
@@ -237,7 +242,9 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
 def _columns(
     folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
 ) -> Columns:
-    """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
+    """Columns of this recording, new or begun earlier from the same files; InputError where the folder holds other
+    ones.
+    """
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
     now = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}
@@ -249,7 +256,7 @@ def _columns(
 
 
 def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
-    """Whether the samples of a group are those of the clock."""
+    """Whether a group was sampled at the recording's own sample times."""
     clock = group.timing
     at = grid.places(clock.times)
     inside = (at >= 0) & (at < grid.count)
@@ -262,11 +269,13 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
 
 
 def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
-    """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
+    """Write samples that are on the clock already into the columns, block by block, NaN in gaps; returns findings on
+    absurd values.
+    """
     names, done, absurd = tuple(signal.name for signal in group.signals), 0, list[Finding]()
 
     def put(last_index: int, indices: np.ndarray, si: np.ndarray) -> None:
-        """Samples up to ``last_index``, those at these places as they are."""
+        """Write the samples up to ``last_index``: values ``si`` at ``indices``, NaN at the others."""
         for first in range(done, last_index, BLOCK):
             here = (indices >= first) & (indices < min(first + BLOCK, last_index))
             values = np.full((min(BLOCK, last_index - first), len(names)), np.nan)
@@ -290,8 +299,9 @@ def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) 
 
 
 def _resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
-    """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
-    absurd."""
+    """Bring samples of another clock onto this one: copy them to a file, then interpolate one signal after another.
+    Returns findings on absurd values.
+    """
     clock, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
     raw = Columns(folder / RAW, group.names, count)

@@ -42,8 +42,10 @@ Run = Callable[[Recording, Path], SectionOutcome]
 
 @dataclass(frozen=True)
 class Consequence:
-    """The section that a finding changes most: rms of the change divided by that of the force, and damage as recorded
-    divided by that with the finding put right; NaN and no section where it cannot be told."""
+    """Effect of a finding on the section force that it changes most. force : rms of the change divided by the rms of
+    the force; damage : damage as recorded divided by damage with the finding corrected; NaN, and no section, where
+    unknown.
+    """
 
     finding: Finding
     section: str = ""
@@ -52,7 +54,7 @@ class Consequence:
 
     @property
     def grade(self) -> int:
-        """0 harmless, 1 a doubt or not known, 2 beyond what may be accepted."""
+        """Grade of the consequence: 0 harmless, 1 doubtful or unknown, 2 not acceptable."""
         if not self.section:
             return 1
         return max(
@@ -71,7 +73,9 @@ class Consequence:
 def consequences(
     findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[SectionChannel], folder: Path
 ) -> tuple[Consequence, ...]:
-    """One for every doubt; run : makes a run of a recording in a folder; answers : the section forces that count."""
+    """A consequence for every doubt. run : function that simulates a recording in a folder; answers : section forces
+    that are compared.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     known = dict[int, SectionOutcome]()
 
@@ -99,7 +103,7 @@ def consequences(
 
 
 def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
-    """The verdict on a run that is accepted but for what its findings do."""
+    """The verdict on an otherwise accepted run, lowered if its findings change the section forces too much."""
     worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
@@ -109,7 +113,9 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
 
 
 def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
-    """A text each; where more than LISTED_FINDINGS are of one check only the worst, which says of how many."""
+    """A text for each consequence. Of more than LISTED_FINDINGS by the same check only the worst is described, with
+    their number.
+    """
     kinds: dict[str, list[Consequence]] = {}
     for consequence in consequences:
         kinds.setdefault(consequence.finding.check, []).append(consequence)
@@ -121,14 +127,14 @@ def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
 
 
 def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
-    """Doubts, those of the same check about the same channels once; what a filter says follows from all others."""
+    """The doubts, each check about the same channels once."""
     doubts = [finding for finding in findings if finding.weight == "doubt"]
     first = {(finding.check, finding.signals or finding.place): finding for finding in reversed(doubts)}
     return list(reversed(first.values()))
 
 
 def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
-    """First sample and number of samples that are run."""
+    """First sample and number of samples that are run to judge a finding."""
     count = min(recording.count, round(LONGEST / recording.period) + 1)
     middle = finding.times[0] if finding.times else 0.0
     first = min(max(round((middle - LONGEST / 2) / recording.period), 0), recording.count - count)
@@ -136,7 +142,7 @@ def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
 
 
 def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -> Recording:
-    """A recording of these samples."""
+    """Write samples into columns in ``folder``, and return these as a recording."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))
     columns = Columns(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
@@ -147,7 +153,7 @@ def samples_as_recording(recording: Recording, samples: Samples, folder: Path) -
 def _most_changed_force(
     finding: Finding, recorded: SectionOutcome, right: SectionOutcome, answers: Sequence[SectionChannel]
 ) -> Consequence:
-    """The section force that differs most, of those that carry anything."""
+    """Consequence for the section force that changes most, among those that are not negligibly small."""
     first = min(round(SETTLING / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
     size = {a: rms(measured - measured.mean()) for a, (_, measured) in pairs.items()}
@@ -161,14 +167,14 @@ def _most_changed_force(
 
 
 def _read_later(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Channels read later by a delay, or by the drift of a clock since the start."""
+    """Samples of the channels read later: by a constant delay, or by a clock's drift, which grows from the start on."""
     size, count = finding.size or 0.0, len(next(iter(samples.values())))
     later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
     return {s: _read_at(samples[s], later) for s in signals}
 
 
 def _read_at(values: np.ndarray, samples_later: np.ndarray) -> np.ndarray:
-    """Values (n,) read so many samples (n,) later, by a cubic spline; NaN where one beside it is not known."""
+    """Values (n,) read later by ``samples_later`` (n,) samples, with a cubic spline; NaN next to an unknown value."""
     from scipy.interpolate import make_interp_spline
 
     known, places = np.isfinite(values), np.arange(len(values))
@@ -216,7 +222,7 @@ def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Sample
 
 
 def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Gaps bridged as they are for the run, off by a standard deviation, one gap upwards, the next one downwards."""
+    """Samples with gaps bridged as for the run, plus or minus the bridge's standard deviation, gap by gap in turn."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):

@@ -23,7 +23,8 @@ SHARE, LONGEST = 0.2, 30.0
 def errors_of_steps(
     job: SectionRun, outcome: SectionOutcome, before: dict[str, Estimate], folder: Path
 ) -> dict[str, Estimate]:
-    """Errors by the answer's name of what springs, mounts and bars carry, and of roll and pitch.
+    """Errors that the steps cause, by the name of the channel: of the forces of springs, mounts and bars, and of roll
+    and pitch.
 
     before : errors of the virtual measurement by the element's name, which come on top. Raises RunFailed where the
     stretch, which begins at rest in the middle of the recording, does not end.
@@ -50,9 +51,9 @@ def errors_of_steps(
 
 
 def _principal(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
-    """Answers whose error is told, and the elements that they are of, none of angles; not of what hardly moves.
+    """Channels whose error is estimated, each with its element ("" for an angle), without channels that hardly move.
 
-    After a virtual measurement angles are not told: moments that are measured wrong add up in them.
+    After a virtual measurement roll and pitch are left out: errors of measured moments accumulate in them.
     """
     elements = {element.name: element.unit for element in job.vehicle.elements}
     names = {a.name: a.section for a in outcome.answers if a.section in elements and a.unit == elements[a.section]}

@@ -7,7 +7,7 @@ from models.systems.measured.scene import MeasuredScene
 
 
 def exported(scene: MeasuredScene, engine: str) -> Exported:
-    """The cut vehicle; InputError for the pitch plane, which scenes of its own have."""
+    """Export the cut vehicle; InputError for the pitch plane, which a scene of that system exports."""
     vehicle = scene.rig().vehicle
     if vehicle is None:
         allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"

@@ -31,7 +31,8 @@ def hand_on(
     start: datetime | None = None,
     comment: str = "",
 ) -> list[Path]:
-    """Write forces and moments of a run, or the answers named, as ``section_forces.EXT`` for every extension.
+    """Write forces and moments of a run, or only the channels ``answers``, to a file ``section_forces.EXT`` for every
+    format.
 
     Names, units and comments (axes and signs) go along, block by block. Returns the paths; raises InputError where a
     file exists or a format has no room for a name.
@@ -55,14 +56,14 @@ def hand_on(
 
 
 def forces(answers: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
-    """The answers that are section forces and moments."""
+    """The channels that are section forces and moments."""
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 
 def labelled(
     scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, Counted], folder: Path, **more: Any
 ) -> Result:
-    """The result of a run, whose columns lie in ``folder``; where there is none, what is said of it alone.
+    """The result of a run whose columns lie in ``folder``. Without an outcome it has attributes only.
 
     It has the answers over time, where they are no more than a block, and figures of the section forces that were
     counted; ``more`` as of ``models.core.result.result``.

@@ -16,7 +16,9 @@ NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "an
 
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHold]:
-    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
+    """For each run by name, the way in which roll and pitch are held: free, and by the stabiliser that the scene
+    names.
+    """
     stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
     held = {
         stabilised.method: AttitudeHold(
@@ -27,7 +29,9 @@ def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHo
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
-    """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
+    """Standard deviations of the noise (SI, by key): as stated, else as estimated but at least those of usual
+    transducers, since filters hide noise.
+    """
     deviations = dict[str, float]()
     for key, quantity in NOISE.items():
         sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])

@@ -41,28 +41,28 @@ class StepGrid:
 
     @property
     def part(self) -> Fraction:
-        """Half a step by a sampling period."""
+        """Ratio of half a step to the sampling period."""
         return Fraction(self.step / (2 * self.period)).limit_denominator(1000)
 
     @property
     def every(self) -> int:
-        """Steps from an answer to the next."""
+        """Number of steps from one output sample to the next."""
         return max(round(self.period / self.step), 1)
 
     @property
     def skip(self) -> int:
-        """Samples from an answer to the next."""
+        """Number of samples of the recording from one output sample to the next."""
         return max(round(self.step / self.period), 1)
 
     def check(self, file: str = "") -> None:
-        """InputError unless step and period are multiples of one another."""
+        """Raise InputError unless one of step and period is a multiple of the other."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
             fitting = f"must be a part or a multiple of the recording's period of {self.period:g} s"
             raise InputError(file, "run.step", self.step, fitting)
 
     def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
-        """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), on straight lines."""
+        """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), by linear interpolation."""
         return interpolate(samples, *self._samples_before(count))
 
     def cubic(self, samples: np.ndarray, count: int) -> np.ndarray:
@@ -85,10 +85,12 @@ class StepGrid:
 
 
 class Inputs:
-    """Hub forces and angles of a recording, those that are not named as checks."""
+    """Hub forces and angles of a recording that drive a run. Signals marked as checks are left out."""
 
     def __init__(self, recording: Recording, vehicle: CutVehicle, enforced: bool = False) -> None:
-        """``enforced`` : whether angles are bridged, too. InputError for forces that are missing or have long gaps."""
+        """``enforced`` : whether gaps in the angles are bridged as well. InputError for missing forces, or forces with
+        long gaps.
+        """
         self.recording, self.vehicle, self.findings = recording, vehicle, list[Finding]()
         used: dict[tuple[str, str, str], Signal] = {
             (s.quantity, s.component, s.at): s for s in reversed(recording.signals) if not s.check
@@ -113,21 +115,25 @@ class Inputs:
 
     @property
     def used(self) -> tuple[Signal, ...]:
-        """Signals that are put in."""
+        """Signals that drive or hold the run."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
     def wrenches(self, first: int, count: int) -> np.ndarray:
-        """Hub forces (n, 6 h), N and N m, samples ``first`` .. first + count - 1; components not measured are 0."""
+        """Hub forces (count, 6 h), N and N m, at samples from ``first`` on; components that were not measured are 0."""
         return self._block(self.hubs, first, count, 0.0)
 
     def around(self, first: int, count: int) -> np.ndarray:
-        """``wrenches`` with one sample before and two after; beyond its ends a recording is mirrored in a point."""
+        """``wrenches`` with one more sample before and two after; beyond an end the recording is mirrored in its end
+        point.
+        """
         before, after = max(1 - first, 0), max(first + count + 2 - self.recording.count, 0)
         known = self.wrenches(first - 1 + before, count + 3 - before)
         return np.pad(known, ((before, after), (0, 0)), mode="reflect", reflect_type="odd")
 
     def tilt(self, first: int, count: int) -> np.ndarray:
-        """Roll, pitch and their rates (n, 4), NaN where not measured; rates of gyros become those of the angles."""
+        """Roll, pitch and their rates (n, 4), NaN where not measured; rates that gyros measured are converted to rates
+        of the angles.
+        """
         tilt = self._block(self.angles, first, count, np.nan)
         if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
             known = np.isfinite(tilt[:, 2:])
@@ -165,10 +171,12 @@ class Inputs:
 
 
 class Prescribed:
-    """Roll and pitch to be enforced: smoothed, and a quintic spline through stretches of samples that never move."""
+    """Roll and pitch to be enforced: smoothed, then interpolated by a quintic spline within fixed windows of
+    samples.
+    """
 
     def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
-        """``bandwidth`` : Hz, of the low-pass over the whole recording; InputError where an angle is missing."""
+        """``bandwidth`` (Hz) : of a low-pass over the whole recording. InputError where an angle is missing."""
         whole = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(whole).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")

@@ -70,10 +70,11 @@ TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"
 
 @dataclass(frozen=True)
 class ChannelGuess:
-    """Guess at the meaning of a channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is
-    not sure.
+    """Guess at the meaning of a channel. ``unit`` is empty where the file's unit is usable; ``doubt`` names what is
+    uncertain.
 
-    ``at`` is empty where no place can be named. ``left_out`` says why the guess is not to be used as it stands.
+    ``at`` is empty where no place can be named. ``left_out`` gives the reason why the guess should not be used
+    unchanged.
     """
 
     channel: str
@@ -86,7 +87,7 @@ class ChannelGuess:
 
 
 def guess(channel: Channel) -> ChannelGuess | None:
-    """A guess at the meaning of a channel; None where there is no clue; what is missing in a guess is empty."""
+    """Guess the meaning of a channel; None without any clue. Fields of the guess that remain unknown are empty."""
     words, family = _words_of_name(channel.name), _words_of_name(channel.family)
     kinds = quantities(channel.unit) or tuple(WORDS)
     what = next((kind for kind in kinds if _has_words(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
@@ -115,12 +116,12 @@ def guess(channel: Channel) -> ChannelGuess | None:
 
 
 def _words_of_name(name: str) -> str:
-    """Words of a name in small letters, parted by spaces."""
+    """Words of a name in lower case, separated by spaces."""
     return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
 
 
 def _suspension_words(*texts: str) -> str:
-    """Words of a name, or of its group's, that name a part of a suspension; empty where none does."""
+    """First word in the names of a channel and its group that names a part of a suspension; empty if there is none."""
     matches = (re.search(rf"[^ ]*({PARTS})[^ ]*", text) for text in texts)
     return next((match.group() for match in matches if match), "")
 
@@ -137,11 +138,12 @@ def _has_words(names: str, words: str) -> bool:
 
 
 def describe(path: Path) -> str:
-    """Channels with unit, rate, samples, times and range; what the reader noticed; a scene with a guessed map.
+    """Text on a file: its channels with unit, rate, samples, times and range, remarks of the reader, and a scene with a
+    guessed channel map.
 
-    All but the scene is in comments: the whole is a scene file.
+    All lines but those of the scene are comments, so that the text is a scene file.
 
-    Raises InputError for what is no measurement file.
+    Raises InputError for a file that is no measurement.
     """
     source = open_source(path)
     began = f", began {source.start.isoformat(sep=' ')}" if source.start else ", which does not say when it began"
@@ -164,7 +166,7 @@ def describe(path: Path) -> str:
 
 
 def _ranges(source: Source, names: list[str]) -> dict[str, str]:
-    """Rate, samples, first and last time, least and most of each channel of a group, as text."""
+    """Text for each channel of a group: rate, number of samples, first and last time, least and largest value."""
     count = next(channel.count for channel in source.channels if channel.name == names[0])
     firsts = sorted({*range(0, count, max(BLOCK, -(-count // LOOKED_AT))), max(count - BLOCK, 0)}) if count else []
     blocks = [next(source.blocks(names, BLOCK, first)) for first in firsts]
@@ -182,13 +184,13 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
 
 
 def scene_text(source: Source) -> str:
-    """A scene for this file, as TOML, with what was guessed, and as comments what was not."""
+    """A scene for this file as TOML: entries for guessed channels, comments for the others."""
     rows = [_row(channel.name, guess(channel)) for channel in source.channels]
     return "\n".join([SCENE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
 
 
 def _row(name: str, guess: ChannelGuess | None) -> str:
-    """An entry of the map, as a comment where anything is missing."""
+    """An entry of the channel map, as a comment where anything is missing or uncertain."""
     if guess is None:
         return f"  # {{ channel = {_quoted(name)} }},  # not known"
     free = guess.quantity in ("travel", "strain") or bool(guess.left_out and not guess.at)
@@ -206,5 +208,5 @@ def _row(name: str, guess: ChannelGuess | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A TOML string."""
+    """A text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)

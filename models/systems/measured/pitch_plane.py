@@ -45,7 +45,9 @@ SPRINGS = {"f3": "front spring", "f4": "rear spring"}
 
 @dataclass(frozen=True)
 class PlaneJob:
-    """A run to be made: parameters name a set or a TOML file of one; ``hold`` as in ``section_run``; step in s."""
+    """Job for a run in the pitch plane. parameters : name of a set, or of a TOML file; hold : as in ``section_run``;
+    step : s.
+    """
 
     recording: Recording
     parameters: str
@@ -56,13 +58,15 @@ class PlaneJob:
 
     @property
     def effect(self) -> str | None:
-        """Name of the effect that holds the pitch."""
+        """Name of the effect that holds the pitch; None for a free run."""
         return EFFECTS.get(self.hold.method)
 
 
 @dataclass(frozen=True)
 class PlaneRun:
-    """A run, what limits it, what it is worth, and its section forces as ``section_run`` gives them."""
+    """A run in the pitch plane: its result, the predicted limits of trust, the verdict, and section forces as
+    ``section_run`` gives them.
+    """
 
     result: Result
     trust: Trust | None
@@ -94,10 +98,11 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
 
 
 def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
-    """The verdict on a free run that ends before noise drives it off, beside its pitch as measured.
+    """The verdict on a free run that ends before noise drives it off, after its pitch is compared with the measured
+    pitch.
 
-    Where forces turn with the vehicle nothing grows, but offsets and forces of another frame drive it off all the same,
-    and its forces along the vehicle are as wrong as its pitch: there a measured pitch must bear the run out.
+    Where forces turn with the vehicle no error grows, but offsets and forces in another frame still drive it off, and
+    its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
     angles = job.recording.find("angle", CHASSIS, "pitch")
     if not angles:
@@ -118,7 +123,7 @@ def _frames(job: PlaneJob) -> set[str]:
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
-    """The scene of the pitch plane, its files in the folder, and what was bridged."""
+    """A pitch-plane scene of the recording, whose files are written into the folder, and findings on bridged gaps."""
     period, said, frames = job.recording.period, list[Finding](), _frames(job)
     forces = {axle: ("N", _axle(job, axle, said)) for axle in AXLES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
@@ -146,8 +151,9 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
 
 
 def trusted_time(scene: Scene, deviation: float) -> Trust | None:
-    """How long a scene's run can be trusted when its forces have noise of this standard deviation (N); None where the
-    pitch is held to a measured pitch."""
+    """Time for which a scene's run can be trusted when its forces have noise of this standard deviation (N); None where
+    the pitch is held to a measured pitch.
+    """
     assembly = assemble(scene)
     bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
@@ -157,7 +163,7 @@ def trusted_time(scene: Scene, deviation: float) -> Trust | None:
 
 
 def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
-    """Vertical force (n,) of an axle, short gaps bridged; InputError for a long one, or a wheel that is missing."""
+    """Vertical force (n,) of an axle with short gaps bridged; InputError for a long gap or a missing wheel."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
         whole, left, right = map(repr, AXLES[axle])
@@ -173,7 +179,7 @@ def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Find
 
 
 def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> dict[str, Any]:
-    """The effect's table, and its file of pitch and rate, nose up."""
+    """The table of the effect that holds the pitch; the measured pitch and rate, nose up, are written into a file."""
     hold, filtered = job.hold, job.hold.method == "kalman"
     columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
     known = (

@@ -33,12 +33,12 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
 
 
 def opened(scene: MeasuredScene) -> tuple[Source, ...]:
-    """The files of a scene; raises InputError."""
+    """The scene's files, opened; raises InputError."""
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
 def mapped(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
-    """Signals of all files; raises InputError, also where a wheel has no vertical force or the stabiliser no angles."""
+    """Signals of all files. InputError also where a wheel has no vertical force, or the stabiliser no angles."""
     every, method = signals(scene, sources, rig.places), scene.stabilise.method
     driving = {(s.quantity, s.at, s.component) for s in every if not s.check}
     for hub in rig.hubs if rig.vehicle else ():
@@ -72,7 +72,7 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
 
 
 def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
-    """Queries about the vehicle; what is found in the recording its study tells."""
+    """Doubts about implausible parameters of the vehicle; doubts about the recording are found by its study."""
     accept, plane = scene.vehicle.accept, scene.plane()
     if plane is not None:
         return plausible_plane(plane, accept)
@@ -107,7 +107,7 @@ def describe(scene: MeasuredScene) -> str:
 
 
 def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
-    """Every file with its channels as they will be read."""
+    """Lines on every file and its channels, as these will be read."""
     sources, lines = opened(scene), list[str]()
     every = mapped(scene, sources, rig)
     for source in sources:

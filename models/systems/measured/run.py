@@ -57,7 +57,7 @@ WORK = "work"
 
 @dataclass
 class Examination:
-    """Everything made of a recording, in the order of its making; what was not reached is empty.
+    """Everything that is computed for a recording, in the order of computation; what was not reached is empty.
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
     seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
@@ -86,19 +86,19 @@ class Examination:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """The evidence that the checks look at."""
+        """The evidence that the checks of the recording examine."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in NOISE.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
     def stopped(self) -> bool:
-        """Whether an error in the recording forbids a run."""
+        """Whether the recording has an error because of which no run is made."""
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
     def chosen(self) -> str:
-        """The run that is handed on: with the stabiliser, or free where the scene names none."""
+        """Name of the run that is handed on: with the stabiliser, or free where the scene names none."""
         return [*self.holds][-1]
 
     @property
@@ -107,18 +107,21 @@ class Examination:
         return self.runs.get(self.chosen)
 
     def put_in(self, signal: Signal) -> bool:
-        """Whether a signal drives or holds the vehicle; all others are compared with."""
+        """Whether a signal drives or holds the vehicle; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
         return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
 
     def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
-        """Section forces and moments of a run at the sections that the scene names, all if none."""
+        """Section forces and moments of a run at the sections that the scene names, or at all sections if it names
+        none.
+        """
         wanted = self.scene.hand_on.sections
         return [answer for answer in forces(outcome.answers) if wanted is None or answer.section in wanted]
 
     def job(self, name: str, recording: Recording | None = None) -> SectionRun | PlaneJob:
-        """A run of this name to be made, or of another recording held alike; answers at all sections, in the chassis'
-        axes, and at accelerometers."""
+        """The job for a run of this name, or for another recording with roll and pitch held in the same way. It gives
+        forces at all sections in the chassis' axes, and accelerations at accelerometers.
+        """
         recording, vehicle = recording or self.recording, self.rig.vehicle
         settings = self.engine, self.holds[name], self.scene.run.step, self.scene.file
         if vehicle is None:
@@ -129,7 +132,9 @@ class Examination:
     def march(
         self, name: str, folder: Path, progress: Callable[[float, float], None] = no_progress, error: bool = False
     ) -> SectionOutcome:
-        """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
+        """Make the run of this name, or complete the one in a folder. In the pitch plane ``error`` requests its
+        error.
+        """
         job = self.job(name)
         if isinstance(job, SectionRun):
             return march(job, folder, progress)
@@ -154,12 +159,12 @@ def run(
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
-    """Run a recording held as its scene says; the result's detail is the Examination.
+    """Run a recording with roll and pitch held as the scene says; the result's detail is the Examination.
 
-    folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole_run : whether
-    the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
-    is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in
-    the detail, another one raises RunFailed.
+    folder : where samples are kept, so that an interrupted run can continue; without one they live as long as the
+    detail. whole_run : whether the recording is also checked, run free and judged, and files are handed on. error :
+    whether the error of the steps is estimated, by further runs. Raises InputError for files that cannot be read. If a
+    whole run fails, its detail has the reason; another run raises RunFailed.
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
@@ -184,7 +189,9 @@ def run(
 
 
 def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
-    """The result with what it assumes and what of that it broke; of the pitch plane beside what its own run says."""
+    """The result with its assumptions and those that are broken; in the pitch plane together with those that its own
+    run states.
+    """
     if examination.outcome is None:
         return run
     with_assumptions(run, assumptions(examination.scene, examination.rig.vehicle, examination))
@@ -211,7 +218,9 @@ def _with_error(run: Result, examination: Examination, work: Path) -> Result:
 
 
 def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
-    """The recording on one clock: of the scene's files, or of those that a virtual measurement leaves."""
+    """Start an examination: bring the recording onto one clock, from the scene's files or from those of a virtual
+    measurement.
+    """
     rig, virtual, seconds, begun = scene.rig(), None, dict[str, float](), time.perf_counter()
     (folder / WORK).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
@@ -228,18 +237,20 @@ def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, 
 
 
 def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
-    """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
+    """The files of a scene as a recording on one clock, with columns in a folder; InputError for unusable files."""
     sources, rig = opened(scene), scene.rig()
     return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
 
 
 def _lap(examination: Examination, stage: str, begun: float) -> None:
-    """Seconds of a stage that has ended, since ``begun`` and without the stages before it."""
+    """Record the seconds of a stage that has ended: time since ``begun`` less that of the earlier stages."""
     examination.seconds[stage] = time.perf_counter() - begun - sum(examination.seconds.values())
 
 
 def _examined(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
-    """Check, predict, run, judge, and hand on, as far as the recording can be used."""
+    """Check the recording, predict its drift, run it, judge the runs and hand on forces, as far as the recording can be
+    used.
+    """
     lap = partial(_lap, examination, begun=time.perf_counter() - sum(examination.seconds.values()))
     progress("checks", 0.2)
     examination.findings = findings(examination.evidence)
@@ -268,7 +279,9 @@ def _examined(examination: Examination, folder: Path, progress: Progress, error:
 
 
 def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
-    """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
+    """Predict the drift of the free run, which begins level and at rest: from noise, from moments that the motion
+    contradicts, and from the measured initial tilt and rates.
+    """
     recording, free = examination.recording, examination.holds[FREE]
     tilt, rate = (
         [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
@@ -288,7 +301,7 @@ def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
 
 
 def _initial_value(recording: Recording, quantity: str, axis: str, chassis: str) -> float:
-    """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
+    """Mean (rad, rad/s) of an angle or a rate over its first tenth of a second; 0 where it is not measured."""
     for signal in recording.find(quantity, chassis, axis)[:1]:
         values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
         return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
@@ -319,7 +332,7 @@ def _run(examination: Examination, work: Path, progress: Progress, error: bool) 
 
 
 def _with_time_left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
-    """Progress of a run with the time that it will still take."""
+    """Progress callback of a run that adds an estimate of the remaining time."""
     started, first = time.monotonic(), [-1.0]
 
     def told(completed: float, total: float) -> None:
@@ -332,7 +345,7 @@ def _with_time_left(name: str, progress: Progress, begin: float, share: float) -
 
 
 def _with_verdicts(examination: Examination) -> None:
-    """Check channels beside the run that is handed on, and the verdict on every run."""
+    """Compare check channels with the run that is handed on, and judge every run."""
     assert examination.drift is not None
     recording, slopes = examination.recording, tuple(examination.scene.hand_on.slopes)
     for name, outcome in examination.runs.items():
@@ -352,8 +365,9 @@ def _with_verdicts(examination: Examination) -> None:
 
 
 def _with_consequences(examination: Examination, work: Path) -> None:
-    """Compute the changes of the section forces by each finding, and the verdicts that follow: by the run
-    with the stabiliser, or by the free one where that failed."""
+    """Compute how each finding changes the section forces, and revise the verdicts. The run with the stabiliser is
+    used, or the free run where that failed.
+    """
     name = (
         examination.chosen
         if examination.chosen in examination.runs and examination.chosen not in examination.failed
@@ -371,7 +385,9 @@ def _with_consequences(examination: Examination, work: Path) -> None:
 
 
 def _save_section_forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> None:
-    """Section forces counted, and into files in every format that the scene names; those of a killed run are left."""
+    """Count the cycles of the section forces, and write these in every format that the scene names. Existing files of
+    an interrupted run are kept.
+    """
     answers, wanted = examination.forces(outcome), examination.scene.hand_on
     examination.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
     examination.handed = tuple(folder / f"{FILES}.{form}" for form in wanted.formats)
@@ -397,6 +413,6 @@ def _labelled(scene: MeasuredScene, examination: Examination, folder: Path) -> R
 
 
 def _endings(examination: Examination) -> dict[str, str]:
-    """How the runs ended, as attributes."""
+    """Verdicts on the runs and reasons of failures, as attributes of the result."""
     verdicts = {name: [verdict.word, verdict.reason] for name, verdict in examination.verdicts.items()}
     return {"verdicts": json.dumps(verdicts), "failed": json.dumps(examination.failed)}

@@ -28,10 +28,11 @@ Engine = Literal["reference", "exudyn", "mujoco"]
 
 @dataclass(frozen=True)
 class Rig:
-    """The vehicle that a recording drives, and where its sensors and sections are.
+    """The vehicle that a recording drives, and the places of its sensors and sections.
 
-    name : of the vehicle or the parameter set; chassis : whose angles hold it; sections that can be asked for; angles :
-    the components that hold it; vehicle : cut at its wheels, None of the pitch plane.
+    name : of the vehicle or the parameter set; chassis : body whose angles are measured; sections : those at which
+    forces can be requested; angles : components of the measured angles; vehicle : cut at its wheels, None in the pitch
+    plane.
     """
 
     name: str
@@ -43,7 +44,7 @@ class Rig:
 
     @property
     def hubs(self) -> tuple[str, ...]:
-        """Where forces are put in."""
+        """Names of the hubs at which forces drive the vehicle."""
         return self.places.hubs
 
 
@@ -153,7 +154,9 @@ class MeasuredScene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def rig(self) -> Rig:
-        """The vehicle that is driven, the pitch plane at its axles or at the wheels of each; raises InputError."""
+        """The vehicle that the recording drives. The pitch plane is driven at its axles or at the wheels of each axle.
+        Raises InputError.
+        """
         given_vehicle = self.vehicle
         if given_vehicle.file is None:
             hubs, springs = tuple(hub for axle in AXLES.values() for hub in axle), tuple(SPRINGS.values())
@@ -166,14 +169,14 @@ class MeasuredScene(SceneFile):
 
     @property
     def places(self) -> dict[str, TransducerPlace]:
-        """Where sensors sit."""
+        """Places of the sensors by name."""
         return {
             name: TransducerPlace(s.body, (s.position[0], s.position[1], s.position[2]))
             for name, s in self.sensors.items()
         }
 
     def plane(self) -> Parameters | None:
-        """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
+        """Parameters of the vehicle if it is one in the pitch plane, None for a vehicle in space; raises InputError."""
         parameters = self.vehicle.parameters
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 

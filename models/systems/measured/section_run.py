@@ -43,7 +43,8 @@ Progress = Callable[[float, float], None]
 
 @dataclass(frozen=True)
 class AttitudeHold:
-    """How roll and pitch are held; Hz, rad/s^2, Hz as in the scene's table ``stabilise``.
+    """Way in which roll and pitch are held; bandwidth (Hz), model (rad/s^2) and smoothing (Hz) as in the scene's table
+    ``stabilise``.
 
     Standard deviations of the noise of samples: force (N), moment (N m), angle (rad), rate (rad/s).
     """
@@ -60,7 +61,9 @@ class AttitudeHold:
 
 @dataclass(frozen=True)
 class SectionRun:
-    """A run to be made: ``step`` in s, the recording's period if None; ``file`` is the scene that messages name."""
+    """Job for a run of a cut vehicle. ``step`` is in s, the recording's period if None; ``file`` is the scene that
+    messages name.
+    """
 
     vehicle: CutVehicle
     recording: Recording
@@ -72,19 +75,20 @@ class SectionRun:
 
     @property
     def grid(self) -> StepGrid:
-        """Steps on the recording's clock."""
+        """Steps of the run, in relation to the recording's samples."""
         return StepGrid(self.step or self.recording.period, self.recording.period)
 
     @property
     def count(self) -> int:
-        """Number of answers in the whole run."""
+        """Number of output samples in the whole run."""
         return (self.recording.count - 1) // self.grid.skip + 1
 
 
 @dataclass(frozen=True)
 class SectionOutcome:
-    """Answers of a run, ``period`` (s) apart, of which ``done`` are there; ``surprise`` of the filter, NaN without,
-    and what it says against its measurements; counts of steps, force calls and states."""
+    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``surprise`` and ``doubts`` of
+    the filter about its measurements, NaN and none without one; counts of steps, force calls and states.
+    """
 
     columns: Columns
     answers: tuple[SectionChannel, ...]
@@ -96,20 +100,23 @@ class SectionOutcome:
     counts: dict[str, int] = field(default_factory=dict)
 
     def samples(self, answer: SectionChannel | str) -> np.ndarray:
-        """Samples (done,) of one answer, or of that of a name."""
+        """Samples (done,) of one channel, which is given itself or by its name."""
         return self.columns.read(answer if isinstance(answer, str) else answer.name, 0, self.done)
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file that holds arrays, and the inputs that they are of: ``of`` gives each a name that a user understands."""
+    """A file of arrays and the inputs that these depend on: ``of`` has a checksum of each input by a name that users
+    understand.
+    """
 
     path: Path
     of: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> dict[str, np.ndarray] | None:
-        """The saved arrays, None without a checkpoint; InputError, which names the input that differs, for other
-        inputs' checkpoint."""
+        """The saved arrays, None without a checkpoint. InputError if they depend on other inputs; it names the one that
+        differs.
+        """
         if not self.path.is_file():
             return None
         try:
@@ -132,7 +139,7 @@ class Checkpoint:
 
 
 def digest(*parts: object) -> str:
-    """Digest of objects by their representation, arrays by their bytes."""
+    """Digest of objects: arrays count by their bytes, other objects by their ``repr``."""
     total = hashlib.blake2b(digest_size=16)
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -144,7 +151,7 @@ def digest(*parts: object) -> str:
 
 
 def check(job: SectionRun) -> None:
-    """Refuse what no run can do right, before any is made."""
+    """Refuse a job that no run can do correctly, before any run is made."""
     grid, hold = job.grid, job.hold
     grid.check(job.file)
     if job.count < 2:
@@ -177,7 +184,7 @@ def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: 
 
 
 class _March:
-    """A run under way: ``done`` answers are on disk, ``state`` (2 n,) is that of the next one."""
+    """A run in progress: ``done`` output samples are on disk, and ``state`` (2 n,) belongs to the next one."""
 
     def __init__(self, job: SectionRun, folder: Path, length: int) -> None:
         self.job, self.grid, self.length, hold = job, job.grid, length, job.hold
@@ -212,7 +219,7 @@ class _March:
         )
 
     def advance(self) -> None:
-        """March a block and save it; RunFailed with the outcome until then."""
+        """March a block and save it; RunFailed carries the outcome so far."""
         grid, last = self.grid, self.job.count - 1
         answers = min(self.length, max(last - self.done, 1))
         hub_inputs = self._hub_inputs(self.done * grid.skip, answers * grid.every)
@@ -228,7 +235,9 @@ class _March:
         self._save()
 
     def _marched(self, model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
-        """States of a block until its end or until the vehicle topples, and the failure that says when."""
+        """States of a block until its end or until the vehicle topples, and in the latter case the failure with its
+        time.
+        """
         began, steps = self.done * self.grid.period * self.grid.skip, model.steps
         try:
             states = model.marched(*np.split(self.state, 2)).states
@@ -249,7 +258,9 @@ class _March:
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
     def _march_until_failure(self, model: HubModel) -> np.ndarray:
-        """States of a block that the engine gave up: the longest part, by halves, that it can march."""
+        """States of a block that the engine did not complete: the longest beginning that it can march, found by
+        bisection.
+        """
         good, bad, states = 0, model.steps, self.state[None]
         while bad - good > 1:
             model.steps = (good + bad) // 2
@@ -261,7 +272,9 @@ class _March:
         return states
 
     def _hub_inputs(self, first: int, steps: int) -> HubInputs:
-        """Hub inputs at half steps from a sample on."""
+        """Inputs at half steps of a block that begins at sample ``first``: hub forces and, where they are held, roll
+        and pitch.
+        """
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
         wrenches = self.inputs.around(first, used + 1)

@@ -35,7 +35,7 @@ MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
 
 @dataclass(frozen=True)
 class SectionChannel:
-    """One channel of a run.
+    """One output channel of a run: a section force, a motion or a stabilising moment.
 
     section : the element, guide or hub that it belongs to, empty of motion and of what stabilises; quantity, at and
     component : as those of a signal that measures the same; comment : axes and sign, as the files say them.
@@ -50,7 +50,7 @@ class SectionChannel:
     component: str = ""
 
     def measures(self, signal: Signal) -> bool:
-        """Whether a signal measures this."""
+        """Whether a signal measures the same as this channel."""
         return (self.quantity, self.at, self.component) == (signal.quantity, signal.at, signal.component)
 
 
@@ -66,8 +66,8 @@ class AccelerometerPoint:
 
 @dataclass(frozen=True)
 class Sections:
-    """Section forces and other answers that are read of a vehicle's run; answers in the order of their columns,
-    ``columns`` those of the kernel's row.
+    """Section forces and other channels that are computed from a vehicle's run. answers : channels in the order of
+    their columns; columns : their indices in the kernel's row.
 
     frame : axes of guides and hubs, "body" for the chassis', "hub" for those of what they carry.
     """
@@ -101,7 +101,9 @@ class Sections:
         object.__setattr__(self, "_places", FeltPlaces(*_guides(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
-        """Answers (n, answers) of states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in ``HubModel``."""
+        """Values (n, answers) of the channels at states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in
+        ``HubModel``.
+        """
         wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
         count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
@@ -110,20 +112,20 @@ class Sections:
 
 
 def names(vehicle: CutVehicle) -> tuple[str, ...]:
-    """Every section that can be asked for."""
+    """Names of all sections at which forces can be requested."""
     guides = tuple(f"{name} guide" for name in guided(vehicle))
     return (*(element.name for element in vehicle.elements), *guides, *(f"{hub} hub" for hub in vehicle.hubs))
 
 
 def guided(vehicle: CutVehicle) -> tuple[str, ...]:
-    """Bodies that ride on the chassis or on one another."""
+    """Names of the bodies that are guided by the chassis or by another body."""
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
 
 def _kernel_columns(
     vehicle: CutVehicle, frame: str, points: tuple[AccelerometerPoint, ...]
 ) -> Iterator[SectionChannel]:
-    """Every column of the kernel's row."""
+    """The channel of every column in the kernel's row."""
     chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:
         if e.unit == "N":
@@ -157,7 +159,7 @@ def _kernel_columns(
 
 
 def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
-    """Force components along the free direction of sliding guides, which are zero."""
+    """Names of the guides' force components that are zero, as they act along the guide's free direction."""
     sliding = set[str]()
     for name in guided(vehicle):
         body = vehicle.uncut.body(name)
@@ -168,7 +170,9 @@ def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
 
 
 def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
-    """Last joint (g,) of every guided body and what acts behind it (g, b + h + 3 e), as the kernel reads it."""
+    """For every guided body its last joint (g,), and which bodies, hubs and elements act behind that joint (g, b + h +
+    3 e), in the kernel's format.
+    """
     heavy = [body.name for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
     ends = [end for element in vehicle.elements for end in (element.first_body, element.second_body, element.frame)]
     owners = [*heavy, *(tyre.body for tyre in vehicle.uncut.tyres), *ends]
@@ -185,7 +189,7 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
 def points(
     vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, TransducerPlace]
 ) -> tuple[AccelerometerPoint, ...]:
-    """Where accelerations are measured: at sensors, which ``places`` knows, and at centres of bodies."""
+    """Points at which accelerations are measured: sensors, which ``places`` lists, and centres of bodies."""
     section_points = dict[str, AccelerometerPoint]()
     for signal in (signal for signal in signals if signal.quantity == "acceleration"):
         if signal.at in places:

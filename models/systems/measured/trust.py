@@ -32,7 +32,7 @@ POINTS = 2000
 
 @dataclass(frozen=True)
 class Level:
-    """Error level of a measurement: deviations of forces and moments, bias, initial tilt and rate.
+    """Errors of a measurement: noise of forces and moments, their bias, and the initial error of tilt and rate.
 
     force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
     hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
@@ -45,13 +45,13 @@ class Level:
     rate: Sequence[float] = (0.0, 0.0)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
-        """Standard deviations (6 h,), hub by hub."""
+        """Standard deviations (6 h,) of the samples' noise, N and N m hub by hub."""
         return np.tile(np.repeat([self.force, self.moment], 3), len(vehicle.hubs))
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of a free run by the errors of its measurement.
+    """Drift of a free run that the errors of its measurement cause.
 
     means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
     deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
@@ -64,7 +64,7 @@ class Drift:
     frame: str = "hub"
 
     def passes(self, angle: float = ANGLE, source: str | None = None) -> float | None:
-        """First time (s) at which half of all runs have roll or pitch off by more than ``angle`` (rad).
+        """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad).
 
         source : one of ``means`` or "noise" alone; None: all together.
         """
@@ -81,24 +81,28 @@ class Drift:
 
     @property
     def angle(self) -> float:
-        """Error (rad) from which on the section forces of a free run are not trusted."""
+        """Error (rad) of roll or pitch beyond which the section forces of a free run are not trusted."""
         return ANGLE if self.frame == "inertial" else UPRIGHT
 
     @property
     def trusted(self) -> float:
-        """Time (s) until which the section forces of a free run are trusted; at most that of the run."""
+        """Time (s) until which the section forces of a free run are trusted; at most the duration of the run."""
         passed = self.passes(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
     def trust(self, angle: float | None = None) -> Trust:
-        """Times by source; ``angle`` (rad) other than that of the section forces: 0.05 rad for the motion itself."""
+        """Time by source of error at which ``angle`` (rad) is passed, by default that of section forces; 0.05 rad for
+        the motion itself.
+        """
         limit = self.angle if angle is None else angle
         times = {name: self.passes(limit, name) for name in ("noise", *self.means)}
         return Trust({**times, "all together": self.passes(limit)}, float(self.rates.max()), limit)
 
 
 def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
-    """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
+    """Drift of a free run under hub forces that are given in a frame and sampled every ``period`` (s), over a duration
+    (s).
+    """
     body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
     noise = period * body.turning(level.deviations(vehicle))
     spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
@@ -113,10 +117,11 @@ def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, fra
 
 
 def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray, frame: str) -> np.ndarray:
-    """Size (n, 3) in m of the error of x, y, z at times (n,) of a free run: noise, bias and tilt at the start.
+    """Error (n, 3) in m of x, y, z of a free run at times (n,), from noise, bias and the initial tilt.
 
-    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
-    bias alone. One standard deviation of the noise beside the others' means.
+    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; in the frame "inertial" there are only
+    noise and bias of the forces. The result combines one standard deviation of the noise with the means of the other
+    errors.
     """
     body, deviation = rigid(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))
@@ -132,7 +137,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 
 @dataclass(frozen=True)
 class _AngleResponse:
-    """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
+    """Response of the rigid vehicle's angles to errors, at times (n,), equally spaced from 0."""
 
     rigid: Rigid
     frame: str
@@ -150,19 +155,19 @@ class _AngleResponse:
         return np.asarray(self._modes[0].real)
 
     def _matrices_of_modes(self, factors: np.ndarray) -> np.ndarray:
-        """Matrices (n, 3, 3) of modal factors (n, 3)."""
+        """Matrices (n, 3, 3) of the angles from the factors (n, 3) of the modes."""
         shapes = self._modes[1]
         return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
 
     @cached_property
     def impulse(self) -> np.ndarray:
-        """G (n, 3, 3): angles after a sudden rate."""
+        """Response G (n, 3, 3) of the angles to a sudden rate."""
         turns = np.outer(self.times, self._modes[0])
         return self._matrices_of_modes(self.times[:, None] * np.sinc(1j * turns / np.pi))
 
     @cached_property
     def step(self) -> np.ndarray:
-        """(n, 3, 3): angles after a tilt."""
+        """Response (n, 3, 3) of the angles to an initial tilt."""
         return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
     def summed(self, values: np.ndarray) -> np.ndarray:

@@ -54,7 +54,9 @@ EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "non
 
 @dataclass(frozen=True)
 class Band:
-    """Frequencies from ``low`` to ``high`` (Hz): rms of what was measured and of the error, in the channel's unit."""
+    """A frequency band from ``low`` to ``high`` (Hz), with the rms of the measured values and of the error in it, in
+    the channel's unit.
+    """
 
     low: float
     high: float
@@ -64,7 +66,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Compared:
-    """One check channel.
+    """Comparison of one check channel with the run.
 
     offset : mean of the error; bands : of all but that; explained : part of the measured variance that the run gives,
     1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
@@ -81,16 +83,17 @@ class Compared:
 
 
 def checks(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
-    """Every channel that is not put in and that the run answers, with its answer: named as checks, and accelerations.
+    """Every measured channel that the run is compared with, and the run's channel for it: channels named as checks, and
+    accelerations.
 
-    Strains and sensors of unknown place have none.
+    The run has none for strains and for sensors of unknown place.
     """
     outside = [s for s in job.recording.signals if s.check or s.quantity == "acceleration"]
     return tuple((s, a) for s in outside if _same_axes(job, s) for a in job.sections.answers if a.measures(s))
 
 
 def _same_axes(job: SectionRun, signal: Signal) -> bool:
-    """Whether answers of a signal's quantity are in its axes."""
+    """Whether the run computes a signal's quantity in the axes of the signal."""
     if signal.at in job.vehicle.hubs and signal.quantity in ("force", "moment"):
         return signal.frame == job.sections.frame
     return signal.frame != "inertial" or signal.quantity == "angle"
@@ -99,7 +102,7 @@ def _same_axes(job: SectionRun, signal: Signal) -> bool:
 def overlay(
     recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (n,) in s, measured and computed values (n,) of all answers of a run."""
+    """Times (n,) in s of a run, and the measured and the computed values (n,) of one channel."""
     computed, skip = run.samples(answer), round(run.period / recording.period)
     measured = recording.columns.read(signal.name, 0, (len(computed) - 1) * skip + 1)[::skip]
     return run.period * np.arange(len(computed)), measured, computed
@@ -112,7 +115,7 @@ def compare(
     answer: SectionChannel,
     slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
 ) -> Compared:
-    """Compare a channel with its answer over all that was run."""
+    """Compare a measured channel with the run's channel over the time of the run."""
     _, measured, computed = overlay(recording, run, signal, answer)
     known = np.isfinite(measured)
     if not known.any():
@@ -134,7 +137,9 @@ def compare(
 
 
 def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band, ...]:
-    """rms by band, from averaged spectra of overlapping stretches under a Hann window; those with gaps are left out."""
+    """Rms of the measured values and of the error by frequency band, from averaged spectra of overlapping segments
+    under a Hann window. Segments with gaps are left out.
+    """
     length = min(round(SEGMENT / period), len(error))
     window = np.hanning(length + 1)[:-1]
     power, used = np.zeros((2, length // 2 + 1)), 0
@@ -155,7 +160,7 @@ def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band
 
 
 def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
-    """When the error of a stretch first exceeds ``HALF`` of a size (s)."""
+    """Time (s) at which the rms error of a stretch first exceeds ``HALF`` of ``size``; infinite if it never does."""
     length = max(round(STRETCH / period), 1)
     whole = error[: len(error) // length * length].reshape(-1, length)
     rms = np.sqrt(np.nanmean(np.where(np.isfinite(whole), whole, 0.0) ** 2, axis=1))
@@ -171,10 +176,10 @@ def judge(
     compared: Sequence[Compared] = (),
     noise: Mapping[str, float] | None = None,
 ) -> Verdict:
-    """The verdict of an engineer, who has no true run, on the run of a job.
+    """The verdict on the run of a job that an engineer can give without knowing the true run.
 
-    trusted : s, predicted for a free run (``trust``), None if not known.
-    compared : check channels beside the run; noise : name -> standard deviation of the white noise of each, in SI.
+    trusted : time (s) predicted for a free run (``trust``), None if not known. compared : comparisons of check channels
+    with the run; noise : standard deviation of the white noise of each channel, by name, in SI.
     """
     shares = {
         channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared
@@ -195,7 +200,9 @@ def judge(
 
 
 def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
-    """Doubts where the filter that held a run was surprised by its measurements, or calls them biased."""
+    """Doubts because the innovations of the filter that held a run are too large, or because it calls measurements
+    biased.
+    """
     if not run.surprise > SURPRISED:
         return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
     text = (
@@ -209,13 +216,13 @@ def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
 def judge_beside_truth(
     run: SectionOutcome, true: VirtualMeasurement, hold: AttitudeHold, limits: Limits = LIMITS, slope: float = SLOPE
 ) -> Verdict:
-    """The verdict on a run of a virtual measurement, beside the true one."""
+    """The verdict on a run of a virtual measurement, from its comparison with the true run."""
     figures = figures_of_run(run, true.vehicle), errors(run, true, slope)
     return _in_space(score.verdict(*figures, EFFECTS[hold.method], limits))
 
 
 def _in_space(verdict: Verdict) -> Verdict:
-    """A verdict in the words of a vehicle that rolls, too."""
+    """The verdict with the words for the pitch plane replaced by those for a vehicle that also rolls."""
     reason = verdict.reason
     for plane, space in WORDS.items():
         reason = reason.replace(plane, space)
@@ -223,7 +230,7 @@ def _in_space(verdict: Verdict) -> Verdict:
 
 
 def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
-    """Figures of a run by itself, of roll or pitch, whichever is worse; cost is not among them (0)."""
+    """Figures of a run that need no true run, for roll or pitch, whichever is worse; the cost is left at 0."""
     inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
     tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
     figures = list[RunFigures]()
@@ -240,7 +247,7 @@ def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
 
 
 def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float:
-    """Twice the standard deviation (rad) of the angle, roll or pitch, of a run that is held; 0 of a free one.
+    """Twice the standard deviation (rad) of roll or pitch in a run where they are held; 0 for a free run.
 
     A moment I (w^2 (measured - angle) + 2 z w (measured rate - rate)) lets white noise of the angle through with
     period w / (4 z) of its variance, that of the rate with period z / w, and that of the hub forces' moments, as
@@ -262,8 +269,9 @@ def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float
 
 
 def errors(run: SectionOutcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
-    """Errors of a run against the true run, at the answers' times: section forces of springs, mounts and bars,
-    angles."""
+    """Errors of a run relative to the true run, at the times of the run's answers: of section forces in springs, mounts
+    and bars, and of angles.
+    """
     every, chassis = round(run.period / true.step), true.vehicle.chassis
     loads, states = true.run.elements[::every][: run.done], true.run.states[::every][: run.done]
     damage, force = dict[str, float](), dict[str, float]()
@@ -280,8 +288,8 @@ def errors(run: SectionOutcome, true: VirtualMeasurement, slope: float = SLOPE) 
 
 
 def disagreement(compared_channel: Compared, noise: float = 0.0) -> float:
-    """Rms of the error of a check channel divided by that of the channel, its noise (standard deviation) taken off
-    both.
+    """Ratio of the rms error of a check channel to the channel's rms, after its noise (standard deviation) is removed
+    from both.
 
     0 of a channel that is more than a third noise: it can contradict nothing. Noise that is not known, NaN, is none.
     """

@@ -72,7 +72,7 @@ class VirtualMeasurement:
     """Signals that faultless transducers would record.
 
     signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
-    every : steps of a sampling period. errors : of the steps of the true run, where they were asked for.
+    every : steps of a sampling period. errors : of the steps of the true run, where they were requested.
     """
 
     vehicle: CutVehicle
@@ -93,7 +93,9 @@ class VirtualMeasurement:
         return self.step * self.every
 
     def samples(self, faults: Faults, seed: int, path: int = 0) -> np.ndarray:
-        """Samples (m, signals), SI, with everything that the faults name; NaN where a transducer was silent."""
+        """Samples (m, signals), SI, with the faults of the transducers applied; NaN where a transducer gave no
+        value.
+        """
         return measured(faults, self.signals, self.values, self.step, self.every, seed, path)
 
 
@@ -122,7 +124,9 @@ def virtual_measurement(
 
 
 def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[Signal, ...]:
-    """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
+    """Signals of all channels; InputError for steps that do not divide one another, and for names that the vehicle
+    lacks.
+    """
     period, whole = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
     if not divides(virtual.step, virtual.duration):
         fit = f"must {whole}, as {fitting(virtual.step, virtual.duration)} s does"
@@ -162,7 +166,9 @@ def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
 
 
 def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
-    """Roll and pitch, the rates about the chassis' own axes that gyros read, and its accelerometers (n, m)."""
+    """Roll and pitch, rates about the chassis' own axes as gyros read them, and readings of its accelerometers, as
+    columns (n, m).
+    """
     from scipy.interpolate import make_interp_spline
 
     n, angles = vehicle.size, run.states[:, [ROLL, PITCH]]
@@ -179,8 +185,9 @@ def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) ->
 
 
 def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Rates (n, 3) about the chassis' own axes, rad/s, of roll and pitch (n, 2), rad, and the rates (n, 3) of roll,
-    pitch and heading, which is turned first, then pitch, then roll."""
+    """Angular rates (n, 3) in rad/s about the chassis' own axes, from roll and pitch (n, 2), rad, and the rates (n, 3)
+    of roll, pitch and heading. The heading is turned first, then the pitch, then the roll.
+    """
     (roll, pitch), (droll, dpitch, dheading) = angles.T, rates.T
     return np.column_stack(
         [
@@ -192,7 +199,7 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
 
 
 def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
-    """Samples (n, signals), SI, in the units of the file that they are written to."""
+    """Samples (n, signals), SI, as a group of channels in the units of the file to be written."""
     factors = np.array([signal.factor for signal in signals])
     blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
@@ -201,7 +208,8 @@ def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Ch
 
 
 def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:
-    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and ``scene.toml`` beside it.
+    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and a ``scene.toml`` that reads
+    this file.
 
     Returns the scene's path. Raises InputError where a file exists or the format has no room for the channels.
     """
@@ -221,12 +229,12 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
 
 
 def _toml(value: object) -> str:
-    """A TOML value: text, number, truth or a list of these."""
+    """TOML text of a value: a string, number, boolean or list of these."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
-    """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
+    """TOML lines of the table [[files]] for a file with these channels; ``offset`` (s) is added to the file's clock."""
     lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
         entry = {key: getattr(signal, key) for key in ("channel", "quantity", "at", "component", "frame")}
@@ -236,7 +244,9 @@ def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> st
 
 
 def recording(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
-    """The samples (m, signals) as a recording, past all files and maps; ``path`` is where its columns lie."""
+    """The samples (m, signals) as a recording, without detour through files and maps; ``path`` is the file of its
+    columns.
+    """
     columns = Columns(path, tuple(signal.name for signal in virtual.signals), len(samples))
     columns.write(0, samples)
     return Recording(virtual.signals, columns, virtual.period)

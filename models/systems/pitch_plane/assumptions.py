@@ -43,7 +43,7 @@ def assumptions(assembly: Assembly) -> list[Assumption]:
 
 
 def principal(assembly: Assembly) -> tuple[str, ...]:
-    """Channels whose error is told: neither prescribed motion nor prescribed forces have any."""
+    """Channels whose error is estimated, without prescribed motions and forces, which have no error."""
     free = tuple(name for name, place in (("z3", 2), ("pitch", 3)) if place not in assembly.guided)
     wheels = ("f1", "f2") if assembly.mode in ("free", "road") else ()
     enforced = {"pitch": ("enforced_moment",), "heave-pitch": ("enforced_force", "enforced_moment")}
@@ -51,7 +51,7 @@ def principal(assembly: Assembly) -> tuple[str, ...]:
 
 
 def watching(**channels: str) -> partial[Watched]:
-    """Watch function of an assumption: channels of a run by the names of the parts that they are of."""
+    """Watch function of an assumption; ``channels`` gives the run's channel for each name of a part."""
     return partial(_channels, channels)
 
 
@@ -79,12 +79,12 @@ def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
 
 
 def _deflections(p: Parameters, run: Result) -> Watched:
-    """Deflection (n,) in m of each tyre as its spring alone would have it under the wheel's force."""
+    """Deflection (n,) in m of each tyre if its spring alone carried the wheel's force."""
     return {"front tyre": run["f1"] / p.k1, "rear tyre": run["f2"] / p.k2}
 
 
 def _springs(assembly: Assembly, lifts: bool) -> Assumption:
-    """No vehicle's spring pulls; what its droop stop would do is not in the equations."""
+    """Assumption that no suspension's spring pulls: a droop stop, which would prevent it, is not in the equations."""
     remedy = "no effect adds a droop stop: start lower, or excite it less"
     if assembly.mode not in ("free", "road"):
         remedy = f"take wheel forces of tyres that only push (lift_off on a road); {remedy}"
@@ -101,7 +101,7 @@ def _springs(assembly: Assembly, lifts: bool) -> Assumption:
 
 
 def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
-    """Compression (n,) in m of each suspension's spring."""
+    """Compression (n,) in m of each suspension's spring, from the motion of chassis and wheels."""
     turned = np.sin(run["pitch"]) if exact else run["pitch"]
     return {
         "front suspension": run["z3"] - p.b * turned - run["z1"],
@@ -110,13 +110,13 @@ def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
 
 
 def upright(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
-    """The pitch is one of a vehicle on a road."""
+    """Assumption that the pitch stays as small as that of a vehicle on a road."""
     says = "the chassis pitches less than any road does, as wheels only move vertically"
     return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST, STEEPEST)
 
 
 def _remedy(assembly: Assembly) -> str:
-    """Advice on what keeps the pitch small."""
+    """Advice on how to keep the pitch small."""
     if assembly.guided:
         return "no effect lifts it: check the file of the prescribed pitch, and its unit"
     if assembly.mode in ("free", "road"):
@@ -125,7 +125,7 @@ def _remedy(assembly: Assembly) -> str:
 
 
 def _artificial(assembly: Assembly) -> Assumption:
-    """Assumption that the forces which hold pitch or heave are small beside the vehicle's own forces."""
+    """Assumption that the forces which hold pitch or heave are small compared with the vehicle's own forces."""
     moved = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
     return Assumption(
@@ -139,8 +139,9 @@ def _artificial(assembly: Assembly) -> Assumption:
 
 
 def _artificial_shares(p: Parameters, heave: bool, run: Result) -> Watched:
-    """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
-    are too few or too far apart."""
+    """Ratio of the artificial moment, and of the force where the heave is held, to the chassis' inertia term, up to 15
+    Hz. Empty where the rows are too few or too far apart.
+    """
     from models.drift.score import figures_of_run
 
     with suppress(InputError):

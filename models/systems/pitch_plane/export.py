@@ -20,7 +20,7 @@ INPUTS = {
 
 
 def exported(scene: Scene, engine: str) -> Exported:
-    """The vehicle in "mujoco" or "exudyn"."""
+    """Export the pitch-plane vehicle to "mujoco" or "exudyn"."""
     assembly, subject = assemble(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":
@@ -29,7 +29,9 @@ def exported(scene: Scene, engine: str) -> Exported:
 
 
 def _left_out(assembly: Assembly) -> list[str]:
-    """Names of the parts that the export leaves out: inputs, and parts that can lose contact within a step."""
+    """Names of the parts that the export leaves out: inputs, and springs or tyres that can lose contact within a
+    step.
+    """
     vehicle = assembly.vehicle
     return [
         *INPUTS[assembly.mode],

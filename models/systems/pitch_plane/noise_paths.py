@@ -36,7 +36,8 @@ DRIFT = 0.05
 
 @dataclass(frozen=True)
 class NoisePaths:
-    """Job (see ``runner``): states at chosen steps and drift-off time of every path.
+    """Job (see ``runner``) that runs a scene once per noise path: states at chosen steps, and the time at which each
+    path drifts off.
 
     Attributes
     ----------
@@ -64,11 +65,13 @@ class NoisePaths:
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
-        """The whole run of one path; raises RunFailed if it leaves all bounds."""
+        """Trajectory of one path over the whole run; RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, or its RunFailed; raises PathFailed for failures that are not of the simulated physics."""
+        """Trajectory of each path, or its RunFailed; PathFailed for a failure that is not one of the simulated
+        physics.
+        """
         for path in paths:
             try:
                 yield self.trajectory(path)
@@ -78,7 +81,7 @@ class NoisePaths:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
     def __call__(self, paths: range) -> Arrays:
-        """Arrays of a block.
+        """Named arrays of a block of n paths.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
@@ -96,7 +99,7 @@ class NoisePaths:
         return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the paths depend on."""
+        """Everything on which the paths depend, by name."""
         forces = self.base.input
         return {
             "engine": self.engine,
@@ -117,7 +120,7 @@ def noise_paths(
     threshold: float = DRIFT,
     engine: str = "reference",
 ) -> NoisePaths:
-    """The job of a scene: ``times`` (s) are kept, multiples of the step.
+    """The job that runs a scene's noise paths; states are kept at ``times`` (s), multiples of the step.
 
     truth : pitch (rad) of the true path at every step, shape (steps + 1,); None takes the run of the same scene in
     the reference without noise on its forces. Raises InputError for a scene without ``force_noise``, an integrator
@@ -144,7 +147,7 @@ def noise_paths(
 
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
-    """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
+    """The assembly that all paths share, and the effects that have a path or follow an effect that has one."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
         module = module_of(DEFAULT_SYSTEM, name)
@@ -155,7 +158,7 @@ def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
 
 
 def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
-    """Steps at the asked times."""
+    """Numbers of the steps at the requested times; InputError for a time between steps."""
     for time in times:
         if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not divides(settings.step, time)):
             allowed = f"must lie between 0 and {settings.duration:g} s, on a multiple of the step {settings.step:g} s"
@@ -165,7 +168,7 @@ def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class MujocoThreads(NoisePaths):
-    """Noise paths whose blocks MuJoCo computes with this many threads; the bits do not depend on their number."""
+    """Noise paths whose blocks MuJoCo computes with ``threads`` threads; the results do not depend on their number."""
 
     threads: int = 2
 
@@ -174,7 +177,9 @@ class MujocoThreads(NoisePaths):
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, from one call of ``rollout``; a path that MuJoCo warned of is run again alone."""
+        """Trajectory of each path, all from one call of ``rollout``. If MuJoCo warns, the paths are run again one by
+        one.
+        """
         models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
         times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)
@@ -211,23 +216,24 @@ class MujocoThreads(NoisePaths):
         return states, any(warnings(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
-        """Facts by which the job's saved blocks are known, as of all noise paths."""
+        """Facts that identify the job's saved blocks: those of ``NoisePaths``, and that threads computed them."""
         return {**super().facts(), "way": "threads"}
 
 
 def mujoco_threads(
     scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT, threads: int = 2
 ) -> MujocoThreads:
-    """The job of ``noise_paths`` in MuJoCo's threads."""
+    """The job of ``noise_paths`` for MuJoCo with several threads."""
     return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
 
 
 def gap(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
-    """Largest difference of any state before both paths' drift-off, by the reference's largest state there.
+    """Largest difference between two sets of paths in any state before both drift off, divided by the reference's
+    largest state in that time.
 
     reference, other_paths : arrays of ``NoisePaths``; the second may hold fewer paths; times (rows,) in s. After
-    drift-off a rounding error is as large as the run, and no comparison says anything; nan where all paths have
-    drifted off before the first row past the start.
+    drift-off a rounding error is as large as the run, so that a comparison is meaningless; nan where all paths have
+    drifted off before the first row after the start.
     """
     count = len(other_paths["states"])
     until = np.minimum(reference["drift_off"][:count], other_paths["drift_off"])

@@ -14,7 +14,7 @@ PITCH = 3
 
 
 class PathStatistics:
-    """Of the blocks of ``noise_paths`` beside the true states (rows, 8).
+    """Statistics of noise paths relative to the true states (rows, 8), accumulated from the blocks of ``noise_paths``.
 
     moments, covariance : of the errors of all states at each row; fan : of the size of the pitch error; drift_off :
     times (s), infinite for a path that never did; lost : paths that left all bounds; steepest (rows,) : largest pitch
@@ -41,7 +41,7 @@ class PathStatistics:
 
     @property
     def first(self) -> Arrays:
-        """Arrays of the first paths."""
+        """Arrays of the first ``saved`` paths."""
         return {name: np.concatenate([block[name] for block in self._blocks]) for name in self._blocks[0]}
 
     @property

@@ -45,7 +45,9 @@ REACH = 0.7
 
 @dataclass
 class PitchStep:
-    """Steps of ``period`` (s) through the forces of an assembly: step number i starts at i period, ``count`` in all."""
+    """Steps of the filter, each of ``period`` (s), under the forces of an assembly: step i starts at i period,
+    ``count`` in all.
+    """
 
     assembly: Assembly
     period: float
@@ -66,7 +68,7 @@ class PitchStep:
         self._respond = responding(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Advance the state x (7,) by a step: the new state, and its derivatives.
+        """Advance the state x (7,) by a step; returns the new state and its derivatives.
 
         x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's
         They are those to x, (7, 7), and to the two force samples at the step's start and at its end, (7, 2) per N.
@@ -80,7 +82,7 @@ class PitchStep:
 
 @cache
 def responding(mode: str, geometry: str) -> Any:
-    """The compiled step of one mode with its derivatives, made when first asked for.
+    """The compiled filter step with its derivatives for one mode and geometry, compiled when it is first requested.
 
     (x, step, count, inputs, rows, p, hats) -> (7, 12): x after it, its columns d/dx (7), d/d(first force sample) (2)
     and d/d(last one) (2). step to p are those of the reference's march; hats (rows, 2) say how the first and the
@@ -120,7 +122,7 @@ KNOWN = 1e-6
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measured pitch and/or pitch rate.
+    """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
     period : s; columns : PITCH, RATE or both; deviations : white noise of each column, per sample
@@ -161,7 +163,9 @@ class PitchEstimate:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Filter steps that end at each time: prediction (n, 7), transition and noise (n, 7, 7)."""
+    """Record of the filter steps that end at each time: predicted states (n, 7), transition and noise matrices (n, 7,
+    7).
+    """
 
     predictions: np.ndarray
     transitions: np.ndarray
@@ -169,12 +173,16 @@ class _Steps:
 
 
 class PitchFilter(ExtendedKalmanFilter):
-    """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
+    """Extended Kalman filter that predicts the vehicle's motion step by step; ``x`` (7,) and ``P`` (7, 7) as filterpy
+    names them.
+    """
 
     def __init__(
         self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measurement: Measurement
     ) -> None:
-        """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
+        """Initial state ``start`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample, per
+        step of the filter.
+        """
         super().__init__(dim_x=STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measurement
         self.x, self.P = start.copy(), covariance.copy()
@@ -183,7 +191,7 @@ class PitchFilter(ExtendedKalmanFilter):
         self._seen = [self._model_of_columns(there) for there in range(1 << len(measurement.columns))]
 
     def predict_x(self, u: Any = 0) -> None:
-        """State and Jacobians over step number ``u``.
+        """Predict the state and its Jacobians over step number ``u``.
 
         A force sample that is read linearly acts on the step before it, too. That part, ``late``, is not in P: it
         joins one step later, with what the same sample does then. So the noise that joins is white, and the
@@ -207,7 +215,9 @@ class PitchFilter(ExtendedKalmanFilter):
         return white
 
     def _model_of_columns(self, column_bits: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
+        """Measurement model of the columns whose bits are set in ``column_bits``: their indices, rows (m, 7) that
+        select them from the state, and noise covariance (m, m).
+        """
         chosen = np.array([i for i in range(len(self.measured.columns)) if column_bits >> i & 1], dtype=int)
         return (
             chosen,
@@ -245,7 +255,7 @@ def estimate(
 
 
 def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
-    """Predict over each step, take in what was measured at its end, and keep everything."""
+    """Run the filter: predict each step, update with the measurement at its end, and record all of it."""
     n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
     every, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
@@ -271,7 +281,8 @@ def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
 def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
     """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
-    It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
+    The smoother supports linear steps only, x -> F x. An eighth state, always 1, carries the difference between the
+    nonlinear step and F x.
     """
     n = len(filtered.states)
     states, covariances = np.ones((n, 8)), np.zeros((n, 8, 8))
@@ -285,14 +296,18 @@ def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of the covariance of seven states and an eighth that is certain."""
+    """Inverse of a covariance (8, 8) of seven states and an eighth that is certain; its row and column are left
+    zero.
+    """
     inverse = np.zeros((8, 8))
     inverse[:7, :7] = np.linalg.inv(matrix[:7, :7])
     return inverse
 
 
 def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
-    """State and covariance at the start: the vehicle turned as a whole by ``turn`` (rad), its inertia's share."""
+    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by ``turn`` (rad)
+    and from ``inertia``, the standard deviation of the share by which 1/I is off.
+    """
     p = assembly.parameters
     turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
     covariance = np.outer(turned, turned) + KNOWN**2 * np.eye(STATES)

@@ -36,7 +36,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: Scene) -> tuple[Finding, ...]:
-    """Queries about the vehicle, and doubts about what drives and what holds it."""
+    """Doubts about implausible parameters of the vehicle, and about the inputs that drive and hold it."""
     doubts = (Finding("input", "doubt", scene.file, text) for text in assemble(scene).doubts)
     return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
@@ -58,7 +58,7 @@ def _line(label: str, text: str) -> str:
 
 
 def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
-    """Parameter set, bodies, struts and start, a line each."""
+    """Lines on the parameter set, the bodies, the struts and the initial state."""
     scene_vehicle, vehicle = scene.vehicle, assembly.vehicle
     changed = ", ".join(f"{name} = {value:g}" for name, value in scene_vehicle.override.items())
     lines = [_line("vehicle", scene_vehicle.parameters + (f", but {changed}" if changed else ""))]
@@ -88,7 +88,7 @@ def _channels(assembly: Assembly) -> list[str]:
 
 
 def trust_line(assembly: Assembly) -> list[str]:
-    """How long the pitch of a force-excited run can be trusted, one line; none for a road or a guided run."""
+    """One line on how long the pitch of a force-excited run can be trusted; none on a road or for a guided run."""
     if assembly.mode not in ("force", "force-body"):
         return []
     from models.systems.pitch_plane.trust import predict_trust
@@ -102,7 +102,7 @@ def trust_line(assembly: Assembly) -> list[str]:
 
 
 def doubt_lines(assembly: Assembly) -> list[str]:
-    """Sentences on what contradicts the scene, a line each."""
+    """Lines with the sentences on what contradicts the scene."""
     return [_line("doubt", text) for text in assembly.doubts]
 
 

@@ -34,10 +34,10 @@ def run(
 ) -> Result:
     """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
 
-    settings : in place of the scene's own; assembly : what runs, where it is known already or was changed by hand;
-    error : whether the error of the steps is estimated, by further runs. What the run assumes is judged always.
-    The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the tree is compared with
-    the reference, and says so in "beside reference".
+    settings : replace the scene's own; assembly : replaces the one that the scene describes, where it is known already
+    or was changed by hand; error : whether the error of the steps is estimated, by further runs. The run's assumptions
+    are always judged. The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the
+    tree is compared with the reference; the result is in "beside reference".
     """
     assembly, settings = assembly or assemble(scene), settings or settings_of(scene, engine)
     rows = slice(None, None, _keep_every(scene, settings))
@@ -70,7 +70,9 @@ def run(
 
 
 def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
-    """``run`` of what may drift off: a run whose error is as large as itself is returned with it, and not refused."""
+    """``run`` for a vehicle that may drift off: a run whose error is as large as its motion is returned and not
+    refused.
+    """
     try:
         return run(scene, engine, error=error)
     except RunFailed as failure:
@@ -80,7 +82,9 @@ def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
 
 
 def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
-    """The result with the error of its principal channels, at all steps and not at the saved rows alone."""
+    """The result with the errors of its principal channels, estimated from all steps and not only from the saved
+    rows.
+    """
     engine, names = run.data.attrs["engine"], principal(assembly)
     fine, sizes = _series(run.detail.times, channels, names), _sizes(assembly, channels)
     method = CATALOGUE[engine][settings.integrator]
@@ -100,8 +104,9 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
-    """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
-    the error."""
+    """Rerun in which the engine's own longest step is doubled, too, where the input allows it: this step may dominate
+    the error.
+    """
     try:
         return rerun(replace(settings, step=2.0 * settings.step))
     except InputError:
@@ -113,8 +118,9 @@ def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Se
 
 
 def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """Sizes to which errors of enforced moment and force are related: from the chassis' inertia, as both may be
-    zero."""
+    """Sizes by which errors of the enforced moment and force are divided. They come from the chassis' inertia, as
+    moment and force may be zero.
+    """
     sizes = {}
     if "enforced_moment" in channels:
         sizes["enforced_moment"] = size_of(channels["inertia_term"][2])
@@ -124,8 +130,9 @@ def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
 
 
 def _growth(assembly: Assembly) -> dict[str, float]:
-    """Rms of an error of the pitch over a whole run by that over its first part: a free vehicle under wheel forces
-    tilts ever faster."""
+    """Ratio of the rms pitch error over a whole run to that over its first part: a free vehicle under wheel forces
+    tilts ever faster.
+    """
     if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
         return {}
     from models.drift.growth import pitch_variance
@@ -138,7 +145,7 @@ def _growth(assembly: Assembly) -> dict[str, float]:
 
 
 def _settings_of_longer_step(settings: Settings, times: float, share: float) -> Settings:
-    """Steps so many times as long, over a share of the run, in whole steps."""
+    """Settings with a step ``times`` as long, over ``share`` of the run, rounded to whole steps."""
     step = times * settings.step
     return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 
@@ -157,7 +164,7 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
 def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
     """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
 
-    ``model`` is the one that made the run, and is asked where an effect reads accelerations.
+    ``model`` is the model that made the run; effects that need accelerations compute them with it.
     """
     channels: Channels = {}
     for i, (name, meaning) in enumerate(zip(STATES, MEANINGS, strict=True)):
@@ -174,7 +181,7 @@ def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> 
 
 
 def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
-    """The input at the saved times: on a uniform grid, or one by one for adaptive engines."""
+    """The input at the saved times, sampled on a uniform grid or, for adaptive engines, time by time."""
     if assembly.input is None:
         return None
     step = times[1] - times[0]

@@ -26,7 +26,7 @@ NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, 
 
 
 def check_rate(scene: Scene, place: str, rate: float) -> None:
-    """Refuse, before a run, a sampling rate whose instants fall between the rows of an engine."""
+    """Refuse, before a run, a sampling rate whose sampling times are not at steps of an engine."""
     if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
         raise InputError(scene.file, place, rate, NO_ROW)
     for engine in CATALOGUE:
@@ -40,7 +40,7 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
 
 
 def check_end(scene: Scene, place: str, file: str, end: float) -> None:
-    """Refuse a file that ends (s) before the run does."""
+    """Refuse a file whose data end at a time ``end`` (s) before the run does."""
     length = scene.run.duration
     if end < length * (1 - 1e-9):
         from models.core.time_series import other_unit
@@ -50,12 +50,12 @@ def check_end(scene: Scene, place: str, file: str, end: float) -> None:
 
 
 def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
-    """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
+    """Number (n,) of the sensor's last sampling time at or before each of the times (n,) in s."""
     return np.floor(times * rate + SLACK).astype(np.int64)
 
 
 def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
-    """Sampled values at the sensor's last instant at or before each row, shape (n,).
+    """Values (n,) held by a sensor: for each row the value at the last sampling time at or before it.
 
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
     """
@@ -67,20 +67,23 @@ def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scen
 
 
 def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
-    """The reading with white noise on each sample: ``sampling_rate``, ``deviation``, ``seed`` and ``path`` of p."""
+    """The sampled reading with white noise on each sample; ``p`` has sampling_rate, deviation, seed and path."""
     number = instant_numbers(times, p.sampling_rate)
     noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
     return read_samples(times, values, p.sampling_rate, scene, place) + noise[number]
 
 
 def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
-    """Assumption that a sensor stays within its range; channels by the names of their sensors."""
+    """Assumption that a sensor stays within its range; ``channels`` gives the run's channel for each name of a
+    sensor.
+    """
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
     return Assumption(f"{effect} in range", says, remedy, watching(**channels), unit, -limit, limit)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:
-    """The samples themselves as a file that other effects read: name of its column -> channel of the result.
+    """Write samples to a file that other effects read; ``columns`` gives the result's channel for each name of a
+    column.
 
     Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
     """

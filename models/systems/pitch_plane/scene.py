@@ -67,7 +67,7 @@ class Scene(SceneFile):
     engines: dict[str, EngineTable] = Field(default_factory=dict)
 
     def vehicle_parameters(self) -> pitch_plane.Parameters:
-        """The parameter set with the scene's overrides; each is judged under its own file's name."""
+        """The parameter set with the scene's overrides; an error names the file from which the value comes."""
         base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
         values = {**base.model_dump(), **self.vehicle.override}
         p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
@@ -91,7 +91,7 @@ class Scene(SceneFile):
 
 
 def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
-    """A published set by its name, or the user's own from a TOML file."""
+    """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
         return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
     if name not in parameter_sets():
@@ -105,7 +105,7 @@ SMALLEST = 1e-9
 
 
 def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
-    """Every run begins from the static equilibrium, so there must be one."""
+    """Refuse parameters without a static equilibrium, in which every run begins."""
     for name, value in p:
         if 0 < value < SMALLEST:
             allowed = f"too small for a vehicle: at least {SMALLEST:g}"
@@ -134,14 +134,14 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
 
 
 def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
-    """The scene with some values of its tables changed, by the tables' names."""
+    """The scene with some values changed; ``tables`` gives them by the names of the scene's tables."""
     table = scene.table()
     tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
     return build({**table, **tables_now}, scene.file, Path(scene.folder))
 
 
 def _check_engine(name: str, scene: Scene) -> None:
-    """Check that engine and integrator are known, and that no setting is one that the integrator would not read."""
+    """Refuse unknown engines and integrators, and settings that the integrator does not read."""
     if name not in CATALOGUE:
         raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
     given, place = scene.engines[name], f"engines.{name}"
@@ -162,7 +162,7 @@ def _check_engine(name: str, scene: Scene) -> None:
 
 
 def _check_times(scene: Scene) -> None:
-    """The duration and the saved spacing are whole numbers of every engine's steps."""
+    """Refuse a duration, or a spacing of saved rows, that is not a whole number of steps in every engine."""
     for name in CATALOGUE:
         stated = name in scene.engines and scene.engines[name].step is not None
         _check_step(scene, f"engines.{name}.step" if stated else "run.step", float(scene.settings(name).step or 0))
@@ -201,7 +201,7 @@ def settings_of(scene: Scene, engine: str) -> Settings:
 
 
 def assemble(scene: Scene) -> Assembly:
-    """Build what the scene names; only the files of its effects are imported."""
+    """Assemble the vehicle with the effects that the scene names; only the modules of these effects are imported."""
     p = scene.vehicle_parameters()
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
@@ -211,7 +211,7 @@ def assemble(scene: Scene) -> Assembly:
 
 
 def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
-    """Static equilibrium, with the coordinates that the scene sets put in its place."""
+    """Initial state: the static equilibrium, except for the coordinates that the scene sets."""
     state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
     for name, value in scene.start.items():
         if name not in STATE_NAMES:

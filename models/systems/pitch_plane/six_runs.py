@@ -40,15 +40,18 @@ class Options(Strict):
 
 
 def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
-    """The scene's options; refuses, before anything is written, one that cannot be followed through all its runs."""
+    """The scene's options; refuses, before any file is written, options with which one of the study's runs is
+    impossible.
+    """
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     return options
 
 
 def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
-    """The measurement, the noise's deviation (N), and by name the scenes of runs on the files that it leaves; whether
-    the measurement tells the error of its steps."""
+    """The measurement, the standard deviation (N) of the forces' noise, and by name the scenes of runs on the measured
+    files. ``error`` requests the error of the measurement's steps.
+    """
     options, measured = options_of(scene), measure(scene, error)
     deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
     vehicle, follow = scene.vehicle_parameters(), follower(scene, folder)
@@ -70,7 +73,7 @@ def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, f
 
 
 def error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
-    """Difference to the measurement at the run's own times."""
+    """A run's channel less the measured one, at the run's own times."""
     return run[channel] - np.interp(run.times, measured_run.times, measured_run[channel])
 
 

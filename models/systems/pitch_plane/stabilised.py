@@ -79,7 +79,9 @@ class Options(Strict):
 
 
 def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
-    """The scene's options; refuses, before anything is written, one that cannot be followed through all its runs."""
+    """The scene's options; refuses, before any file is written, options with which one of the study's runs is
+    impossible.
+    """
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     check_steps(scene, engines)
@@ -101,7 +103,7 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
 
 
 def roads(scene: Scene, options: Options) -> dict[str, Scene]:
-    """The scene's own road, and where a grade is asked for, the same road on it."""
+    """The scene's own road and, where options.grade is set, the same road on that grade."""
     if options.grade is None:
         return {"road": scene}
     road = scene.table()["effects"]["road"]
@@ -114,7 +116,7 @@ def roads(scene: Scene, options: Options) -> dict[str, Scene]:
 def compare(
     scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 ) -> tuple["list[Bench]", list[Row], dict[str, str]]:
-    """Benches of all roads, a row per method, and why runs failed, by name.
+    """Benches of all roads, a row of figures for each run of a method, and reasons of failed runs by name.
 
     The first engine runs all methods, the others, on the scene's own road, those that it accepts.
     """
@@ -130,11 +132,11 @@ def compare(
 
 
 class Bench:
-    """One road: what was measured on it, and the perturbed model's runs on these files.
+    """The measurement on one road, and runs of the perturbed model on the measured files.
 
-    Known before any run: ``trusted``, until when a free one can be trusted (s); ``holding``, which spring holds (N
-    m/rad); ``error``: whether the measurement tells the error of its steps, which all runs have in common; ``results``:
-    the measurement and all runs of methods, by name.
+    Known before any run: ``trusted``, the time (s) until which a free run can be trusted; ``holding``, the stiffness (N
+    m/rad) of a spring that holds; ``error``: whether the measurement states the error of its steps, which all runs
+    share; ``results``: the measurement and all runs of methods, by name.
     """
 
     def __init__(self, scene: Scene, road: str, options: Options, folder: Path, error: bool = False) -> None:
@@ -154,7 +156,7 @@ class Bench:
         self.holding = holding_stiffness(self.parameters, predicted.rate)
 
     def _write_sensors(self, stride: int, period: float) -> None:
-        """Noisy pitch, and exact heave and pitch, as files."""
+        """Write files of the noisy pitch, and of the exact heave and pitch."""
         heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
         noise = normal(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
@@ -164,15 +166,15 @@ class Bench:
 
     @property
     def resisting(self) -> float:
-        """I + J in kg m^2: what a moment on the pitch has to turn."""
+        """Inertia I + J in kg m^2 that a moment on the pitch has to turn."""
         return rigid_pitch(self.parameters).total
 
     def spring(self, stiffness: float) -> dict[str, float]:
-        """Settings of a spring to the ground with its damper."""
+        """Settings of a spring to the ground, with a damper of fixed damping ratio."""
         return {"stiffness": stiffness, "damping": 2.0 * DAMPING * math.sqrt(stiffness * self.resisting)}
 
     def _methods(self) -> dict[str, dict[str, Any]]:
-        """Name -> effects beside forces and noise."""
+        """Effects of each method by its name, in addition to forces and noise."""
         options, noisy = self.options, "measured_pitch.csv"
         sure = {"file": noisy, "pitch_deviation": options.angle_deviation, "force_deviation": self.deviation}
         filtered = {**sure, "inertia_deviation": options.inertia_deviation}
@@ -199,7 +201,9 @@ class Bench:
     def score(
         self, engine: str, other_engines: tuple[str, ...], failed: dict[str, str], progress: Progress
     ) -> list[Row]:
-        """A row per method in one engine, and in the others if it is accepted; ``failed`` takes runs that fail."""
+        """A row of figures per method in one engine, and in the other engines if it is accepted; failed runs go into
+        ``failed``.
+        """
         rows: list[Row] = []
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
@@ -211,7 +215,7 @@ class Bench:
         return rows
 
     def _scored(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
-        """One row, or none for a run that fails."""
+        """One row of figures, or none if the run fails."""
         start = time.perf_counter()
         try:
             result = self.simulate(engine, effects)
@@ -223,7 +227,7 @@ class Bench:
         return [{"engine": engine, "road": self.road, **self.row(name, effects, result), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
-        """A run of the perturbed model under noisy forces."""
+        """Result of a run of the perturbed model under the noisy forces, with these effects."""
         return run(self._scene(effects), engine)
 
     def _scene(self, effects: dict[str, Any]) -> Scene:
@@ -231,7 +235,7 @@ class Bench:
         return self.follow(self.override, noise | effects)
 
     def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
-        """Figures and verdicts; a tumbled run has no damage that could mislead."""
+        """Figures and verdicts of a run; a run that tumbled gets no damage ratios, which would mislead."""
         limits = self.options.limits
         figures, wrong = figures_of_run(result, self.parameters), errors(result, self.truth, self.options.slope)
         with_truth = verdict(figures, wrong, effects, limits)
@@ -261,7 +265,9 @@ class Bench:
         }
 
     def sweep(self) -> np.ndarray:
-        """(n, 4): stiffness, largest pitch error of the spring, of the high-pass, worst damage ratio of the spring."""
+        """Sweep (n, 4) over the spring's stiffness: the stiffness, the largest pitch error with the spring and with the
+        high-pass, and the worst damage ratio with the spring.
+        """
         rows = []
         for stiffness in self.options.sweep:
             cut_off = math.sqrt(stiffness / self.resisting) / (2.0 * math.pi)

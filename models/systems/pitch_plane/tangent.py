@@ -36,7 +36,7 @@ or a stiffness that is wrong together with the inertia would leave a moment that
 
 
 class StageForces(NamedTuple):
-    """Forces on the path and on its error columns at the start, the middle and the end of each step.
+    """Wheel forces on the path, and errors of these forces, at the start, the middle and the end of each step.
 
     step : s. forces : (rows, 2) in N, of the wheels. errors : (rows, m, 2) in N, their errors by column. to_middle,
     to_end, to_next : rows of ``forces`` from a step's start to its middle, its end and the next step.
@@ -52,7 +52,9 @@ class StageForces(NamedTuple):
 
 @register_jitable
 def jacobian(y, u, p, body, flat, x, dx):
-    """dx = A x at the state y (8,) under the wheel forces u (2,); ``flat`` is the linearised geometry."""
+    """Compute dx = A x, where A is the Jacobian at the state y (8,) under the wheel forces u (2,); ``flat`` : linear
+    geometry.
+    """
     pitch, rate = (0.0, 0.0) if flat else (y[3], y[7])
     sine, cosine = math.sin(pitch), math.cos(pitch)
     a, b, inertia = p[0], p[1], p[5]
@@ -72,7 +74,7 @@ def jacobian(y, u, p, body, flat, x, dx):
 
 @register_jitable
 def pushed(y, p, body, du, dx):
-    """Add to dx (8,) what the force errors du (2,) in N do."""
+    """Add to the rates dx (8,) the effect of the errors du (2,) in N of the wheel forces."""
     sine, cosine = (math.sin(y[3]), math.cos(y[3])) if body else (0.0, 1.0)
     dx[4] -= cosine * du[0] / p[2]
     dx[5] -= cosine * du[1] / p[3]
@@ -81,7 +83,7 @@ def pushed(y, p, body, du, dx):
 
 def _step_of(rhs, body, flat):
     def step_of(y, x, given, count, row, p, other):
-        """Runge-Kutta step number ``count`` of the path y (8,) and the error columns x (m, 8), in place.
+        """Advance the path y (8,) and the error columns x (m, 8), in place, by the Runge-Kutta step number ``count``.
 
         given : ``StageForces``, whose errors are read from ``row`` on; p, other : parameters (15,), true and wrong.
         """
@@ -117,7 +119,7 @@ def _step_of(rhs, body, flat):
 
 
 def compile_carry(one_step, key):
-    """March that keeps the path and its error columns at every step."""
+    """Compile a march that records the path and its error columns at every step."""
 
     def carry(y, x, given, p, other, states, kept):
         states[0], kept[0] = y, x
@@ -130,14 +132,14 @@ def compile_carry(one_step, key):
 
 @cache
 def march_along(compile_march: Any, mode: str, geometry: str) -> Any:
-    """A march along the path of a mode and a geometry, compiled when first asked for."""
+    """A march along the path for one mode and geometry, compiled when it is first requested."""
     one_step = _step_of(RIGHT_HAND_SIDES[mode, geometry], mode == "force-body", geometry == "linear")
     return compile_march(one_step, (mode, geometry))
 
 
 @dataclass(frozen=True)
 class TangentPath:
-    """A force-excited run as errors are carried along it: by fixed steps that divide the sampling period.
+    """A force-excited run along which small errors are propagated, in fixed steps that divide the sampling period.
 
     per_sample : steps from one sample of the forces to the next; samples : periods that the run covers.
     """
@@ -165,20 +167,21 @@ class TangentPath:
         return self.forces.sample(0.0, self.step / 2, 2 * self.steps + 1)
 
     def given(self, errors: np.ndarray) -> StageForces:
-        """The wheel forces at the stages of all steps, with these errors (rows, m, 2) in N."""
+        """The wheel forces at the stages of all steps, together with their errors (rows, m, 2) in N."""
         return StageForces(self.step, self.inputs, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
 
     def march(self, compile_march: Any):
-        """A compiled march that fits the assembly."""
+        """The compiled march for the mode and geometry of the assembly."""
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
     def carry(
         self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
+        """Path (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the columns begin with ``columns`` (m, 8).
 
         errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step;
-        wrong_parameters : the parameters of a wrong model, whose error forces every column."""
+        wrong_parameters : the parameters of a wrong model, whose error forces every column.
+        """
         count, p = self.steps, self.assembly.parameters.array()
         wrong = p if wrong_parameters is None else p + SMALL * (wrong_parameters.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
@@ -190,12 +193,12 @@ class TangentPath:
 
     @property
     def times(self) -> np.ndarray:
-        """Ends of the steps (s), the start included."""
+        """Times (s) of the start and of the end of each step."""
         return self.step * np.arange(self.steps + 1)
 
 
 def path_of(assembly: Assembly, longest: float = STEP) -> TangentPath:
-    """The path of a free force-excited run; raises ValueError for any other."""
+    """The path of a free force-excited run; raises ValueError for a run of another kind."""
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
@@ -205,7 +208,8 @@ def path_of(assembly: Assembly, longest: float = STEP) -> TangentPath:
 
 
 def tilted(assembly: Assembly) -> np.ndarray:
-    """Two columns (2, 8): a tilt of 1 rad and a rate of 1 rad/s of the rigid vehicle, its wheels moving along.
+    """Two initial error columns (2, 8): a tilt of 1 rad and a tilt rate of 1 rad/s of the rigid vehicle with its
+    wheels.
 
     The struts keep their lengths, so that no fast motion is started that would have to die out first.
     """
@@ -216,17 +220,18 @@ def tilted(assembly: Assembly) -> np.ndarray:
 
 
 def tilt_map(path: TangentPath) -> np.ndarray:
-    """Matrix that maps tilt and tilt rate at the start of a path to those at its end, shape (2, 2).
+    """Matrix (2, 2) that maps tilt and tilt rate at the start of a path to tilt and tilt rate at its end.
 
-    The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
-    fast motion is in the four numbers.
+    The slow error has no damping, so that the determinant of the exact map is 1. Its difference from 1 measures how
+    much of the fast motion is in the four numbers.
     """
     _, columns = path.carry(tilted(path.assembly))
     return columns[-1][:, [3, 7]].T
 
 
 def measured_growth(path: TangentPath) -> tuple[float, float]:
-    """Growth rate (1/s) of a tilt error along a path, and its uncertainty (1/s), which falls with the length.
+    """Growth rate (1/s) of a tilt error along a path, and the uncertainty (1/s) of this rate, which falls with the
+    path's length.
 
     The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
     they meet, at 1, an error of the map moves them by its square root.
@@ -244,20 +249,22 @@ def swing(path: TangentPath) -> float:
 
 @dataclass(frozen=True)
 class CovarianceOverTime:
-    """Covariance of the state over time. times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the
-    state, products of two."""
+    """Covariance of the state over time. times (n,) : s, those of the samples; matrices (n, 8, 8) : in products of the
+    states' units.
+    """
 
     times: np.ndarray
     matrices: np.ndarray
 
     def deviation(self, coordinate: str) -> np.ndarray:
-        """Standard deviation (n,) of a coordinate by its name: m or rad."""
+        """Standard deviation (n,) of a coordinate over time, by its name; m or rad."""
         i = STATES.index(coordinate)
         return np.sqrt(self.matrices[:, i, i])
 
 
 def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> CovarianceOverTime:
-    """Covariance along a free force-excited run, of noise with a standard deviation (N) of each sample.
+    """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
+    (N) per sample.
 
     longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
     every sample of a spline reaches into all periods.
@@ -269,7 +276,7 @@ def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> C
 
 
 def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
-    """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
+    """Covariances (samples + 1, 8, 8) at the samples of a path under noise of ``deviation`` (N); 0 at the start."""
     matrices = np.zeros((path.samples + 1, 8, 8))
     stages = np.arange(2 * path.per_sample + 1) / (2 * path.per_sample)
     weights = np.zeros((len(stages), 12, 2))  # force errors of 1 N in the sample at the start and in that at the end
@@ -289,7 +296,7 @@ def noise_covariances(path: TangentPath, deviation: float) -> np.ndarray:
 
 def _compile_covariance(one_step, key):
     def covariance_march(y, per_sample, given, p, intensity, matrices):
-        """The recursion of this file; x holds the columns of Phi, G0 and G1."""
+        """Run the covariance recursion of this file; x holds the columns of Phi, G0 and G1."""
         x, before = np.empty((12, 8)), np.zeros((2, 8))
         for i in range(len(matrices) - 1):
             x[:] = 0.0

@@ -35,7 +35,7 @@ SMALL = 0.2
 
 
 def small_errors(angle: float) -> Assumption:
-    """Assumption that the pitch error up to which a run is trusted is small enough for the growth laws."""
+    """Assumption that ``angle``, up to which a run is trusted, is small enough for the laws of growth."""
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
     return Assumption("small errors", says, remedy, partial(_allowed, angle), "rad", most=SMALL)
 
@@ -46,7 +46,7 @@ def _allowed(angle: float, run: Result) -> Watched:
 
 @dataclass(frozen=True)
 class Growth:
-    """Growth of a pitch error by the wheel forces alone, before any run.
+    """Growth that the wheel forces alone give a pitch error, computed before any run.
 
     times (n,) in s, those of the samples; rate : mean growth rate, 1/s; sinh_rate (n,) : the rate in the sinh law at
     each time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
@@ -59,19 +59,19 @@ class Growth:
 
 @dataclass(frozen=True)
 class GrowthCurve:
-    """Size of the pitch error (rad) that one source makes, at ``times`` (n,) in s, as long as it is small."""
+    """Size (rad) of the pitch error from one source at ``times`` (n,) in s, valid while it is small."""
 
     times: np.ndarray
     size: np.ndarray
 
     def passes(self, angle: float = ANGLE) -> float | None:
-        """First time (s) at which the size exceeds ``angle`` (rad), None if it never does."""
+        """First time (s) at which the error exceeds ``angle`` (rad), None if it never does."""
         beyond = ~(self.size <= angle)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
 def growth(assembly: Assembly) -> Growth:
-    """Growth along a free force-excited run; raises ValueError for any other."""
+    """Growth of a pitch error along a free force-excited run; raises ValueError for a run of another kind."""
     path = path_of(assembly)
     times = path.forces.period * np.arange(path.samples + 1)
     if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
@@ -83,20 +83,21 @@ def growth(assembly: Assembly) -> Growth:
 
 
 def _covering(path: TangentPath) -> np.ndarray:
-    """Samples (n + 1, 2) of the run; where held ones end with it, the last one stands twice."""
+    """Samples (n + 1, 2) of the run's wheel forces; if held samples end with the run, the last one is repeated."""
     values = path.forces.values[: path.samples + 1]
     return values if len(values) > path.samples else np.vstack([values, values[-1:]])
 
 
 def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
-    """Median size over paths, for white samples of ``deviation`` (N) each."""
+    """Pitch error from white noise of ``deviation`` (N) on each force sample: median of its size over noise paths."""
     growing, period = growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
     return GrowthCurve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity)))
 
 
 def interpolation_error(path: TangentPath) -> np.ndarray:
-    """Error (3 steps, 2) in N of the scene's rule between the samples, by a quintic spline through the same ones.
+    """Error (3 steps, 2) in N that the scene's interpolation of force samples has, compared with a quintic spline
+    through these samples.
 
     At the start, the middle and the end of each step. Linear samples err by f'' t (T - t) / 2, on average by
     f'' T^2 / 12. Held ones first of all delay the whole run by T / 2, which is no drift: they are judged by the
@@ -111,16 +112,17 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
 
 
 def interpolation(assembly: Assembly, longest: float = STEP) -> GrowthCurve:
-    """Error of the rule between the samples alone; 0 for a run of too few samples to tell."""
+    """Pitch error from the interpolation between samples alone; 0 for a run with too few samples to estimate it."""
     path = path_of(assembly, longest)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
 def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> GrowthCurve:
-    """Error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
+    """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
-    What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
-    The difference is carried along a run with the mean of both models, which leaves no error of second order.
+    The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
+    alone. The difference is propagated along a run with the mean of both models, which leaves no error of second
+    order.
     """
     parameters = assembly.parameters.model_dump()
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
@@ -138,7 +140,9 @@ def _growth_by_parameters(
 
 
 def rounding(assembly: Assembly) -> GrowthCurve:
-    """Median size of what rounding alone does, each step rounding the pitch rate anew: a floor for every solver."""
+    """Pitch error from rounding alone, median of its size: each step rounds the pitch rate anew. No solver can do
+    better.
+    """
     growing, path = growth(assembly), path_of(assembly)
     rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
@@ -149,7 +153,8 @@ def rounding(assembly: Assembly) -> GrowthCurve:
 
 @dataclass(frozen=True)
 class Trust:
-    """Times (s) by source of error, None where it does not end the run's trust; ``rate`` in 1/s, ``angle`` in rad.
+    """Times (s) at which each source of error ends the trust in a run, None where it does not; ``rate`` in 1/s,
+    ``angle`` in rad.
 
     unchecked : what was not looked at, with what would show it.
     """
@@ -161,12 +166,12 @@ class Trust:
 
     @property
     def until(self) -> tuple[str, float] | None:
-        """The source that comes first and its time (s); None if nothing limits the run."""
+        """The source of error that ends the trust first, and its time (s); None if nothing limits the run."""
         limits = [(time, name) for name, time in self.times.items() if time is not None]
         return min(limits)[::-1] if limits else None
 
     def __str__(self) -> str:
-        """The one line of a plan."""
+        """The line that describes this trust in a plan."""
         grown, rest = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s", self.unchecked and f"; {self.unchecked}"
         if self.until is None:
             return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
@@ -175,8 +180,9 @@ class Trust:
 
 
 def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
-    """How long a scene's run can be trusted, and why; None for a run that is guided, held, or on a road, where no error
-    grows."""
+    """Time for which a scene's run can be trusted, and the reason. None for a run that is guided, held, or on a road:
+    its errors do not grow.
+    """
     forces = assembly.input
     try:
         path_of(assembly)
@@ -194,8 +200,9 @@ def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
 
 
 def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
-    """When the steady accelerations of doubtful forces have moved the vehicle: turned it by the angle, or made it fall
-    or rise by as much as that angle moves one axle against the other."""
+    """Time (s) by which the mean accelerations of doubtful forces have turned the vehicle by the angle, or moved it
+    vertically as far as the angle moves one axle relative to the other.
+    """
     if not assembly.doubts:
         return {}
     from models.measured.axle_forces import equilibrium_residual
@@ -212,7 +219,7 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
 
 
 def _axles(assembly: Assembly) -> "AxleForces":
-    """The wheel forces of a run as the checks of recordings read them."""
+    """The wheel forces of a run in the form that the checks of recordings read."""
     from models.measured.axle_forces import AxleForces
 
     path, turn = path_of(assembly), assembly.mode == "force-body"

@@ -33,17 +33,17 @@ Follow = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 
 
 def perturbed(p: Parameters, factors: Mapping[str, float] = PAPER) -> dict[str, float]:
-    """Parameters times their factors, by name."""
+    """Changed parameters by name: each is the value in ``p`` times its factor."""
     return {name: getattr(p, name) * factor for name, factor in factors.items()}
 
 
 def measure(scene: Scene, error: bool = False) -> Result:
-    """The run on the road, in the reference by Runge-Kutta steps; ``error`` as in ``run``."""
+    """Run the vehicle on the road in the reference, with Runge-Kutta steps; ``error`` as in ``run``."""
     return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=error)
 
 
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
-    """Refuse a scene that is no virtual measurement, or that cannot be followed through all runs on its files."""
+    """Refuse a scene that is no virtual measurement, or with which a run on its measured forces is impossible."""
     for name in scene.effects:
         if name not in MEASURING:
             allowed = "this study measures on a road and names the effects of the other runs itself: drop it"
@@ -65,7 +65,7 @@ def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> 
 
 
 def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Refuse an engine with a step of its own where runs are compared with the measurement row by row."""
+    """Refuse an engine whose step differs from the measurement's, where runs are compared with it row by row."""
     for engine in engines:
         step = scene.settings(engine).step
         if step != scene.run.step:
@@ -77,7 +77,7 @@ def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
 
 
 def stride(scene: Scene, sampling_rate: float) -> int:
-    """Steps of the measurement from one sample to the next."""
+    """Number of steps of the measurement between samples."""
     ratio = 1.0 / (sampling_rate * scene.run.step)
     if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         allowed = f"the sampling period must be a multiple of run.step = {scene.run.step:g} s"
@@ -86,12 +86,14 @@ def stride(scene: Scene, sampling_rate: float) -> int:
 
 
 def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, period: float) -> None:
-    """``wheel_forces.csv`` of forces (n,) in N, up on the wheels, every ``period`` (s)."""
+    """Write ``wheel_forces.csv`` with forces (n,) in N, up on the wheels, every ``period`` (s)."""
     write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
 
 
 def write_measurement(measured_run: Result, folder: Path, period: float) -> float:
-    """``wheel_forces.csv`` and ``pitch.csv`` every ``period`` (s); returns the largest force (N)."""
+    """Write ``wheel_forces.csv`` and ``pitch.csv`` with a sample every ``period`` (s); returns the largest force
+    (N).
+    """
     every = round(period / float(measured_run.times[1] - measured_run.times[0]))
     front, rear, pitch = (measured_run[name][::every] for name in ("f1", "f2", "pitch"))
     write_wheel_forces(folder, front, rear, period)
@@ -100,7 +102,9 @@ def write_measurement(measured_run: Result, folder: Path, period: float) -> floa
 
 
 def follower(scene: Scene, folder: Path) -> Follow:
-    """Builder of scenes on the files in ``folder``; they start where the measurement did."""
+    """Return a function that builds scenes on the files in ``folder``; their runs start in the state of the
+    measurement.
+    """
     initial = dict(zip(STATE_NAMES, assemble(scene).initial.tolist(), strict=True))
     parameters = scene.vehicle_parameters().model_dump()
 

@@ -37,9 +37,9 @@ UPRIGHT = 0.7
 def assumptions(
     scene: RideScene, vehicle: SpatialVehicle, motion: WatchedMotion | None = None, replaced: bool = False
 ) -> list[Assumption]:
-    """Assumptions of a vehicle in a scene of ride; ``motion`` of a run, which is judged by it.
+    """Assumptions of a vehicle in a scene of ride; ``motion`` : of a run, by which they are judged.
 
-    replaced : whether gains stand for bent springs.
+    replaced : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
     def of(name: str) -> np.ndarray | Gaussian:
@@ -101,7 +101,7 @@ def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
 
 
 def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
-    """Assumption on the travel of a linear spring between a wheel and what it carries."""
+    """Assumption that the linear spring between a wheel and the body that it carries stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     ends = {spring.first_body, spring.second_body}
     if abs(spring.axis[2]) < UPRIGHT or None in ends or not ends & wheels:
@@ -119,7 +119,9 @@ def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of
 
 
 def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
-    """Assumption on a nonlinear spring: by its slopes at rest within a piece of its curves, else within its tables."""
+    """Assumption on a nonlinear spring: its motion stays within the straight piece about rest if slopes at rest are
+    used, else within its tables.
+    """
     for kind, curve, unit in (("travel", spring.travel_force, "m"), ("rate", spring.rate_force, "m/s")):
         friction = spring.friction and kind == "rate" and scene.vehicle.small_motion
         if curve is None and not friction:
@@ -148,7 +150,7 @@ def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumpti
 
 
 def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
-    """Ends of a curve's table, or of the piece about rest in which it is straight."""
+    """Ends of a curve's table or, for small motion, of the straight piece about rest."""
     if curve is None:
         return -np.inf, np.inf
     at = np.array(curve.arguments)
@@ -162,7 +164,9 @@ def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
 
 
 def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
-    """Waves of the road that swing wheels and body at constant speeds; a drive is slow only while it starts."""
+    """Assumptions that, at constant speeds, the road waves that excite wheels and body have wavelengths for which
+    spectra of roads are known. A drive is slow only at its start.
+    """
     if scene.road.file is not None or vehicle.limits:
         return
     hop, bounce = swings(vehicle)
@@ -188,7 +192,9 @@ def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
 
 
 def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
-    """Highest frequency (Hz) of motions that deform above all tyres, and the lowest one of all that swing; else 0."""
+    """Highest frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest frequency of all
+    oscillations, infinite if there are none.
+    """
     still = replace(vehicle, side_forces=(), drags=(), limits=NO_LIMITS, gravity=0.0)
     linear, motion = linearise(still), Kinematics(still)
     squares, shapes = eigh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
@@ -201,7 +207,7 @@ def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
 
 
 def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
-    """Assumptions on outputs that are weighted for people along the vertical."""
+    """Assumption that people stay on their seats, for outputs that are weighted for people along the vertical."""
     people = [name for name, by in scene.weighting.items() if by == "Wk"]
     if not people:
         return

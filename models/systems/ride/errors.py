@@ -30,7 +30,7 @@ SAFETY = 2.0
 
 
 def with_changed_last_digits(vehicle: LinearVehicle, accuracy: float, draw: int = 0) -> LinearVehicle:
-    """The vehicle with other last digits: every entry of its matrices changed by up to ``accuracy`` of itself."""
+    """The vehicle with every entry of its matrices changed by a relative error of up to ``accuracy``."""
 
     def changed(matrix: np.ndarray) -> np.ndarray:
         return matrix * (1.0 + accuracy * np.cos(np.arange(1 + draw, 1 + draw + matrix.size)).reshape(matrix.shape))
@@ -51,7 +51,7 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 def with_error_of_sweep(
     run: Result, swept: Sweep, linear: Linear, roads: Mapping[str, Excitation], filters: Mapping[str, str], digit: float
 ) -> Result:
-    """The result with what rounding makes of its deviations, at some speeds on all roads."""
+    """The result with the rounding errors of its standard deviations, estimated at some speeds on all roads."""
     at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED).round().astype(int))
     recomputed = np.array(
         [[_direct(linear, road, filters, float(swept.speeds[i]), digit) for i in at] for road in roads.values()]
@@ -69,7 +69,7 @@ def with_error_of_sweep(
 
 
 def _direct(linear: Linear, road: Excitation, filters: Mapping[str, str], speed: float, digit: float) -> np.ndarray:
-    """Deviations (outputs,) of the nudged vehicle; nan where its last digits leave none."""
+    """Standard deviations (outputs,) of the vehicle with changed last digits; nan where it has none."""
     system = weighted(excited(with_changed_last_digits(linear(speed), digit), road, speed), filters)
     try:
         return stationary(system).deviation
@@ -78,5 +78,5 @@ def _direct(linear: Linear, road: Excitation, filters: Mapping[str, str], speed:
 
 
 def rms(values: np.ndarray) -> float:
-    """Root mean square, 0 of nothing."""
+    """Root mean square of values, 0 if there are none."""
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -28,8 +28,9 @@ Alone = Callable[[int], np.ndarray]
 
 
 def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
-    """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
-    fewer speeds between which the quasi-stationary ones are straight."""
+    """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
+    its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly.
+    """
     assert scene.drive is not None
     drive: VaryingSpeed = run.detail
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
@@ -58,7 +59,7 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
 
 
 def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
-    """The drive up to a time (s)."""
+    """The drive cut off at a time (s)."""
     before = profile.times < end - 1e-9
     times = [*profile.times[before], end]
     return SpeedProfile(times, [*profile.speeds[before], float(profile.speed(end))])
@@ -72,10 +73,11 @@ def with_error_of_copies(
     copies: Mapping[float, Copies],
     seed: int,
 ) -> Result:
-    """The result with the errors of its deviations, by output.
+    """The result with the errors of its standard deviations, one for each output.
 
-    Copies: by longer steps of some of them on the same roads, and by chance. Statistical linearisation: by the copies
-    beside it, less what chance makes of their difference; by what its gains leave out where that is more.
+    Copies: the error of their steps, from longer steps for some of them on the same roads, and the statistical error.
+    Statistical linearisation: the difference from the copies at the same speeds, less the statistical error of this
+    difference, or what the gains leave out where that is more.
     """
     first = next(iter(copies.values()))
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
@@ -106,7 +108,7 @@ def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
 def _of_steps(
     vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors and orders (p,) of the copies' deviations at a speed."""
+    """Errors (p,) that the steps cause in the copies' standard deviations at a speed, and observed orders (p,)."""
     twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
     count = len(twice)
     deviation = np.sqrt(fine.about_mean()[:count].mean(axis=0))
@@ -119,7 +121,9 @@ def _of_steps(
 def _of_gains(
     equivalents: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
+    """Errors of the standard deviations by statistical linearisation, from their difference to those of the copies at
+    the copies' speeds.
+    """
     beside = [(equivalents[speed], each) for speed, each in copies.items()]
     gains = np.array([each.covariance.deviation for each, _ in beside])
     true = np.array([each.deviation for _, each in beside])

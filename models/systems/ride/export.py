@@ -23,8 +23,9 @@ AXES = "x forward, y left, z up from the ground; the frame moves with the vehicl
 
 
 def exported(scene: RideScene, engine: str) -> Exported:
-    """The vehicle in "mujoco", bodies and joints, or in "exudyn", with linear springs and tyres; Refused for reduced
-    vehicles."""
+    """Export the vehicle to "mujoco" (bodies and joints) or to "exudyn" (with linear springs and tyres); Refused for
+    reduced vehicles.
+    """
     vehicle = vehicle_of(scene)
     check_whole(engine, vehicle)
     by_speed = [

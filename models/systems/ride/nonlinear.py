@@ -56,7 +56,7 @@ class Sampling(Strict):
     seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads in time")
 
     def shown(self, speeds: np.ndarray) -> float:
-        """Speed (m/s) of the engines' runs, one of the ``speeds`` where none is asked for."""
+        """Speed (m/s) of the engines' runs: the one requested, else the middle one of ``speeds``."""
         return self.speed or float(speeds[len(speeds) // 2])
 
 
@@ -65,7 +65,8 @@ class Nonlinear:
     """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
     Monte Carlo copies if the scene requests them.
 
-    shown : the replaced vehicle at the speed of the engines' runs; lifts : whether tyres may, in Monte Carlo alone.
+    shown : the statistically linearised vehicle at the speed of the engines' runs; lifts : whether tyres may lift,
+    which they do in Monte Carlo alone.
     """
 
     speeds: np.ndarray
@@ -76,19 +77,20 @@ class Nonlinear:
     lifts: bool = False
 
     def of(self, name: str) -> np.ndarray:
-        """One part (N, p) of what was found of the replaced vehicles."""
+        """One quantity (N, p) of the statistically linearised vehicles, by its name."""
         return np.array([getattr(each, name) for each in self.replaced])
 
     @property
     def deviation(self) -> np.ndarray:
-        """Deviations (N, p) by statistical linearisation."""
+        """Standard deviations (N, p) by statistical linearisation."""
         return np.array([each.covariance.deviation for each in self.replaced])
 
 
 def linearised(
     scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress, error: bool = False
 ) -> Result:
-    """Small motion and statistical linearisation at all speeds, Monte Carlo at some; detail: ``Nonlinear``.
+    """Small motion and statistical linearisation at all speeds, and Monte Carlo at some; the result's detail is
+    ``Nonlinear``.
 
     error : whether errors are estimated, by more copies in longer steps.
     """
@@ -138,7 +140,7 @@ def linearised(
 
 @dataclass(frozen=True)
 class CopiesBySpeed:
-    """Job (see ``models.ensemble.runner``): path i is all copies at the i-th speed (m/s)."""
+    """Job (see ``models.ensemble.runner``) in which path i means all Monte Carlo copies at the i-th speed (m/s)."""
 
     vehicle: SpatialVehicle
     road: Excitation
@@ -146,7 +148,7 @@ class CopiesBySpeed:
     sampling: Sampling
 
     def __call__(self, paths: range) -> Arrays:
-        """Arrays of ``Copies``, their first axis the speeds."""
+        """Arrays of ``Copies``; the first axis of each is the speed."""
         made = [self._copies_at_speed(self.speeds[i]) for i in paths]
         return {name: np.array([getattr(each, name) for each in made]) for name in Copies.__dataclass_fields__}
 
@@ -155,12 +157,12 @@ class CopiesBySpeed:
         return copies_in_time(self.vehicle, self.road, speed, s.lasting, copies=s.copies, seed=s.seed)
 
     def facts(self) -> dict[str, Any]:
-        """Nothing, as the blocks are not kept."""
+        """Empty: no facts are needed, as the blocks are not stored."""
         return {}
 
 
 def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
-    """Copies by their speeds (m/s)."""
+    """Monte Carlo copies by their speed (m/s), computed by the scene's worker processes."""
 
     def tell(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
@@ -178,7 +180,7 @@ def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[fl
 def _replaced_at(
     vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> StatisticallyLinear:
-    """The replaced vehicle at a speed (m/s), which may be among those that are known."""
+    """The statistically linearised vehicle at a speed (m/s), from ``equivalents`` if it is one of ``speeds``."""
     at = np.flatnonzero(np.isclose(speeds, speed))
     return equivalents[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
 
@@ -186,7 +188,7 @@ def _replaced_at(
 def _motions_of_parts(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, equivalents: list[StatisticallyLinear]
 ) -> Spectral:
-    """Motions of the parts of statistically linearised vehicles, springs about their own means."""
+    """Motions of the parts of statistically linearised vehicles; springs move about their own means."""
     known = dict(zip(speeds.tolist(), equivalents, strict=True))
     chosen = few_speeds(speeds)
     means = {
@@ -204,10 +206,11 @@ def in_engine(
     error: bool = False,
     table: np.ndarray | None = None,
 ) -> Result:
-    """One path of the road through an engine, at the speed that is shown; detail: ``Ride``.
+    """Run the vehicle in an engine over one random path of the road, at the speed that is shown; the detail is
+    ``Ride``.
 
-    error : whether that of the steps is estimated, by runs in longer ones on the same road; table : a road in place of
-    the drawn one, as ``RoadPath.table`` has it.
+    error : whether the error of the steps is estimated, by runs in longer ones on the same road; table : a road in
+    place of the drawn one, as ``RoadPath.table`` has it.
     """
     assert scene.speeds is not None
     speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
@@ -246,7 +249,7 @@ REPEATED, LATEST = 0.9, 0.1
 def _with_error_of_steps(
     run: Result, engine: str, vehicle: SpatialVehicle, path: RoadPath, table: np.ndarray, skipped: float
 ) -> Result:
-    """The result with the errors of its outputs, by runs that read the same road at every second and fourth place."""
+    """The result with the errors of its outputs, by runs in steps twice and four times as long on the same road."""
     names, units = [str(name) for name in run["output"]], run["unit"].tolist()
     steps = len(table) // 2
     first = APART * int(min(skipped / path.step, LATEST * steps) / APART)
@@ -269,7 +272,7 @@ def _with_error_of_steps(
 
 
 def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
-    """A road at twice as many places, straight between those that are known."""
+    """A road with half the spacing of its heights: linear interpolation between the known ones."""
     halved = np.repeat(table, 2, axis=0)[:-1]
     halved[1::2] = (table[:-1] + table[1:]) / 2.0
     return halved
@@ -277,7 +280,8 @@ def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Ride:
-    """A run: states at every step, and outputs (m, p) at ``times`` (m,) in s, counted from the first one.
+    """A run in an engine: states at every step, and outputs (m, p) at ``times`` (m,) in s, counted from the first of
+    these.
 
     Outputs are read by the rows of ``spatial_linear`` from the engine's own positions, rates and accelerations; those
     of small motion, which a ride is. The force of a bent spring is no linear function of them: it is left nan.
@@ -291,7 +295,7 @@ class Ride:
     rows: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """One output (m,)."""
+        """The values (m,) of one output, by its name."""
         return self.outputs[:, self.names.index(name)]
 
     @property
@@ -300,7 +304,7 @@ class Ride:
         return float(self.times[1] - self.times[0])
 
     def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies (f,) in Hz and one-sided densities (f, p) of the outputs by Welch's method.
+        """Frequencies (f,) in Hz, and one-sided power spectral densities (f, p) of the outputs by Welch's method.
 
         They end at ``highest`` (Hz), and begin where windows no longer leak.
         """
@@ -321,7 +325,8 @@ def ridden(
     skipped: float = 0.0,
     stride: int = 1,
 ) -> Ride:
-    """Drive over a road from rest for about ``duration`` (s); outputs ``stride`` so many steps after ``skipped`` (s).
+    """Drive over a road from rest for about ``duration`` (s). Outputs begin after ``skipped`` (s) and are ``stride``
+    steps apart.
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
@@ -332,7 +337,7 @@ def ridden(
 def ride_over(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, every: int = 1
 ) -> Ride:
-    """Drive over a road that is known by its ``table``, else as ``ridden``."""
+    """Drive over the road whose heights are in ``table``; otherwise as ``ridden``."""
     check_rates(vehicle, road.excitation)
     steps = len(table) // 2
     model = _model(engine, vehicle, road, table)
@@ -349,7 +354,7 @@ def _model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarr
 def read_outputs(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
 ) -> Ride:
-    """Outputs of a run at other steps (m,)."""
+    """Outputs of a run at steps (m,) other than those at which they were read."""
     return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
 
 
@@ -361,7 +366,7 @@ def _read(
     run: Trajectory,
     step_numbers: np.ndarray,
 ) -> Ride:
-    """Outputs of a run at steps (m,)."""
+    """Outputs of a run at the steps ``step_numbers`` (m,)."""
     linear = linearise(vehicle, road.speed)
     accelerations = np.array(
         [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in step_numbers]
@@ -387,7 +392,9 @@ def _read(
 
 
 def row_of(output: Output) -> np.ndarray:
-    """Factors (3 n + 2 w,) of accelerations, rates, positions, road heights and their rates."""
+    """Factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates, in this
+    order.
+    """
     return np.concatenate(
         [
             output.acceleration_factors,

@@ -33,7 +33,8 @@ BESIDE = 1.0
 
 @dataclass(frozen=True)
 class Built:
-    """Vehicle and road that effects extend: the road under the wheels is changed by one effect after another.
+    """Vehicle and road that effects extend. Each function in ``road`` changes the road under the wheels, one after
+    another.
 
     A change keeps the noise; states that it adds to those of the road's own filters come last.
     """
@@ -43,11 +44,11 @@ class Built:
 
 
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
-    """The scene's vehicle with its effects, and with gravity where its operating point is the loaded one.
+    """The scene's vehicle with its effects; it has gravity if its operating point is the loaded one.
 
-    InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
-    that their moments about z would pull it back or push it on; and for a tyre that may lift where small motion is
-    asked for.
+    InputError for a loaded vehicle that may yaw, since its preloaded springs keep their directions in space and not in
+    the vehicle, so that their moments about z would turn it back or further. InputError also for a tyre that may lift
+    where small motion is requested.
     """
     vehicle = _built(scene).vehicle
     if vehicle.lifts and scene.vehicle.small_motion:
@@ -65,8 +66,9 @@ def _built(scene: RideScene) -> Built:
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
-    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them, and tyres that
-    may lift."""
+    """Refuse springs with curves or friction unless the scene asks for small motion, which uses their slopes at rest,
+    and tyres that may lift.
+    """
     if vehicle.lifts:
         raise InputError(
             scene.file,
@@ -86,18 +88,19 @@ def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
 
 
 def goes_in_time(scene: RideScene) -> bool:
-    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them, or tyres
-    may lift."""
+    """Whether the scene needs runs in time: a spring of its vehicle is nonlinear, without small motion being asked for,
+    or tyres may lift.
+    """
     return not scene.vehicle.small_motion and in_time_only(vehicle_of(scene))
 
 
 def in_time_only(vehicle: SpatialVehicle) -> bool:
-    """Whether springs are bent or tyres may lift, for which no linear vehicle stands."""
+    """Whether springs are nonlinear or tyres may lift, so that no linear vehicle is equivalent."""
     return vehicle.lifts or any(spring.bent for spring in vehicle.springs)
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
-    """The vehicle at a speed (m/s), linearised by an engine or from its equations."""
+    """Function that gives the vehicle at a speed (m/s), linearised by an engine or from its equations."""
     if engine != "reference":
         from models.engines.spatial_protocol import at_speeds
 
@@ -109,7 +112,7 @@ def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear
 
 
 def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad:
-    """The scene's road; its level holds at half the front track where the scene does not say where."""
+    """The scene's road. Where the scene does not say where its level holds, it holds at half the front track."""
     road = scene.road
     if road.file is not None:
         fitted = fitted_road(scene).road
@@ -126,7 +129,7 @@ def road_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> TwoTrackRoad
 
 
 def fitted_road(scene: RideScene) -> "FittedRoad":
-    """The measured road of a scene with what was fitted to it; InputError where nothing can be."""
+    """The measured road of a scene and the spectra fitted to it; InputError where none can be fitted."""
     from models.road.fitted import fit_road
     from models.road.measured_tracks import read_tracks
 
@@ -137,7 +140,7 @@ def fitted_road(scene: RideScene) -> "FittedRoad":
 
 
 def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
-    """Where (m) the road's tracks lie."""
+    """Distance (m) of the road's tracks from the centre line."""
     if scene.road.file is not None:
         return scene.road.track_width / 2.0
     return scene.road.half_track or half_track(wheels) or BESIDE
@@ -146,7 +149,9 @@ def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
 def excitation_of(
     scene: RideScene, wheels: tuple[WheelPosition, ...], case: tuple[str, str] | None = None
 ) -> Excitation:
-    """The road under the wheels with the scene's effects, in its case of correlation or another one."""
+    """The road under the wheels with the scene's effects; ``case`` : correlation left to right and front to rear, by
+    default the scene's.
+    """
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
     try:
@@ -162,7 +167,7 @@ def excitation_of(
 
 @contextmanager
 def scene_errors(scene: RideScene) -> Iterator[None]:
-    """Turn a computation's error, which names no file, into an error of the scene's key that caused it."""
+    """Context that turns an error without a file into an error of the scene's key that caused it."""
     try:
         yield
     except InputError as error:
@@ -175,7 +180,8 @@ def scene_errors(scene: RideScene) -> Iterator[None]:
 
 
 def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
-    """Where the wheels meet the road: at their own y, or all in the tracks of the first axle's wheels.
+    """The wheels at the places where they meet the road: at their own y, or all in the tracks of the first axle's
+    wheels.
 
     A vehicle without a width runs on one of the tracks where the road is given by their level.
     """
@@ -189,7 +195,7 @@ def placed_wheels(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[
 
 
 def in_tracks(wheels: tuple[WheelPosition, ...]) -> tuple[WheelPosition, ...]:
-    """The wheels of every axle in the tracks of the first one, side by side: its outermost wheel leads."""
+    """The wheels of every axle moved into the track that the first axle's outermost wheel makes on their side."""
     first = [wheel.y for wheel in wheels if wheel.axle == 0]
     tracks = {1.0: max(first), -1.0: min(first)}
     return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheels)

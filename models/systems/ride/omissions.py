@@ -23,7 +23,9 @@ less, on_road = ReducedScene.less, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
-    """Every effect that the scene's vehicle, road and own tables hold, in the order of their sorts' names."""
+    """Every effect of the scene's vehicle, road and own tables that can be left out, in the order of their sorts'
+    names.
+    """
     system = scene.ride.system
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
     effects = {name: find(scene) for name, find in SORTS.items()}
@@ -43,17 +45,17 @@ def _without_table(scene: ReducedScene, name: str) -> ReducedScene:
 
 
 def _with_needy(effect: Effect, needy: tuple[str, ...]) -> Effect:
-    """Goes with those of the scene's own tables that need it."""
+    """The effect, which now requires that the scene's own tables ``needy``, which need it, are left out as well."""
     return replace(effect, needs=(*effect.needs, *needy), why=effect.why or "for it needs it") if needy else effect
 
 
 def has_omissions(scene: RideScene, sort: str) -> bool:
-    """Whether a scene's vehicle and road hold any effects of a sort."""
+    """Whether a scene's vehicle and road have effects of this sort, which can be left out."""
     return bool(SORTS[sort](ReducedScene.complete(scene)))
 
 
 def anti_roll_bars(scene: ReducedScene) -> list[Effect]:
-    """One effect per bar."""
+    """Leaving out an anti-roll bar: one effect per bar."""
     return [
         Effect(f"bar {bar.name}", partial(_without_bar, bar=bar.name), f"no {bar.name}") for bar in scene.vehicle.bars
     ]
@@ -70,7 +72,7 @@ def wheels_of(vehicle: SpatialVehicle) -> set[str]:
 
 
 def body_mass(scene: ReducedScene) -> list[Effect]:
-    """Wheels of each axle and all together, then light bodies one by one.
+    """Leaving out masses: of the wheels of each axle, of all wheels together, then of light bodies one by one.
 
     White noise that comes through tyre damping would move a wheel without mass at an infinite rate.
     """
@@ -94,7 +96,9 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
 
 
 def bushings(scene: ReducedScene) -> list[Effect]:
-    """One effect per sort, of springs that are stiffer than the softest between the same two bodies."""
+    """Making bushings at wheels rigid: one effect per group of similar stiffness, for springs that are stiffer than the
+    softest one between the same two bodies.
+    """
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str | None], list[SpringDamper]](list)
     for spring in scene.vehicle.springs:
         if {spring.first_body, spring.second_body} & wheels:
@@ -132,7 +136,9 @@ def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
 
 
 def curves(scene: ReducedScene) -> list[Effect]:
-    """One effect per law that any spring has, where laws are not taken by their slopes anyway."""
+    """Replacing nonlinear laws by gains: one effect per law that any spring has, unless small motion replaces the laws
+    anyway.
+    """
     return [
         Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", singular=True)
         for law, name in LAWS.items()
@@ -141,14 +147,16 @@ def curves(scene: ReducedScene) -> list[Effect]:
 
 
 def delay(scene: ReducedScene) -> list[Effect]:
-    """One effect, where axles follow one another."""
+    """Leaving out the delay from front to rear: one effect, where axles follow one another."""
     follows = len(scene.vehicle.axles) > 1 and scene.ride.road.front_rear == "delayed"
     equal = Effect("delay front to rear", partial(on_road, front_rear="equal"), "all axles meet the same at once")
     return [equal] if follows else []
 
 
 def freedoms(scene: ReducedScene) -> list[Effect]:
-    """One effect per freedom of a body without a tyre, one per sort of freedom of those with one."""
+    """Locking degrees of freedom: one effect per freedom of a body without tyres, and one per sort of freedom of the
+    bodies with tyres.
+    """
     wheels, groups = wheels_of(scene.vehicle), defaultdict[str, list[tuple[str, Freedom]]](list)
     shared = defaultdict[str, list[tuple[str, Freedom]]](list)
     for body, freedom in scene.vehicle.coordinates():
@@ -163,7 +171,7 @@ def freedoms(scene: ReducedScene) -> list[Effect]:
 
 
 def mounts(scene: ReducedScene) -> list[Effect]:
-    """One effect per pair of bodies that springs join and of which none carries a tyre."""
+    """Making mounts rigid: one effect per pair of bodies that springs connect, if neither carries a tyre."""
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str], list[str]](list)
     for spring in scene.vehicle.springs:
         if spring.second_body is not None and not {spring.first_body, spring.second_body} & wheels:
@@ -181,7 +189,7 @@ def mounts(scene: ReducedScene) -> list[Effect]:
 
 
 def second_corner(scene: ReducedScene) -> list[Effect]:
-    """One effect, where the road has a second corner; a tyre that is damped would then meet white noise."""
+    """Leaving out the road's second corner: one effect, where it has one. A damped tyre would then meet white noise."""
     if scene.ride.road.cutoff is None:
         return []
     needs = (TYRE_DAMPING,) if any(tyre.damping for tyre in scene.vehicle.tyres) else ()
@@ -190,7 +198,9 @@ def second_corner(scene: ReducedScene) -> list[Effect]:
 
 
 def second_track(scene: ReducedScene) -> list[Effect]:
-    """One effect, where wheels stand beside the centre line of a road with two tracks as modelled."""
+    """Leaving out the second track: one effect, where wheels are off the centre line of a road with two tracks as
+    modelled.
+    """
     wide = len({tyre.point[1] for tyre in scene.vehicle.tyres}) > 1
     if not wide or scene.ride.road.left_right != "modelled":
         return []
@@ -199,7 +209,7 @@ def second_track(scene: ReducedScene) -> list[Effect]:
 
 
 def tyre_damping(scene: ReducedScene) -> list[Effect]:
-    """One effect, where any tyre is damped."""
+    """Leaving out the damping of tyres: one effect, where any tyre is damped."""
     damped = any(tyre.damping for tyre in scene.vehicle.tyres)
     return [Effect(TYRE_DAMPING, _undamped, "tyres are springs without damping")] if damped else []
 

@@ -34,7 +34,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def findings(scene: RideScene) -> tuple[Finding, ...]:
-    """Queries about the vehicle."""
+    """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
     return plausible(vehicle_of(scene), scene.vehicle.accept)
 
 
@@ -71,7 +71,7 @@ FRONT_REAR = {
 
 
 def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> tuple[str, str]:
-    """How the wheels of an axle, and the axles, share the road's noise, in words."""
+    """Text on how the wheels of an axle, and the axles, share the road's noise."""
     road, placed = scene.road, placed_wheels(scene, wheels)
     place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
     if len({wheel.y for wheel in placed}) == 1:
@@ -83,7 +83,9 @@ def noise_sharing_text(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> t
 
 
 def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
-    """A line per body, then the number of freedoms and their frequencies where no speed is needed."""
+    """Lines on each body, then on the number of freedoms and their natural frequencies where these do not depend on the
+    speed.
+    """
     for body in vehicle.bodies:
         on = f" on {body.parent}" if body.parent else ""
         yield "  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"
@@ -97,7 +99,9 @@ def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
 
 
 def undamped(vehicle: SpatialVehicle) -> list[float]:
-    """Frequencies (Hz) of a vehicle without damping, side forces and drag; 0 for what nothing pulls back."""
+    """Natural frequencies (Hz) of the vehicle without damping, side forces and drag; 0 for motions without a restoring
+    force.
+    """
     import numpy as np
     from scipy.linalg import eigvalsh
 
@@ -113,7 +117,9 @@ FREE = 1e-4
 
 
 def doubts(vehicle: SpatialVehicle) -> list[str]:
-    """A question where the vehicle has motions that no road vehicle has, as with a value in other units than SI."""
+    """A question where the vehicle has natural frequencies that no road vehicle has, as happens with values that are
+    not in SI units.
+    """
     odd = [f for f in undamped(vehicle) if f > FREE and not USUAL[0] <= f <= USUAL[1]]
     if not odd:
         return []

@@ -17,15 +17,15 @@ LONGEST, SHORTEST = 1e-2, 500.0
 
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
-    """Static load (N) of the tyre behind each output that is a tyre force."""
+    """Static load (N) of the tyre that each output of the kind tyre force belongs to."""
     loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
     forces = (out for out in vehicle.outputs if isinstance(out, TyreOutput) and out.kind == "tyre force")
     return {output.name: loads[output.tyre] for output in forces}
 
 
 def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
-    """Relative change of every output's deviation by an isotropic road with the same track spectrum, both up to
-    SHORTEST.
+    """Relative change of every output's deviation if the road is replaced by an isotropic one with the same track
+    spectrum, both up to SHORTEST.
 
     Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
     """
@@ -48,7 +48,9 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
 
 
 def largest_gap(sweep: Sweep, reference: Sweep) -> float:
-    """Largest difference of standard deviations where both are finite, by the output's largest on any of the roads."""
+    """Largest difference of standard deviations where both are finite, divided by the output's largest value on any of
+    the roads.
+    """
     finite = np.isfinite(reference.deviation) & np.isfinite(sweep.deviation)
     known, others = (np.where(finite, each.deviation, 0.0) for each in (reference, sweep))
     largest = known.max(axis=(0, 1))  # an output may be zero on one of the roads
@@ -56,7 +58,8 @@ def largest_gap(sweep: Sweep, reference: Sweep) -> float:
 
 
 def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str]) -> np.ndarray:
-    """Relative errors (outputs,), each the largest over the speeds, of a case beside true deviations (speeds, outputs).
+    """Relative errors (outputs,) of a case of the sweep compared with true deviations (speeds, outputs), each the
+    largest over the speeds.
 
     nan for an output that the sweep's vehicle does not have.
     """
@@ -71,8 +74,9 @@ def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str])
 
 
 def quasi_stationary_gaps(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> np.ndarray:
-    """Error (N, p) of the quasi-stationary deviations, relative to the largest deviation of the drive; 0 where that is
-    0."""
+    """Error (N, p) of the quasi-stationary standard deviations, divided by each output's largest standard deviation in
+    the drive; 0 where that is 0.
+    """
     both = np.isfinite(quasi_stationary) & np.isfinite(drive.deviation)
     known = np.where(both, drive.deviation, 0.0)
     largest = known.max(axis=0)

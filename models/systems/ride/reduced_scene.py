@@ -13,8 +13,9 @@ from models.vehicles.spatial_linear import wheels
 
 @dataclass(frozen=True)
 class ReducedScene:
-    """A ride and its vehicle, less what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and
-    the laws of bent springs that are ``straight``: gains stand for them."""
+    """A ride and its vehicle without what is left out: ``massless`` bodies, ``rigid`` springs, ``locked`` freedoms, and
+    ``straight`` laws of nonlinear springs, which gains replace.
+    """
 
     ride: RideScene
     vehicle: SpatialVehicle
@@ -25,16 +26,16 @@ class ReducedScene:
 
     @classmethod
     def complete(cls, ride: RideScene) -> "ReducedScene":
-        """The ride with its whole vehicle, nothing left out."""
+        """The ride with its complete vehicle, nothing left out."""
         return cls(ride, vehicle_of(ride))
 
     @property
     def limits(self) -> Limits:
-        """Limits that the reduced vehicle takes: massless, rigid and locked parts."""
+        """Limits by which the vehicle is reduced: massless, rigid and locked parts."""
         return Limits(self.massless, self.rigid, self.locked)
 
     def less(self, **names: Iterable[object]) -> "ReducedScene":
-        """The reduced scene with more names in its sets, as massless = ["wheel"]."""
+        """The scene reduced further: names are added to its sets, for example massless = ["wheel"]."""
         return replace(self, **{key: getattr(self, key) | set(more) for key, more in names.items()})
 
     def on_road(self, **changes: object) -> "ReducedScene":
@@ -48,7 +49,7 @@ class ReducedScene:
         return replace(self, ride=ride, vehicle=vehicle_of(ride))
 
     def excitation(self) -> Excitation:
-        """The road under the wheels; axles that meet the same at once share one filter."""
+        """The road under the wheels; axles that meet the same heights at the same time share one filter."""
         road = excitation_of(self.ride, wheels(self.vehicle))
         if road.independent or any(road.lengths):
             return road
@@ -57,11 +58,12 @@ class ReducedScene:
 
 @dataclass(frozen=True)
 class Effect:
-    """One thing that may be left out: its name, what leaving it out means, and with what it goes.
+    """Something that may be left out: its name, what leaving it out means, and its relation to other effects.
 
-    needs : effects that must be left out, too, and go with it; excludes : effects that may not be left out beside it;
-    ``why``, a phrase for both. singular : no small change in any respect, so that it is solved and not screened.
-    has_table : it is a table [effects.NAME], which goes before all others, for without it the vehicle is another one.
+    needs : effects that must be left out as well; excludes : effects that may not be left out together with this one;
+    ``why`` : the reason for both. singular : leaving it out is no small change in any respect, so that it is solved and
+    not screened. has_table : it is a table [effects.NAME], which is removed before all other effects, since it changes
+    the vehicle.
     """
 
     name: str
@@ -75,7 +77,7 @@ class Effect:
 
 
 def illegal(omitted_effects: Iterable[Effect]) -> str:
-    """Why these may not be left out together, with the remedy; empty where they may."""
+    """Reason why these effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
     for effect in omitted_effects:
@@ -89,7 +91,7 @@ def illegal(omitted_effects: Iterable[Effect]) -> str:
 
 
 def without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
-    """The scene without these effects; its tables [effects.NAME] go first and together."""
+    """The scene without these effects; effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:
         scene = scene.without_tables(*tables)

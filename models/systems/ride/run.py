@@ -33,7 +33,7 @@ QUASI_STATIONARY = 90
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """Speeds and correlations at which a linear vehicle is solved, in place of the scene's.
+    """Speeds and correlations at which a linear vehicle is solved; they replace the scene's own.
 
     speeds : m/s, those of the scene if None. correlations : of the road, left to right and front to rear, by name; None
     is the scene's own.
@@ -53,14 +53,14 @@ def run(
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
-    """Run a scene by the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
+    """Run a scene with the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
 
-    vehicle, points : in place of the scene's own. sampling : asks for a run in time, as springs do that are bent and
-    tyres that may lift; the reference then answers by statistical linearisation with copies beside, an engine by one
-    path of the road. progress : of it. error : whether errors are estimated, by further solutions or runs. What a run
-    assumes is judged always.
+    vehicle, points : replace the scene's own. sampling : requests a run in time, which nonlinear springs and tyres that
+    may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one path of the
+    road. progress : called during such a run. error : whether errors are estimated, by further solutions or runs. The
+    assumptions of a run are always judged.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
+    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
     """
     engine = engine or "reference"
     with scene_errors(scene):
@@ -79,7 +79,9 @@ def run(
 def _deviations_by_speed(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool
 ) -> Result:
-    """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
+    """Standard deviations (correlation, speed, output). Assumptions are judged on the scene's own road, or on the last
+    one.
+    """
     from models.ride.sweep import sweep
 
     assert scene.speeds is not None
@@ -111,7 +113,9 @@ def _deviations_by_speed(
 
 
 def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
-    """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
+    """Standard deviations (time, output) along a drive, and the quasi-stationary ones, as if each speed had always been
+    driven.
+    """
     from models.ride.varying_speed import quasi_stationary, varying_speed
     from models.systems.ride.errors_in_time import with_error_of_drive
 

@@ -59,7 +59,7 @@ class Drive(Strict):
     speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
 
     def profile(self, file: str = "") -> SpeedProfile:
-        """The drive itself; raises InputError for what is none."""
+        """The drive's speed over time; raises InputError for values that are no drive."""
         return SpeedProfile(self.time, self.speed, file)
 
 
@@ -78,7 +78,7 @@ class RideScene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def check_choice(self) -> None:
-        """A choice of effects wants quantities, a tolerance and constant speeds."""
+        """Check that a choice of effects has quantities, a tolerance and constant speeds; raises InputError."""
         super().check_choice()
         if self.study == self.CHOOSING and self.speeds is None:
             raise InputError(self.file, "drive", None, "effects are chosen at constant speeds: give [speeds]")

@@ -24,16 +24,17 @@ FEW = 5
 
 
 class WatchedMotion(Protocol):
-    """Motion of a vehicle's parts in a run, by the names of ``watched``."""
+    """Motion of a vehicle's parts in a run; the parts have the names of ``watched``."""
 
     def of(self, name: str) -> np.ndarray | Gaussian:
-        """Values at every row of the run, or what is known of them."""
+        """Values of a motion at every row of the run, or its Gaussian statistics."""
         ...
 
 
 def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
-    """Outputs that tell how every part moves: the force of a tyre less its load, travels and rates, angles of bodies
-    that may turn, and, where tyres have side forces, what makes up their slip."""
+    """Outputs that describe how every part moves: tyre forces without the static load, travels and their rates, angles
+    of bodies that may turn and, where tyres have side forces, the components of their slip.
+    """
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
     whole: list[SpatialOutput] = [TyreOutput(f"load {tyre.name}", "tyre force", tyre.name) for tyre in vehicle.tyres]
     whole += [PartOutput(f"travel {spring.name}", "travel", spring.name) for spring in vehicle.springs]
@@ -47,7 +48,7 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
 
 
 def watching(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
-    """A linear vehicle, whoever made it, whose outputs are those of ``watched`` and the slip angles (rad)."""
+    """A linear vehicle, of any engine, with the outputs of ``watched`` and the slip angles (rad)."""
     seen = replace(vehicle, outputs=watched_outputs(vehicle))
     rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
     return replace(linear, outputs=(*rows, *_slips(vehicle, rows, speed)))
@@ -64,21 +65,23 @@ def _slips(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> I
 
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
-    """Static load (N) of every tyre; empty where no spring carries a weight."""
+    """Static load (N) of every tyre; empty where the springs carry no weight."""
     with suppress(InputError):
         return preloads(replace(vehicle, gravity=GRAVITY)).tyres
     return {}
 
 
 def few_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
-    """Some of the speeds (m/s), the slowest and the fastest among them."""
+    """A few of the speeds (m/s), with the slowest and the fastest among them."""
     rising = np.unique(np.asarray(speeds, float))
     return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, FEW).round().astype(int))]
 
 
 @dataclass(frozen=True)
 class Spectral:
-    """Motion by covariances at constant speeds (m/s); ``means`` (speeds,) of what does not swing about its rest."""
+    """Motion by covariances at constant speeds (m/s); ``means`` (speeds,) : of motions whose mean is not the rest
+    position.
+    """
 
     vehicle: SpatialVehicle
     linear: Linear
@@ -93,7 +96,7 @@ class Spectral:
 
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
-        """Standard deviations (speeds,) by name, not finite where there is none."""
+        """Standard deviations (speeds,) by name, not finite where a speed has none."""
         rows, names = [], [output.name for output in self._watched_at_speed(self.speeds[0]).outputs]
         for speed in self.speeds:
             try:
@@ -108,8 +111,9 @@ class Spectral:
 
 @dataclass(frozen=True)
 class MotionAlongDrive:
-    """Motion along a drive: deviations (time, ...) of the run's own outputs, and others as if each speed had always
-    been driven."""
+    """Motion along a drive. deviations : of the run's own outputs (time, ...); apart : of other outputs, as if each
+    speed had always been driven.
+    """
 
     deviations: Mapping[str, np.ndarray]
     apart: Spectral
@@ -123,7 +127,7 @@ class MotionAlongDrive:
 
 
 def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
-    """Deviations (rows, outputs) of a vehicle's own outputs by the names of ``watched``."""
+    """Standard deviations (rows, outputs) of a vehicle's own outputs, under the names of ``watched``."""
     alike = {replace(output, name=""): output.name for output in watched_outputs(vehicle)}
     pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
     return {alike[same]: values for output, values in pairs if (same := replace(output, name="")) in alike}
@@ -131,7 +135,9 @@ def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, 
 
 @dataclass(frozen=True)
 class MotionInRun:
-    """Motion in a run: positions and rates (rows, n), heights of the road and their rates (rows, 2 w)."""
+    """Motion in a run: positions and rates (rows, n) of the coordinates, heights of the road and their rates (rows, 2
+    w).
+    """
 
     seen: LinearVehicle
     positions: np.ndarray
@@ -139,7 +145,7 @@ class MotionInRun:
     heights: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """Values at every row."""
+        """Values of a motion at every row of the run."""
         row = {output.name: output for output in self.seen.outputs}[name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
         return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

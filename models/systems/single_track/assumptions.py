@@ -9,7 +9,7 @@ SMALL = 0.35
 
 
 def assumptions(scene: SingleTrackScene) -> list[Assumption]:
-    """Small angles, and axles that keep on the ground."""
+    """Assumptions that slip angles are small and that both axles keep on the ground."""
     weight = scene.vehicle.mass
     return [
         Assumption(

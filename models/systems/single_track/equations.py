@@ -26,8 +26,10 @@ TURNED = 0.02
 
 
 class Axle(NamedTuple):
-    """stiffness : cornering stiffness by load (1/rad); friction; sharpness : n; side : friction in left turns is
-    larger by this share, in right turns smaller; lift : N s^2/m^2; rise : e, share of the stiffness beyond the bend."""
+    """Tyres of an axle. stiffness : cornering stiffness by load (1/rad); friction; sharpness : n; side : friction in
+    left turns is larger by this share, in right turns smaller; lift : N s^2/m^2; rise : e, share of the stiffness
+    beyond the bend.
+    """
 
     stiffness: float
     friction: float
@@ -38,8 +40,10 @@ class Axle(NamedTuple):
 
 
 class Car(NamedTuple):
-    """SI. mass; front, rear : from the centre of mass to the axles; inertia : about the upright; height : of the centre
-    of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces below and above 0."""
+    """Parameters of a car in SI units. mass; front, rear : from the centre of mass to the axles; inertia : about the
+    upright; height : of the centre of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces
+    below and above 0.
+    """
 
     mass: float
     front: float
@@ -53,7 +57,7 @@ class Car(NamedTuple):
 
 @compiled
 def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
-    """Side force (N, left positive) of an axle at a load and a forward force (N) and a slip angle (rad)."""
+    """Side force (N, left positive) of an axle under a load (N) and a forward force (N), at a slip angle (rad)."""
     grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
     across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
     x = axle.stiffness * load * slip_angle / across
@@ -92,7 +96,8 @@ def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive:
 
 @compiled
 def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, first: tuple[float, float]) -> np.ndarray:
-    """(n, 2): lateral velocity (m/s) and yaw rate (rad/s) at every sample, by Heun's method from sample to sample.
+    """Motion (n, 2) at every sample, by Heun's method from sample to sample: lateral velocity (m/s) and yaw rate
+    (rad/s).
 
     given (n, 3) : steer angle, speed, its rate at samples ``step`` (s) apart; first : motion at the first of them.
     """
@@ -112,7 +117,9 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
 
 @compiled
 def reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """(n, 7): lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad), front first."""
+    """Channels (n, 7) of a motion: lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad),
+    front first.
+    """
     table = np.empty((len(inputs), 7))
     for i in range(len(inputs)):
         answer = forces(car, front, rear, (motion[i, 0], motion[i, 1]), (inputs[i, 0], inputs[i, 1], inputs[i, 2]))

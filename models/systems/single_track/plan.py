@@ -8,7 +8,7 @@ from models.systems.single_track.scene import SingleTrackScene
 
 
 def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, a file that holds no drive."""
+    """Refuse, before any file is written, a measured file that contains no drive."""
     inputs(read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch)), scene)
 
 

@@ -52,7 +52,9 @@ PARAMETERS = (
 
 
 def plain(source: Path, target: Path) -> Path:
-    """The race's file as a table that scenes take: one of EVERY samples, nothing of what those cannot show."""
+    """Write the race's file as a table that scenes can read: one of EVERY samples, low-passed so that frequencies which
+    these cannot resolve are removed.
+    """
     raw = _raw(source)
     period = float(np.median(np.diff(raw["t"])))
     columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
@@ -66,7 +68,7 @@ def plain(source: Path, target: Path) -> Path:
 
 
 def _raw(source: Path) -> dict[str, np.ndarray]:
-    """Columns of the race's file, packed or not; InputError where one is missing, or times do not rise."""
+    """Columns of the race's file, gzipped or not; InputError where one is missing, or times do not rise."""
     with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
         head, *rows = list(csv.reader(file))
     for column, _ in COLUMNS.values():

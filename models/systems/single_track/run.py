@@ -24,7 +24,8 @@ UNITS = ("N", "N", "rad") * 2
 
 
 def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Result:
-    """The whole drive; channels over time are what sensors would show, and loads, side forces and slip angles.
+    """Run the whole measured drive. Channels over time are what sensors would show, and loads, side forces and slip
+    angles.
 
     Raises InputError for a file that is no drive, RunFailed where the motion is not finite.
     """
@@ -52,7 +53,9 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
 
 
 def inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
-    """(n, 3): steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and put right."""
+    """Inputs (n, 3) of the equations: steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and
+    corrected for the sensors' errors.
+    """
     period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
     steer, speed = drive.steer, drive.speed
     if scene.drive.low_pass:
@@ -65,7 +68,9 @@ def inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
 
 
 def motion_of(scene: SingleTrackScene, inputs: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral velocity and yaw rate (n, 2), and reports (n, 7), from the steady turn of the first sample on."""
+    """Lateral velocity and yaw rate (n, 2), and reports (n, 7). The motion begins with the steady turn of the first
+    sample.
+    """
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
     settling = np.repeat(inputs[:1], max(2, round(SETTLING / period)), axis=0)
     first = march(*parts, settling, period, (0.0, 0.0))[-1]
@@ -81,7 +86,7 @@ def motion_of(scene: SingleTrackScene, inputs: np.ndarray, period: float) -> tup
 def sensor_channels(
     sensors: SensorTable, inputs: np.ndarray, motion: np.ndarray, lateral: np.ndarray
 ) -> dict[str, Channel]:
-    """What sensors show of the motion, by the names of channels that a measurement has."""
+    """Readings of sensors in the motion, by the names of the channels of a measurement."""
     slip = np.arctan2(motion[:, 0], inputs[:, 1]) + sensors.side_slip_offset
     acceleration = sensors.acceleration_ratio * lateral + sensors.acceleration_offset
     return {

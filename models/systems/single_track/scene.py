@@ -39,7 +39,7 @@ class AxleTable(Strict):
     rise: float = Field(default=0.0, ge=0.0, le=0.5, description="share of the stiffness that is left beyond the bend")
 
     def axle(self) -> Axle:
-        """As the equations take it."""
+        """The axle in the form that the equations use."""
         return Axle(self.stiffness, self.friction, self.sharpness, self.side, self.lift, self.rise)
 
 
@@ -77,7 +77,7 @@ class SingleTrackScene(SceneFile):
     sensors: SensorTable = SensorTable()
 
     def car(self) -> Car:
-        """As the equations take it."""
+        """The car in the form that the equations use."""
         return Car(*self.vehicle.model_dump().values())
 
 

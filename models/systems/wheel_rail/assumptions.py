@@ -14,7 +14,9 @@ WHEELS = ("right", "left")
 
 
 def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
-    """Assumptions of a case with this coefficient of friction; judged by ``Contacts``, a result's detail."""
+    """Assumptions of a case with this coefficient of friction. They are judged by ``Contacts``, the detail of a
+    result.
+    """
     listed = [_half_space(), _within_profiles(scene)]
     if yields(scene.bodies.wheel, scene.bodies.rail):
         listed.append(_elastic())
@@ -24,7 +26,9 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
 
 
 def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
-    """The largest or least value among the patches of each wheel, over the positions."""
+    """Return the watch function of a value: its largest or least among the patches of each wheel, over the
+    positions.
+    """
     worst = max if largest else min
 
     def watched(run: Result) -> Watched:
@@ -52,7 +56,9 @@ def _half_space() -> Assumption:
 
 
 def _within_profiles(scene: WheelRailScene) -> Assumption:
-    """The way (mm) from a patch to the nearer end of the rail or to the wheel's outer face."""
+    """Assumption on the distance (mm) from a patch to the nearer end of the rail's profile or to the wheel's outer
+    face.
+    """
     side = scene.profiles.side(scene.wheelset.radius)
 
     def free(patch: PatchReport) -> float:

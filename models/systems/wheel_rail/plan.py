@@ -6,7 +6,7 @@ from models.systems.wheel_rail.scene import WheelRailScene
 
 
 def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, what reading alone does not find: files that hold no profiles."""
+    """Refuse, before any file is written, files that hold no profiles, which reading the scene does not find."""
     for case in scene.cases.values():
         _ = scene.contact(case).pair.G
 
@@ -30,6 +30,6 @@ def describe(scene: WheelRailScene) -> str:
 
 
 def case_text(yaw: float, friction: float) -> str:
-    """A case in words."""
+    """Text on a case: its yaw, and whether it rolls with friction or is only pressed."""
     turned = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
     return f"{turned}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")

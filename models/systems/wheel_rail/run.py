@@ -56,7 +56,9 @@ PATCH: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contact at every position that has one, why others (mm) have none, seconds of the processor that each took."""
+    """Contacts of a case. placed : the contact at each position that has one; failed : reasons for the others, by
+    position (mm); seconds : processor time of each.
+    """
 
     placed: list[WheelsetPlacement] = field(default_factory=list)
     failed: dict[float, str] = field(default_factory=dict)
@@ -71,12 +73,12 @@ def run(
     *,
     error: bool = False,
 ) -> Result:
-    """A case, the first of the scene's if none is named, at every position; the detail is its ``Contacts``.
+    """Compute a case, by default the first, at every position of the wheelset; the detail is its ``Contacts``.
 
-    Channels of positions lie over the shift, those of patches over shift, wheel and patch, the one that carries most
-    first; not a number where there is no further patch. Positions that fail are doubts. progress : called before each
-    shift with it (mm) and the share that is done; error : whether every other position is computed on half the cells,
-    too, which tells the error of cells. Raises InputError for profiles that are none.
+    Channels of positions lie over the shift, those of patches over shift, wheel and patch, the patch with the largest
+    load first; not a number where there is no further patch. Positions that fail are doubts. progress : called before
+    each shift with the shift (mm) and the completed share; error : whether every other position is computed on half the
+    cells, too, from which the error of the cells is estimated. Raises InputError for files that are no profiles.
     """
     name = case or next(iter(scene.cases))
     held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
@@ -99,9 +101,11 @@ def run(
 
 
 def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) -> Result:
-    """The result with what the cells leave, as the root mean square over both wheels and every other position.
+    """The result with the error that the finite cells cause, as the root mean square over both wheels and every other
+    position.
 
-    Half the cells are of first order: what they change is what the cells leave. Shares are of the root mean square.
+    The error of the cells is of first order, so that it is as large as the change on half the cells. Relative errors
+    refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
     for placed in run.detail.placed[::EVERY]:
@@ -120,7 +124,9 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
 
 
 def sums(placed: WheelsetPlacement) -> np.ndarray:
-    """``SUMS`` (2, 5) of the right and the left wheel over their patches, and the largest pressure."""
+    """Quantities ``SUMS`` (2, 5) of the right and of the left wheel: sums over the wheel's patches, then the largest
+    pressure.
+    """
     return np.array(
         [
             [*(sum(getattr(place, name) for place in wheel) for name in ("normal", "area", "fx", "fy")), peak]
@@ -153,12 +159,12 @@ def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
 
 
 def patches(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
-    """The patches of one wheel, the one that carries most first."""
+    """The patches of one wheel, in the order of their normal force, largest first."""
     return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
 
 
 def position_quantities(placed: WheelsetPlacement) -> dict[str, Any]:
-    """Every quantity of a position, and of every patch of both wheels."""
+    """Quantities of the wheelset at a position and of every patch of both wheels, by name."""
     return {
         "shift": 1e3 * placed.shift,
         "yaw": 1e3 * placed.yaw,

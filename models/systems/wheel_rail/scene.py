@@ -35,7 +35,7 @@ class Positions(Strict):
     count: int = Field(default=21, ge=1, le=1000, description="number of displacements")
 
     def values(self) -> np.ndarray:
-        """All displacements (m)."""
+        """All lateral displacements (m) of the wheelset."""
         return np.linspace(self.start, self.stop, self.count)
 
 
@@ -69,7 +69,7 @@ class WheelRailScene(SceneFile):
     cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
     def contact(self, case: Case) -> WheelsetContact:
-        """Profiles, track and wheelset in touch; raises InputError for files that are no profiles."""
+        """Contact of the wheelset with the track in a case; raises InputError for files that are no profiles."""
         side = self.profiles.side(self.wheelset.radius)
         return WheelsetContact(
             side,

@@ -28,7 +28,7 @@ FRICTION = 0.02
 
 
 def assumptions(equations: Equations) -> list[Assumption]:
-    """Assumptions of a path of the wheelset at its speed; judged by the path, a result's detail."""
+    """Assumptions of a path of the wheelset at its speed. They are judged by the path, the detail of a result."""
     wheelset = equations.wheelset
     listed = [_wheels_press(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
     listed += [_elastic()] if yields(wheelset.material) else []
@@ -40,7 +40,7 @@ def assumptions(equations: Equations) -> list[Assumption]:
 
 
 def of_linear(wheelset: Wheelset) -> list[Assumption]:
-    """Assumption of the eigenvalues beside small motions: that creep forces act at all."""
+    """Assumption of the eigenvalues, in addition to small motions: there is friction, so that creep forces act."""
     return [
         Assumption(
             "friction",
@@ -54,18 +54,18 @@ def of_linear(wheelset: Wheelset) -> list[Assumption]:
 
 
 def of_branch(wheelset: Wheelset) -> list[Assumption]:
-    """Assumptions of a branch of limit cycles about their amplitudes; a cone's flange is a spring."""
+    """Assumptions of a branch of limit cycles, on their amplitudes; the flange of a cone acts as a spring."""
     return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
 
 
 def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
-    """Sums over the patches of each wheel of values (n, patches)."""
+    """Values (n, patches) summed over the patches of each wheel."""
     each = contacts.shape[1] // 2
     return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
 
 
 def _of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
-    """Watch function for a result whose detail is its path, or a periodic motion that has one."""
+    """Return the watch function for a result whose detail is a path, or a periodic motion that has one."""
 
     def of_result(run: Result) -> Watched:
         return watched(run.detail if isinstance(run.detail, WheelsetPath) else run.detail.path())
@@ -74,7 +74,7 @@ def _of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], W
 
 
 def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
-    """The largest value among the patches of each wheel that carry something, 0 where none does."""
+    """Return the watch function of a value's maximum among the loaded patches of each wheel, 0 where none is loaded."""
 
     def of_path(path: WheelsetPath) -> Watched:
         each, load = path.contacts.shape[1] // 2, path.contacts["load"]
@@ -119,8 +119,9 @@ def _rolls(equations: Equations) -> Assumption:
 
 
 def _half_space() -> Assumption:
-    """Assumption that bodies are half-spaces: in a Hertzian contact the penetration by its shorter semi-axis is about
-    that semi-axis by its radius."""
+    """Assumption that bodies are half-spaces. In a Hertzian contact the ratio of penetration to the shorter semi-axis
+    is about the ratio of that semi-axis to its radius.
+    """
 
     def watched(contacts: Array) -> Array:
         short = np.minimum(contacts["a"], contacts["b"])
@@ -222,7 +223,9 @@ def _flange_way(wheelset: Wheelset, watched: Callable[[Result], Watched] | None 
 
 
 def _within_profiles(wheelset: Wheelset) -> Assumption:
-    """Distance (mm) of the contacts on the wheel from the flange's tip, and of those on the rail from its ends."""
+    """Assumption on the distances (mm) of contacts from the flange's tip on the wheel, and from the ends of the profile
+    on the rail.
+    """
     assert wheelset.profiles is not None
     side = wheelset.profiles.side(wheelset.radius)
     tip, outer = float(side.wheel.y[np.argmax(side.wheel.z)]), float(side.wheel.y[-1])
@@ -249,12 +252,12 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
 
 
 def _along_axle(path: WheelsetPath) -> Array:
-    """Places (n, patches) of the contacts along the axle from its middle (m)."""
+    """Positions (n, patches) of the contacts along the axle, from its middle (m)."""
     roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
     x, y, z = (contacts[name] for name in "xyz")
     return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
 
 
 def _across_track(path: WheelsetPath) -> Array:
-    """Places (n, patches) of the contacts from the middle of the track (m)."""
+    """Lateral positions (n, patches) of the contacts, from the middle of the track (m)."""
     return np.asarray(path.states[:, Y, None] + path.contacts["y"])

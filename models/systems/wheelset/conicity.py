@@ -30,8 +30,10 @@ CHANNELS = {
 
 @dataclass(frozen=True, eq=False)
 class Conicities:
-    """table : differences of rolling radii (m). rows : at each amplitude, not a number where there is no wave. why :
-    by amplitude (m), the reason there. source : what the table is of, in words. wavelengths (m) of the rows."""
+    """Equivalent conicities. table : rolling radius differences (m); rows : one per amplitude, not a number where there
+    is no wave; why : reasons for that, by amplitude (m); source : text on what the table describes; wavelengths : of
+    the rows (m).
+    """
 
     table: RollingRadiusTable
     rows: tuple[ConicityRow, ...]
@@ -40,7 +42,7 @@ class Conicities:
     wavelengths: tuple[float, ...]
 
     def save_table(self, path: Path) -> None:
-        """Write the differences as a table that ``read_rolling_radii`` reads."""
+        """Write the rolling radius differences as a table that ``read_rolling_radii`` reads."""
         write_table(path, {"y": ("m", self.table.displacements), "dr": ("m", self.table.differences)})
 
 
@@ -50,7 +52,7 @@ def told_conicity(scene: WheelsetScene) -> bool:
 
 
 def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda share: None) -> Result:
-    """Both conicities at the scene's amplitudes; the detail are ``Conicities``.
+    """Compute both conicities at the scene's amplitudes; the detail is ``Conicities``.
 
     report_progress : called with the share of the rolling radii that is done. InputError for a file that is no table
     and for wheels that do not stand on their rails; an amplitude without a wave is a doubt.
@@ -77,7 +79,9 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
 
 
 def check(scene: WheelsetScene) -> None:
-    """Refuse a file that is no table, and a left side that is no profile, before anything is computed."""
+    """Refuse, before anything is computed, a file that is no table of differences and a left side that is no
+    profile.
+    """
     asked = scene.conicity or ConicityTable()
     if asked.table is not None:
         read_rolling_radii(scene.path(asked.table, "conicity.table"))
@@ -86,7 +90,7 @@ def check(scene: WheelsetScene) -> None:
 
 
 def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: Profiles) -> Profiles:
-    """Cross-sections of the left side."""
+    """Profiles of the left wheel and rail: those that [conicity] names, else those of the right side."""
     named = {
         key: value
         for key, value in (("wheel", conicity_table.left_wheel), ("rail", conicity_table.left_rail))
@@ -118,7 +122,7 @@ def _table(
 
 
 def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
-    """InputError where no amplitude of a scene has a wave."""
+    """Raise InputError where the wheelset has no wave at any of the scene's amplitudes."""
     if len(conicities.why) == len(conicities.rows):
         amplitude, why = next(iter(conicities.why.items()))
         table = scene.conicity.table if scene.conicity else None
@@ -126,7 +130,9 @@ def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
 
 
 def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
-    """Both conicities as plain numbers at each amplitude (m), the wave's centre (m); None where there is no wave."""
+    """Both conicities at each amplitude (m) as plain numbers, with the centre (m) of the wave; None where there is no
+    wave.
+    """
     rows: tuple[ConicityRow, ...] = run_of_scene.detail.rows
     return {
         "conicity": [
@@ -137,7 +143,7 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
 
 
 def lines(conicities: Conicities) -> list[str]:
-    """Both conicities at every amplitude, as text."""
+    """Text with both conicities at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     told = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):

@@ -10,6 +10,6 @@ LEFT_OUT = ("normal and creep forces of the right rail", "normal and creep force
 
 
 def exported(scene: WheelsetScene, engine: str) -> Exported:
-    """The wheelset in "mujoco" or "exudyn" without the rails."""
+    """Export the wheelset without the rails to "mujoco" or "exudyn"."""
     equations = equations_of(scene, engine, path_speeds(scene)[0])
     return export_free_vehicle(engine, driven_by(equations), ExportSubject(scene.title, scene.file, AXES), LEFT_OUT)

@@ -28,7 +28,7 @@ BESIDE = (0.9, 1.1)
 
 
 def wheelset_of(scene: WheelsetScene) -> Wheelset:
-    """The wheelset with the scene's overrides; each value is judged under its own file's name."""
+    """The wheelset with the scene's overrides; an error names the file from which the value comes."""
     name, override = scene.wheelset.parameters, scene.wheelset.override
     base = SETS.get(name)
     if base is None and not name.endswith(".toml"):
@@ -50,7 +50,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
 
 
 def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset:
-    """The wheelset of these values; errors name the file and the table."""
+    """The wheelset with these values; errors name the file and the table that they come from."""
     try:
         return Wheelset(**values)
     except InputError as error:
@@ -59,13 +59,15 @@ def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset
 
 
 def implementation(engine: str) -> type[Equations]:
-    """The equations of motion of an implementation; its engine is imported here and not before."""
+    """The class of the equations of motion for an implementation; only its own engine is imported, when it is
+    needed.
+    """
     module, _, name = IMPLEMENTATIONS[engine].rpartition(".")
     return getattr(import_module(module), name)
 
 
 def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
-    """The scene's wheelset with its law of creep at a speed (m/s)."""
+    """Equations of motion of the scene's wheelset, with its law of creep, at a speed (m/s)."""
     return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
 
@@ -80,13 +82,17 @@ def _initial_state(
 
 
 def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
-    """Equations at a speed (m/s), and the state (10,) that the scene's paths begin with; kept for further paths."""
+    """Equations at a speed (m/s), and the state (10,) in which the scene's paths begin. Both are kept for further
+    paths.
+    """
     contact, run = scene.contact, scene.run
     return _initial_state(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
 
 
 def path_speeds(scene: WheelsetScene) -> list[float]:
-    """Speeds (m/s) of the paths: the scene's, or around the critical one, or the last speed where there is none."""
+    """Speeds (m/s) of the paths: the scene's, else around the critical speed, or the last speed where there is no
+    critical one.
+    """
     if scene.run.speeds:
         return list(scene.run.speeds)
     critical, _ = critical_or_why(wheelset_of(scene))

@@ -14,7 +14,9 @@ LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, 
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
-    """Refuse, before any file is written, what reading alone does not find: a wheelset or a step that cannot be."""
+    """Refuse, before any file is written, wheelsets and steps that are impossible, which reading the scene does not
+    find.
+    """
     check_conicity(scene)
     for speed in path_speeds(scene):
         equations = equations_of(scene, "reference", speed)
@@ -56,7 +58,7 @@ def describe(scene: WheelsetScene) -> str:
 
 
 def _assumed(scene: WheelsetScene) -> list[str]:
-    """Lines on the assumptions of paths and eigenvalues."""
+    """Lines on the assumptions of paths and of eigenvalues."""
     equations = equations_of(scene, "reference", path_speeds(scene)[0])
     return assumption_lines([*assumptions(equations), *of_linear(equations.wheelset)])
 
@@ -77,7 +79,7 @@ def _conicity(conicity_table: ConicityTable) -> str:
 
 
 def _suspension(wheelset: Wheelset) -> str:
-    """Springs and dampers of one side along each axis, in words."""
+    """Text on the springs and dampers of one side along each axis."""
     w = wheelset
     sizes = ((axis, getattr(w, f"stiffness_{axis}"), getattr(w, f"damping_{axis}")) for axis in "xyz")
     parts = [f"{axis} {spring:g} N/m and {damper:g} N s/m" for axis, spring, damper in sizes if spring or damper]

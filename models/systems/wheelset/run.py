@@ -53,7 +53,7 @@ ORBIT = {
 
 
 def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error: bool = False) -> Result:
-    """The path at a speed (m/s), the first of the scene's if none is given; the detail is its ``WheelsetPath``.
+    """Compute the path at a speed (m/s), by default the first of the scene's; the detail is its ``WheelsetPath``.
 
     error : whether the error of steps and cells is estimated, by further paths. What the path assumes is judged always.
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
@@ -67,13 +67,13 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
 
 
 def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **more: Any) -> Result:
-    """A motion as the result of a scene at a speed (m/s), which says what assumptions it breaks."""
+    """A motion as the result of a scene at a speed (m/s), with the assumptions that it breaks."""
     equations, _ = equations_and_start(scene, engine, speed)
     return with_assumptions(_labelled(scene, engine, motion, **more), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
-    """The motion at a speed (m/s) from the scene's displacement and yaw, every step of it, and nothing else."""
+    """The motion at a speed (m/s) from the scene's displacement and yaw, at every step."""
     equations, start = equations_and_start(scene, engine, speed)
     return equations.run(start, scene.run.duration, scene.run.step)
 
@@ -89,7 +89,7 @@ def _labelled(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: A
 
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
-    """Paths by engine and speed (m/s) as one result over engine, speed and time."""
+    """Results by engine and speed (m/s), joined to one result over engine, speed and time."""
     each = {engine: gathered(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
     whole = gathered(join_results(each, "engine"), each)
     whole.data["speed"].attrs["units"] = "m/s"
@@ -97,14 +97,15 @@ def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
 
 
 def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
-    """Results of one engine by what tells them apart in words."""
+    """Results of one engine by speed, with text such as "20 m/s" as keys."""
     return {f"{speed:g} m/s": result for speed, result in results.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Linearised motion: eigenvalues (speeds, 9) in 1/s at speeds (m/s), the free wheelset's wavelength (m), the
-    critical speed (m/s), or why there is none."""
+    """Linearised motion. values (speeds, 9) : eigenvalues in 1/s at speeds (m/s); wavelength (m) : of the free
+    wheelset; critical : critical speed (m/s), None if there is none; why : the reason.
+    """
 
     speeds: np.ndarray
     values: np.ndarray
@@ -114,14 +115,14 @@ class Linear:
 
     @property
     def hunting(self) -> np.ndarray:
-        """The least damped oscillation's eigenvalue (speeds,) in 1/s."""
+        """Eigenvalue (speeds,) of the least damped oscillation in 1/s."""
         return hunting(self.values)
 
 
 def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
-    """Eigenvalues over the scene's speeds with linear creep; the detail is ``Linear``.
+    """Eigenvalues over the scene's speeds with linear creep; the result's detail is ``Linear``.
 
-    error : whether that of the differences that linearise is told, at the last speed.
+    error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
     """
     kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
     linear = Linear(
@@ -146,11 +147,12 @@ def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Res
 
 
 def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False) -> Result:
-    """Limit cycles by rising amplitude within the scene's speeds, by the written equations; the detail are its orbits.
+    """Limit cycles in the order of rising amplitude, within the scene's speeds, by the written equations; the detail is
+    their orbits.
 
     Where no branch begins because nothing is stable, cycles that motions reach at these speeds. Why it ends or never
-    begins is a doubt. The scene's crew computes what linearises. progress : called with the number of cycles after
-    each; error : whether one is solved on half the cells, too, which tells the error of cells.
+    begins is a doubt. The scene's workers compute what linearises. progress : called with the number of cycles after
+    each; error : whether one is solved on half the cells, too, from which the error of the cells is estimated.
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
@@ -179,7 +181,7 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
 
 
 def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> Orbit | None:
-    """The limit cycle on half the cells, in twice the step; None where none is found."""
+    """The limit cycle solved on half the cells, in twice the step; None where there is none."""
     if scene.contact.cells < FEWEST:
         return None
     coarse = replace(orbit, steps=orbit.steps // 2)
@@ -194,7 +196,7 @@ def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> 
 
 
 def _reached(scene: WheelsetScene, speed: float) -> Orbit | None:
-    """The refined cycle that a motion reaches at a speed (m/s), None where it dies out."""
+    """The refined limit cycle that a motion reaches at a speed (m/s); None where the motion dies out."""
     orbit = _attained(scene, speed)
     return None if orbit is None else refined(orbit, AMPLITUDE)
 
@@ -204,7 +206,7 @@ def _attained(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
-    """A speed (m/s) above that at which the branch begins, the scene's last where there is none."""
+    """A speed (m/s) above the one at which the branch begins; the scene's last speed where there is no branch."""
     last = float(scene.speeds.all().max())
     return min(last, round(BESIDE[1] * orbits[0].speed, 2)) if orbits else last
 
@@ -212,10 +214,11 @@ def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
 def cycles(
     scene: WheelsetScene, engines: Sequence[str], speed: float, *, error: bool = False
 ) -> tuple[dict[str, Result], dict[str, str]]:
-    """One period of the refined limit cycle at a speed (m/s) by every engine, and why some have none.
+    """One period of the refined limit cycle at a speed (m/s) in every engine, and reasons why some engines have none.
 
-    error : whether each is solved on half the cells, too, which tells the error of cells. Each engine finds it from a
-    guess that is off. The details are the orbits. None of both where the motion dies out.
+    Each engine starts from a guess that is deliberately off. The details are the orbits. Both are empty where the
+    motion dies out. error : whether each is solved on half the cells, too, from which the error of the cells is
+    estimated.
     """
     results, failed = dict[str, Result](), dict[str, str]()
     first = _attained(scene, speed)
@@ -232,7 +235,7 @@ def cycles(
 
 
 def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
-    """A cycle as a result over its period, whose detail is the orbit."""
+    """The result of a limit cycle over one period; its detail is the orbit."""
     labelled = with_assumptions(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
     period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
     if not error:

@@ -45,7 +45,9 @@ March = Callable[[WheelsetScene], WheelsetPath]
 
 
 def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
-    """The result of a path with the errors of its principal channels; raises RunFailed where it is no answer."""
+    """The result of a path with the errors of its principal channels; RunFailed where these are so large that it is no
+    answer.
+    """
     fine, step = series(run.detail), scene.run.step
     if scene.contact.law == "linear":
         return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
@@ -63,7 +65,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
 
 
 def series(path: WheelsetPath) -> Series:
-    """The principal channels of a path."""
+    """Time series of the principal channels of a path."""
     forces = {
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
     }
@@ -71,8 +73,9 @@ def series(path: WheelsetPath) -> Series:
 
 
 def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
-    """The scene with a step longer by a factor, over a share of its path (whole steps), and with another number of
-    contact cells."""
+    """The scene with a step that is ``times`` as long, over a share of its path (whole steps), and with another number
+    of cells.
+    """
     step = times * scene.run.step
     duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
     contact = scene.contact if cells is None else scene.contact.model_copy(update={"cells": cells})
@@ -81,14 +84,14 @@ def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int |
 
 
 def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
-    """The path on other cells, in twice the step where that can be."""
+    """The path on another number of cells, in twice the step where this is possible."""
     with suppress(InputError, RunFailed):
         return series(march(changed(scene, 2.0, cells=cells)))
     return series(march(changed(scene, 1.0, cells=cells)))
 
 
 def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
-    """Step errors over the whole path: those of its beginning, enlarged by the growth of the cells' errors."""
+    """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
     power = 2.0**KINKED
     try:
         part, share, remains = series(march(changed(scene, 2.0, FINE_WINDOW))), FINE_WINDOW, 1.0 / (power - 1.0)
@@ -104,7 +107,9 @@ def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) 
 
 
 def _gap(fine: Series, other_series: Series, name: str, end: float = math.inf) -> float:
-    """Root mean square of the difference of a channel until a time (s), at the rows that have the longer steps."""
+    """Root mean square of the difference between two series in one channel, up to a time (s), at the rows that both
+    have.
+    """
     long, short = sorted((fine, other_series), key=lambda series: -series.times[min(1, len(series.times) - 1)])
     times = long.times[long.times <= min(end, short.times[-1]) * (1.0 + 1e-9)]
     gap = long.channels[name][: len(times)] - short.channels[name][rows_at(short.times, times)]
@@ -114,10 +119,10 @@ def _gap(fine: Series, other_series: Series, name: str, end: float = math.inf) -
 def with_error_of_cycles(
     run: Result, orbits: Sequence[Orbit], coarse: Mapping[int, Orbit], unknown: str, cells: int
 ) -> Result:
-    """A result of periodic motions with the errors of what was sought and of the frequency.
+    """The result of limit cycles with the errors of the frequency and of the unknown that was solved for.
 
-    Each was solved in half the step, too, which tells what steps leave; ``coarse``: some of them, by their places, on
-    half the cells.
+    Each cycle was also solved in half the step, which gives the error of the steps. ``coarse`` : some of them on half
+    the cells, by their index.
     """
     units, told = {unknown: "m" if unknown == "amplitude" else "m/s", "frequency": "Hz"}, dict[str, Estimate]()
     for name, unit in units.items():

@@ -17,7 +17,9 @@ ENGINE, WINDOWED = "reference", False
 
 
 def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -> RunQuantities:
-    """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
+    """Drive every procedure and collect its quantities. Those that are not finite, as in a run that does not stop, are
+    left out.
+    """
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
     for name in scene.procedures:
@@ -43,20 +45,20 @@ def computed_quantities(scene: BrakingScene, engine: str, error: bool = False) -
 
 
 def steps(scene: BrakingScene) -> int:
-    """Number of steps of a procedure of the longest allowed duration."""
+    """Number of steps of a procedure that lasts as long as a run may."""
     return round(scene.run.duration / scene.run.sample) * scene.run.substeps
 
 
 def parts(scene: BrakingScene) -> int:
-    """Steps within a sample, which alone may be longer: the controller's samples stay."""
+    """Number of steps within a sample. Only these steps may become longer; the controller's samples stay."""
     return scene.run.substeps
 
 
 def shorten(table: dict[str, Any], scene: BrakingScene, steps: int) -> None:
-    """Every procedure's first samples."""
+    """Edit the table to run only the first samples of every procedure."""
     table.setdefault("run", {})["duration"] = max(2, steps // scene.run.substeps) * scene.run.sample
 
 
 def coarsen(table: dict[str, Any], scene: BrakingScene, times: int) -> None:
-    """Fewer steps within a sample."""
+    """Edit the table to take fewer steps within a sample."""
     table.setdefault("run", {})["substeps"] = scene.run.substeps // times

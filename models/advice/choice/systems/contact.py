@@ -12,7 +12,7 @@ QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
 def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -> RunQuantities:
-    """Press the bodies and roll them at every creepage."""
+    """Press the bodies together, roll them at every creepage, and collect the quantities."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
     forces = run(scene, error=error)
@@ -21,7 +21,7 @@ def computed_quantities(scene: ContactScene, engine: str, error: bool = False) -
 
 
 def steps(scene: ContactScene) -> int:
-    """Creepages: nothing is marched in time."""
+    """Number of creepages, as nothing is marched in time."""
     return len(creepages(scene))
 
 

@@ -15,7 +15,7 @@ TYRES = ("load", "fx", "fy", "mz")
 
 
 def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) -> RunQuantities:
-    """Drive every manoeuvre."""
+    """Drive every manoeuvre and collect the quantities."""
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [each.detail for each in runs]
     speeds = [drive.velocity() for drive in drives]
@@ -35,7 +35,7 @@ def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) 
 
 
 def steps(scene: HandlingScene) -> int:
-    """Steps of the shortest manoeuvre."""
+    """Number of steps of the shortest manoeuvre."""
     return min(round(manoeuvre.duration / scene.run.step) for manoeuvre in scene.manoeuvres.values())
 
 
@@ -43,11 +43,11 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
-    """Shorten the scene to at most so many steps of the scene's own in every manoeuvre."""
+    """Shorten every manoeuvre to at most ``steps`` steps of the scene's own length."""
     for name, manoeuvre in table["manoeuvres"].items():
         manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 
 
 def coarsen(table: dict[str, Any], scene: HandlingScene, times: int) -> None:
-    """The scene with its step multiplied by a whole factor."""
+    """Edit the table to multiply the step by ``times``."""
     table.setdefault("run", {})["step"] = times * scene.run.step

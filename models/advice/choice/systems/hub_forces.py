@@ -10,7 +10,7 @@ ENGINE, WINDOWED = "mujoco", True
 
 
 def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> RunQuantities:
-    """Measure, and run as the scene holds roll and pitch."""
+    """Measure hub forces, run the vehicle with roll and pitch held as in the scene, and collect the quantities."""
     path = run(scene, engine, error=error)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION.items()}
     names = path.data["element"].values
@@ -22,7 +22,7 @@ def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> Ru
 
 
 def steps(scene: HubScene) -> int:
-    """Steps of a run."""
+    """Number of steps of a run."""
     return scene.steps
 
 
@@ -30,10 +30,10 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: HubScene, steps: int) -> None:
-    """Shorten the scene to so many steps of the scene's own."""
+    """Shorten the run to ``steps`` steps of the scene's own length."""
     table.setdefault("run", {})["duration"] = steps * scene.run.step
 
 
 def coarsen(table: dict[str, Any], scene: HubScene, times: int) -> None:
-    """Steps so many times as long."""
+    """Edit the table to multiply the step by ``times``."""
     table.setdefault("run", {})["step"] = times * scene.run.step

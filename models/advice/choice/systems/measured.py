@@ -18,7 +18,9 @@ FINE = 60
 
 
 def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) -> RunQuantities:
-    """Record, and march; the seconds are those of the march."""
+    """Bring the measurement onto one clock, run the vehicle, and collect the quantities; the seconds are those of the
+    march.
+    """
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
@@ -33,7 +35,7 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
 
 
 def steps(scene: MeasuredScene) -> int:
-    """Steps of a run."""
+    """Number of steps of a run."""
     return round(_clock(scene)[1] / _step(scene))
 
 
@@ -41,12 +43,12 @@ parts = steps
 
 
 def _step(scene: MeasuredScene) -> float:
-    """s."""
+    """Step of the run (s): the scene's, else the period of the recording."""
     return scene.run.step or _clock(scene)[0]
 
 
 def _clock(scene: MeasuredScene) -> tuple[float, float]:
-    """Period and duration (s) of the recording; that of a virtual measurement is known without a run."""
+    """Sampling period and duration (s) of the recording. For a virtual measurement they are known without a run."""
     if scene.virtual is not None:
         whole = scene.virtual.duration - scene.clock.start
         return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(whole, scene.clock.duration or whole)
@@ -56,8 +58,9 @@ def _clock(scene: MeasuredScene) -> tuple[float, float]:
 
 
 def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
-    """Shorten the scene to so many steps of the recording, or as many as a recording must have; a virtual measurement
-    ends there, too."""
+    """Shorten the run to ``few`` steps, at least as many as a recording must have; a virtual measurement ends then,
+    too.
+    """
     period, whole = _clock(scene)
     least = FINE * math.ceil(LEAST * period / (_step(scene) * FINE))
     duration = min(max(few, least) * _step(scene), whole)
@@ -69,5 +72,5 @@ def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
 
 
 def coarsen(table: dict[str, Any], scene: MeasuredScene, times: int) -> None:
-    """Steps so many times as long."""
+    """Edit the table to multiply the step by ``times``."""
     table.setdefault("run", {})["step"] = times * _step(scene)

@@ -13,7 +13,7 @@ CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
 
 
 def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
-    """Run the scene."""
+    """Run the scene and collect its quantities."""
     assembly = assemble(scene)
     begun = time.process_time()
     result = run(scene, engine, assembly=assembly, error=error)
@@ -28,7 +28,7 @@ def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQu
 
 
 def steps(scene: Scene) -> int:
-    """Steps of the run."""
+    """Number of steps of the run."""
     return round(scene.run.duration / scene.run.step)
 
 
@@ -36,13 +36,13 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: Scene, steps: int) -> None:
-    """Shorten the scene to so many steps of the scene's own."""
+    """Shorten the run to ``steps`` steps of the scene's own length."""
     table["run"] |= {"duration": steps * scene.run.step}
     table["run"].pop("output_step", None)
 
 
 def coarsen(table: dict[str, Any], scene: Scene, times: int) -> None:
-    """Steps so many times as long, those of every engine; all of them are kept."""
+    """Edit the table to multiply the steps of all engines by ``times``; every step becomes a saved row."""
     table["run"] |= {"step": times * scene.run.step}
     table["run"].pop("output_step", None)
     for engine_table in table.get("engines", {}).values():

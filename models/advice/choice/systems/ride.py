@@ -17,7 +17,9 @@ ENGINE, WINDOWED = "reference", True
 
 
 def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
-    """The scene for runs in time, with its effects and functions that shorten the run and lengthen its steps."""
+    """The scene as copies that run in time, an object that can leave out effects, shorten the run and lengthen its
+    steps.
+    """
     if isinstance(scene, CopiesInTime):
         return scene
     with scene_errors(scene):
@@ -25,7 +27,9 @@ def opened(scene: RideScene | CopiesInTime) -> CopiesInTime:
 
 
 def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -> RunQuantities:
-    """March the copies at every speed, by their own equations; InputError for another engine."""
+    """March the copies at every speed with their own equations, and collect the quantities; InputError for another
+    engine.
+    """
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
@@ -53,5 +57,5 @@ def steps(scene: CopiesInTime) -> int:
 
 
 def parts(scene: CopiesInTime) -> int:
-    """Steps of which whole numbers make up what is run, before and while outputs count."""
+    """Number by which the steps of a run can be grouped in whole numbers, both before and while outputs count."""
     return UNIT // gcd(UNIT, scene.times)

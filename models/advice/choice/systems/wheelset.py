@@ -14,7 +14,9 @@ ENGINE, WINDOWED = "reference", True
 
 
 def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) -> RunQuantities:
-    """Run every path. Of quantities of patches a path begins with the first one, all its times one after the other."""
+    """Compute every path and collect the quantities. A quantity of patches lists all times of the first patch, then
+    those of the next one.
+    """
     paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
     quantities = {
         str(name): Quantity(
@@ -32,7 +34,7 @@ def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) 
 
 
 def steps(scene: WheelsetScene) -> int:
-    """Steps of every path."""
+    """Number of steps of every path."""
     return round(scene.run.duration / scene.run.step)
 
 
@@ -40,10 +42,10 @@ parts = steps
 
 
 def shorten(table: dict[str, Any], scene: WheelsetScene, steps: int) -> None:
-    """Shorten the scene to so many steps of the scene's own, at the speeds of the whole scene."""
+    """Shorten the paths to ``steps`` steps of the scene's own length, at the speeds of the whole scene."""
     table.setdefault("run", {}).update(duration=steps * scene.run.step, speeds=path_speeds(scene))
 
 
 def coarsen(table: dict[str, Any], scene: WheelsetScene, times: int) -> None:
-    """Steps so many times as long."""
+    """Edit the table to multiply the step by ``times``."""
     table.setdefault("run", {})["step"] = times * scene.run.step

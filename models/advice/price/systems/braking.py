@@ -32,7 +32,7 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 @dataclass(frozen=True)
 class PricedBraking:
-    """See ``models.advice.price.PricedScene``. name : of the procedure."""
+    """Braking as a priced scene, see ``models.advice.price.PricedScene``. name : of the procedure."""
 
     scene: BrakingScene
     name: str
@@ -53,33 +53,35 @@ class PricedBraking:
 
     @property
     def whole(self) -> float:
-        """The longest that a run may take, s."""
+        """Longest duration (s) that a run may take."""
         return self.scene.run.duration
 
     first = whole
 
     @property
     def counted(self) -> str:
-        """Forces of tyres, once a step, whatever the engine."""
+        """Name of the count that measures the work: tyre forces, evaluated once per step in every engine."""
         return "force calls"
 
     def ladders(self) -> list[SettingLadder]:
-        """The one method of braking, its chassis carried by each engine."""
+        """Ladder of steps for the only method of braking, one for each engine that carries the chassis."""
         run = self.scene.run
         values = tuple(run.sample / n for n in sorted({*SUBSTEPS, run.substeps}))
         return [SettingLadder(engine, METHOD, values, 1, default=run.sample / run.substeps) for engine in self.engines]
 
     def reference(self) -> SettingLadder:
-        """Twice the steps on every rung."""
+        """Ladder of the reference, with twice as many steps on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
         return SettingLadder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """None, as there is no second method: a stop with valves in the loop has one method."""
+        """None: there is only one method for a stop with valves in the loop."""
         return None
 
     def solve(self, setting: Setting, duration: float) -> tuple[int, BrakingPath]:
-        """Substeps and the procedure, driven; RunFailed where it does not end at rest."""
+        """Drive the procedure with a setting; returns the number of substeps and the path. RunFailed where it does not
+        end at rest.
+        """
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
         path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.name).detail
@@ -88,13 +90,13 @@ class PricedBraking:
         return substeps, path
 
     def answer(self, solution: tuple[int, BrakingPath]) -> PricedRun:
-        """One number, as a history that does not change; every step asks for the forces of each wheel once."""
+        """The quantity, a single number, as a constant history. Each step evaluates the forces of each wheel once."""
         substeps, path = solution
         value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
         return PricedRun(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Steps within a sample."""
+        """Lines of a scene file that set the number of steps within a sample."""
         return [
             "[run]",
             f"substeps = {round(self.scene.run.sample / setting.value)}",
@@ -103,7 +105,7 @@ class PricedBraking:
 
 
 def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedBraking:
-    """The scene with a quantity, PROCEDURE.QUANTITY; the first procedure where none is named."""
+    """The braking scene with the quantity PROCEDURE.QUANTITY to price; the first procedure where none is named."""
     if scene.port is not None:
         raise InputError(
             scene.file,

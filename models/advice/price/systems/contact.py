@@ -31,8 +31,9 @@ USUAL = "fx,fy"
 
 @dataclass(frozen=True, eq=False)
 class PricedContact:
-    """See ``models.advice.price.PricedScene``. channels : of the quantity; rows : of a table, those that are sound;
-    None for one contact at its creepages."""
+    """A contact as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; rows : those of
+    a table that can be answered; None for one contact at its creepages.
+    """
 
     scene: ContactScene
     channels: tuple[str, ...]
@@ -48,26 +49,26 @@ class PricedContact:
 
     @property
     def quantity(self) -> str:
-        """Channels that the tolerance is set on."""
+        """Channels to which the tolerance applies, as text."""
         return " and ".join(self.channels)
 
     @property
     def unit(self) -> str:
-        """The one unit of the channels."""
+        """Unit that all channels share."""
         return UNITS[self.channels[0]]
 
     @property
     def extent(self) -> str:
-        """What the quantity is asked of."""
+        """Text on where the quantity is computed: at every creepage, or in rows of a table."""
         return "at every creepage" if self.rows is None else f"in the first {len(self.rows.lines):,} sound rows"
 
     @property
     def note(self) -> str:
-        """What the price leaves out."""
+        """Text on what the price leaves out: the error of the theory."""
         return "errors are those of cells: how far the theory is off stands beside the forces of a run"
 
     def ladders(self) -> list[SettingLadder]:
-        """Every march of the scene's theory over the cells."""
+        """Ladder of cells for every march of the scene's theory."""
         name, usual = self.scene.method.name, self.scene.method
         values = tuple(1.0 / n for n in sorted({*CELLS, usual.cells}))
         return [
@@ -82,7 +83,7 @@ class PricedContact:
         return int(self._method(march, self.scene.method.cells).order)
 
     def reference(self) -> SettingLadder:
-        """The march of the highest order on cells that halve."""
+        """Ladder of the reference: cells that halve, with the march of the highest order."""
         name = self.scene.method.name
         march = MARCHES[name][0]
         values = tuple(1.0 / n for n in REFERENCE)
@@ -90,7 +91,7 @@ class PricedContact:
         return SettingLadder(name, march or name, values, self._order(march), cells=True, said=said)
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """No other family has the same theory."""
+        """None: no other family of methods has the same theory."""
         return None
 
     def _method(self, march: str, cells: int) -> Method:
@@ -98,7 +99,7 @@ class PricedContact:
         return self.scene.method.model_copy(update=update)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:
-        """Values (n, k) of the channels, and the number of cells that all rows took."""
+        """Values (n, k) of the channels with a setting, and the number of cells that all rows took."""
         method = self._method(setting.method, round(1.0 / setting.value))
         if self.rows is None:
             contact = run(self.scene.model_copy(update={"method": method}), error=False)
@@ -109,7 +110,7 @@ class PricedContact:
         return values, len(values) * method.cells**2
 
     def answer(self, solution: tuple[np.ndarray, int]) -> PricedRun:
-        """Rows stand in for times; one row stands there twice, as a span of time has two ends."""
+        """The channels as a run, with rows in place of times; a single row is repeated, since a run needs two times."""
         values, cells = solution
         values = np.repeat(values, 2, axis=0) if len(values) == 1 else values
         return PricedRun(np.linspace(0.0, 1.0, len(values)), values, {"steps": len(values), "contact cells": cells})
@@ -121,7 +122,7 @@ class PricedContact:
 
 
 def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, ...]) -> PricedContact:
-    """The scene with a quantity: forces fx, fy in the plane of the contact, or the moment mz."""
+    """The contact scene with a quantity to price: forces fx, fy in the plane of the contact, or the moment mz."""
     channels = tuple(name.strip() for name in (quantity or USUAL).split(","))
     for name in channels:
         if name not in UNITS:
@@ -136,7 +137,7 @@ def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, 
 
 
 def _sound_rows(scene: ContactScene) -> RowBlock:
-    """The first rows of a table that can be answered; InputError where there are none."""
+    """The first rows of a table, without those that the theory refuses; InputError where none remain."""
     file = scene.cases_file()
     for block in islice(blocks(file, (BY_AXES, BY_CURVATURES), ROWS), 1):
         coarse = scene.method.model_copy(update={"cells": CELLS[0]})

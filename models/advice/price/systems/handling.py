@@ -30,13 +30,13 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
 
 @cache
 def _with_cells(handling: Handling, cells: int) -> Handling:
-    """The vehicle with other cells."""
+    """The vehicle with another number of cells in its tyres' patches."""
     return replace(handling, tyres=replace(handling.tyres, cells=cells))
 
 
 @dataclass(frozen=True)
 class PricedHandling(MeshedScene):
-    """A manoeuvre."""
+    """A manoeuvre of handling as a priced scene."""
 
     scene: HandlingScene
     name: str
@@ -44,11 +44,11 @@ class PricedHandling(MeshedScene):
     handling: Handling
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
-        """The manoeuvre in an engine."""
+        """Drive the manoeuvre in an engine with this number of cells and this step (s)."""
         return drive_run(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
-        """The drive by DOP853 with the engine's accelerations, an accurate reference."""
+        """Drive the manoeuvre by the solver DOP853 with the engine's accelerations, as an accurate reference."""
         handling = _with_cells(self.handling, cells)
         model, start = build(self.reference_engine, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
@@ -66,7 +66,7 @@ class PricedHandling(MeshedScene):
         return read_run(handling, Trajectory(times, done.y.T), self.reference_engine)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity over time; the drive is judged."""
+        """The quantity over the time of a drive, and the number of force calls; the drive's assumptions are judged."""
         judged_drive(self.scene, self.reference_engine, self.name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
@@ -83,7 +83,7 @@ class PricedHandling(MeshedScene):
 
 
 def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedHandling:
-    """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
+    """The handling scene with the quantity MANOEUVRE.QUANTITY to price; the first manoeuvre where none is named."""
     name, asked = run_and_quantity(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)
     manoeuvre, step, others = (

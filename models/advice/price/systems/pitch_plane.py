@@ -48,8 +48,9 @@ TIGHT = 1e-10
 
 @dataclass(frozen=True)
 class PricedPitchPlane:
-    """See ``models.advice.price.PricedScene``. channels : of the quantity; base : step (s) whose parts all divide
-    the run and its samples."""
+    """The pitch plane as a priced scene, see ``models.advice.price.PricedScene``. channels : of the quantity; base :
+    step (s) whose whole fractions all divide the run and its samples.
+    """
 
     assembly: Assembly
     engines: tuple[str, ...]
@@ -65,23 +66,23 @@ class PricedPitchPlane:
 
     @property
     def quantity(self) -> str:
-        """Channels that the tolerance is set on."""
+        """Channels to which the tolerance applies, as text."""
         return " and ".join(self.channels)
 
     @property
     def whole(self) -> float:
-        """Length of the scene's run, s."""
+        """Duration (s) of the scene's run."""
         return self.assembly.scene.run.duration
 
     @property
     def sampled(self) -> bool:
-        """Whether the input has a kink at every sample."""
+        """Whether the input is not smooth at its samples."""
         signal = self.assembly.input
         return signal is not None and signal.period is not None and len(signal.knots(self.whole)) > 0
 
     @property
     def kink_period(self) -> float:
-        """The sampling period of an input with a kink at every sample."""
+        """Sampling period (s) of an input that is not smooth at its samples; 0 for a smooth input."""
         return self.base if self.sampled else 0.0
 
     @property
@@ -91,11 +92,13 @@ class PricedPitchPlane:
 
     @property
     def counted(self) -> str:
-        """Every method's work is its force calls."""
+        """Name of the count that measures the work: force calls, for every method."""
         return "force calls"
 
     def ladders(self) -> list[SettingLadder]:
-        """Every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and the recommended."""
+        """Ladders for every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and with the
+        recommended one.
+        """
         ladders = []
         for engine in self.engines:
             for name, known in CATALOGUE[engine].items():
@@ -111,30 +114,30 @@ class PricedPitchPlane:
         return ladders
 
     def reference(self) -> SettingLadder:
-        """The written equations by RK4; each step is half the one before."""
+        """Ladder of the reference: RK4 on the written equations; each step is half the one before."""
         most = max(1, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
         return SettingLadder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
     def second(self, reference_setting: Setting) -> Setting | None:
-        """The second method, LSODA, unless it would restart at every sample."""
+        """LSODA, to check the reference; None where it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 
     def solve(self, setting: Setting, duration: float) -> Result:
-        """The run's result, at every step."""
+        """The result of a run with a setting, with a row at every step."""
         return self.run(setting.engine, self._settings(setting, duration))
 
     def run(self, engine: str, settings: Settings) -> Result:
-        """The result of the scene with any settings."""
+        """The result of the scene in an engine with these settings."""
         scene: Scene = self.assembly.scene
         every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
         return run(every_step, engine, settings, self.assembly)
 
     def answer(self, solution: Result) -> PricedRun:
-        """The quantity's channels."""
+        """The quantity's channels along a run."""
         return PricedRun(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
     def lines(self, setting: Setting) -> list[str]:
-        """The setting as the scene file holds it."""
+        """Lines of a scene file that contain the setting."""
         if setting.engine in OUTSIDE:
             return _outside(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
@@ -154,13 +157,13 @@ class PricedPitchPlane:
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
 
     def _steps(self) -> tuple[float, ...]:
-        """Parts of ``base``, from coarse to fine."""
+        """Steps (s) that are whole fractions of ``base``, from coarse to fine."""
         parts = np.unique(np.ceil(self.base / np.array(STEPS) * (1 - 1e-9)).astype(int))
         return tuple(self.base / int(k) for k in parts)
 
 
 def _outside(setting: Setting) -> list[str]:
-    """A class from outside the tree, which no scene names."""
+    """Lines for an engine from outside the tree, which a scene file cannot name."""
     asked = f"# twinrig run SCENE --engine {setting.engine}"
     return (
         [asked, f"# with the {setting.label()} in the class itself"]
@@ -170,7 +173,7 @@ def _outside(setting: Setting) -> list[str]:
 
 
 def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> PricedPitchPlane:
-    """The scene with a quantity: channels of its result, with commas between them, of one unit."""
+    """The scene with a quantity to price: channels of its result that share a unit, separated by commas."""
     assembly = assemble(scene)
     channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))
     base, first = _lengths(assembly)
@@ -179,7 +182,9 @@ def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -
 
 
 def _lengths(assembly: Assembly) -> tuple[float, float]:
-    """Step (s) whose parts divide the run and its samples; how much of the run is searched (s)."""
+    """Step (s) whose whole fractions divide the run and its samples, and the duration (s) of the part that is
+    searched.
+    """
     length, step = assembly.scene.run.duration, assembly.scene.run.step
     sampled = (signal for signal in (assembly.input, assembly.moment) if signal is not None)
     period = next((signal.period for signal in sampled if signal.period is not None), None)
@@ -207,7 +212,7 @@ def _unit(scene: PricedPitchPlane) -> str:
 
 
 def engine_settings(setting: Setting, duration: float) -> Settings:
-    """A setting as the engines take it."""
+    """The setting in the form that engines use."""
     integrator = setting.method.split()[0]
     radius = RADII.get(setting.method, 0.6)
     if setting.adaptive:

@@ -22,28 +22,30 @@ QUANTITIES = {**STATES, **CONTACTS}
 
 @dataclass(frozen=True)
 class PricedWheelset(MeshedScene):
-    """The paths of a scene at all its speeds."""
+    """The paths of a wheelset scene at all its speeds, as a priced scene."""
 
     scene: WheelsetScene
     speeds: tuple[float, ...]
 
     def _scene(self, cells: int, step: float, duration: float) -> WheelsetScene:
-        """The scene with another net, step and duration (s)."""
+        """The scene with another number of cells, step (s) and duration (s)."""
         contact = self.scene.contact.model_copy(update={"cells": cells or 3})
         run = self.scene.run.model_copy(update={"step": step, "duration": duration})
         return self.scene.model_copy(update={"contact": contact, "run": run})
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> list[WheelsetPath]:
-        """A path for every speed."""
+        """Compute the path at every speed in an engine, with this number of cells and this step (s)."""
         return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
-        """The paths of the wheelset by DOP853, an accurate reference."""
+        """The path at every speed by the solver DOP853, as an accurate reference."""
         scene = self._scene(cells, step, duration)
         return [_exact(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity of all paths side by side; each is judged."""
+        """The quantity along all paths, as columns over time, and the number of force calls; each path's assumptions
+        are judged.
+        """
         for speed, wheelset_run in zip(self.speeds, run, strict=True):
             judged_path(self.scene, self.reference_engine, speed, wheelset_run)
         name, times = self.quantity, run[0].times
@@ -61,7 +63,7 @@ class PricedWheelset(MeshedScene):
 
 
 def _exact(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
-    """A path by a Runge-Kutta method of order 8 with steps of its own; RunFailed where it gives up."""
+    """A path by a Runge-Kutta method of order 8 that picks its own steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start), 1e-3)
     done = solve_ivp(
@@ -80,7 +82,7 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
 
 
 def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
-    """The scene with a quantity: a state or a force of the contacts, of its paths at all speeds."""
+    """The wheelset scene with a quantity to price: a state or a contact force, along its paths at all speeds."""
     asked, wheelset, contact = chosen(quantity or USUAL, QUANTITIES), wheelset_of(scene), scene.contact
     speeds, run = tuple(path_speeds(scene)), scene.run
     fastest = max(

@@ -6,7 +6,7 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_control(key: str, neutral: float, usual: float, says: str, **more: Any) -> Entry:
-    """An effect that a key of [control] names by a value that is not neutral."""
+    """An effect of the control: it is present where this key of [control] has a value other than ``neutral``."""
 
     def there(scene: Any) -> bool:
         return bool(getattr(scene.control, key) != neutral)

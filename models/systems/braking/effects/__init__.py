@@ -15,12 +15,14 @@ NOISE, BITS, SCALE = ("noise",), ("bits", "range"), ("gain", "offset")
 
 
 def _differs(table: Any, keys: tuple[str, ...]) -> bool:
-    """Whether any of these keys of a table of the scene is other than by default."""
+    """Whether any of these keys of a scene's table differs from its default."""
     return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
 
 
 def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: str, usual: dict[str, float]) -> Entry:
-    """An effect of the sensors behind a port: keys of [port.signals] or [port.pressures] other than a perfect one's."""
+    """An effect of the sensors at a port: present where keys of [port.signals] or [port.pressures] differ from those of
+    a perfect sensor.
+    """
 
     def there(scene: Any) -> bool:
         return scene.port is not None and _differs(getattr(scene.port, kind), keys)
@@ -40,8 +42,9 @@ def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: st
 def _of_brakes(
     keys: tuple[str, ...], freed: tuple[str, ...], says: str, place: str, cost: str, count: str, usual: Any
 ) -> Entry:
-    """An effect of the brakes: keys of their tables, those that go with it, and ``usual(axle, brake)``: what changes of
-    a brake of the front or the rear axle."""
+    """An effect that the brakes' keys ``keys`` switch on. Leaving it out removes the keys ``freed``; putting it in
+    updates the table of the front and of the rear brake by ``usual(axle, brake)``.
+    """
 
     def there(scene: Any) -> bool:
         return any(_differs(getattr(scene.brakes, axle), keys) for axle in AXLES)
@@ -61,25 +64,27 @@ def _of_brakes(
 
 
 def _without_reservoir(table: Table, scene: Any) -> None:
-    """The supply's pressure stays."""
+    """Remove the reservoir and its volume, so that the supply's pressure is constant."""
     for key in ("reservoir", "volume"):
         table["pressure"].pop(key, None)
 
 
 def _without_slow_apply(table: Table, scene: Any) -> None:
-    """Valves apply, hold and release; a controller of the scene that applies slowly goes back to its steps."""
+    """Remove slow filling: valves apply, hold and release. The controller loses its parameter ``slow`` and applies in
+    steps.
+    """
     del table["pressure"]["slow"]
     table.get("controller", {}).get("parameters", {}).pop("slow", None)
 
 
 def _with_slow_apply(table: Table, scene: Any) -> None:
-    """A throttle that fills eight times as slowly."""
+    """Let valves fill through a throttle, too, eight times as slowly."""
     fill = 0.15 if scene.pressure is None else scene.pressure.fill
     table.setdefault("pressure", {})["slow"] = 8.0 * fill
 
 
 def _with_delay(table: Table, scene: Any) -> None:
-    """Two samples of delay."""
+    """Set the valves' delay to two samples."""
     table.setdefault("pressure", {})["delay"] = 2.0 * scene.run.sample
 
 
@@ -92,7 +97,7 @@ def _of_two_surfaces(scene: Any) -> bool:
 
 
 def _on_one_surface(table: Table, scene: Any) -> None:
-    """Everywhere the surface that is left of the line at the start."""
+    """Replace the road by a single surface, the one that is left of the line at the start."""
     first = scene.road.stretches[0].left
     table["road"] = {"stretches": [{"left": first}]}
     for procedure in table["procedures"].values():
@@ -101,28 +106,28 @@ def _on_one_surface(table: Table, scene: Any) -> None:
 
 
 def _on_another_surface(table: Table, scene: Any) -> None:
-    """Dry road after 10 m, or ice after a dry one."""
+    """Append a stretch that begins 10 m after the last one does: ice if the last one is dry, else dry."""
     last = scene.road.stretches[-1]
     stretches = table.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
     stretches.append({"x": last.x + 10.0, "left": "ice" if last.left == "dry" else "dry"})
 
 
 def _in_the_plane(table: Table, scene: Any) -> None:
-    """Edit the scene's table to a vehicle in the plane with the same masses, axles and wheels."""
+    """Replace the vehicle by one in the plane with the same masses, axles and wheels."""
     from models.systems.braking.of_scene import vehicle_of
 
     table["vehicle"] = {"override": vehicle_of(scene).model_dump()}
 
 
 def _with_trailer(table: Table, scene: Any) -> None:
-    """The chosen one, unladen."""
+    """Add the trailer ``CHOSEN``, which is unladen."""
     from models.brake.trailer import CHOSEN
 
     table["trailer"] = CHOSEN.model_dump(exclude_unset=True)
 
 
 def _tows(scene: Any) -> bool:
-    """Whether the vehicle of a file has bodies with a hitch."""
+    """Whether the vehicle of the scene's file tows bodies."""
     from models.systems.braking.of_scene import spatial_vehicle_of
 
     given = spatial_vehicle_of(scene)

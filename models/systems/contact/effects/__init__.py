@@ -12,7 +12,9 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_theory(says: str, theory: str, cost: str, count: str, instead: Callable[[Any], dict[str, str]]) -> Entry:
-    """A theory beyond FASTSIM; ``instead`` gives the method of a scene without it, its cells left out."""
+    """An effect that names a theory beyond FASTSIM. ``instead`` gives the [method] of the scene without this theory,
+    cells excepted.
+    """
 
     def leave_out(table: Table, scene: Any) -> None:
         cells = {key: value for key, value in table["method"].items() if key == "cells"}
@@ -41,7 +43,7 @@ def _without_half_space(scene: Any) -> dict[str, str]:
 
 
 def _method(name: str) -> Callable[[Table, Any], None]:
-    """The edit that names a theory."""
+    """Return the edit of a scene that names a theory in [method]."""
 
     def put_in(table: Table, scene: Any) -> None:
         table["method"] = {"name": name}
@@ -62,7 +64,7 @@ def _without_profiles(table: Table, scene: Any) -> None:
 
 
 def _spin_is_swept(scene: Any) -> bool:
-    """Whether spin is what a scene sweeps."""
+    """Whether the scene sweeps the spin."""
     return scene.sweep is not None and scene.sweep.of == "spin"
 
 

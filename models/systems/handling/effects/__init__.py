@@ -11,7 +11,7 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual: Any) -> Entry:
-    """An effect that a key of the manoeuvres names: left out of all of them, put into all of them."""
+    """An effect that a key of the manoeuvres switches on; it is left out of all manoeuvres, or put into all."""
 
     def there(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
@@ -37,7 +37,9 @@ ALONE, TOWING = "r19_free", "r19_caravan"
 
 
 def without_trailer(table: Table, scene: Any) -> None:
-    """The shipped car without its caravan; what is left of a file of the user's is for the user to say."""
+    """Replace the shipped car and caravan by the shipped car. InputError for another file, which its user must
+    change.
+    """
     if scene.vehicle.file != TOWING:
         allowed = "has bodies with a hitch: name a vehicle file without them"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
@@ -45,7 +47,7 @@ def without_trailer(table: Table, scene: Any) -> None:
 
 
 def with_trailer(table: Table, scene: Any) -> None:
-    """The shipped caravan behind the shipped car."""
+    """Replace the shipped car by the shipped car with its caravan. InputError for another file."""
     if scene.vehicle.file != ALONE:
         allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
@@ -62,7 +64,7 @@ def _measured(scene: Any) -> bool:
 
 
 def _without_measured(table: dict[str, Any], scene: Any) -> None:
-    """Roll straight ahead for as long, and from the same speed, as the drives that were measured."""
+    """Replace measured drives by rolling straight ahead, for as long and from the same speed."""
     for manoeuvre in table["manoeuvres"].values():
         manoeuvre.pop("measured", None)
         manoeuvre.pop("stretch", None)

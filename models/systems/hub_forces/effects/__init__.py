@@ -9,10 +9,11 @@ from models.core.scene_effects import Entry, Table
 def _chosen(
     says: str, place: str, cost: str, counts: dict[str, int], usual: str, instead: str | None, **more: Any
 ) -> Entry:
-    """An effect that a word of the scene names, ``usual``; the word without it is ``instead``, None for the default.
+    """An effect that a word of the scene selects: ``usual`` with the effect, ``instead`` without it, None for the
+    default.
 
-    One that needs the virtual measurement is none where the scene has files. What is stated of noise stays without it:
-    the filter is told the same deviations as before.
+    An effect that needs the virtual measurement is absent where the scene has files. Stated deviations of noise stay
+    without the effect: the filter gets the same ones as before.
     """
     name, key = place.split(".")
 
@@ -34,7 +35,7 @@ def _chosen(
 
 
 def _keep_road(table: Table, scene: Any) -> None:
-    """InputError: files must take its place."""
+    """Raise InputError: the road can be left out only if files replace it."""
     raise InputError(scene.file, "road", None, "can only give way to forces.file and angles.file: name them")
 
 

@@ -8,7 +8,9 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **counts: int) -> Entry:
-    """An effect of virtual transducers: a key of [virtual.faults]; files have the faults that they have."""
+    """An effect of virtual transducers, which a key of [virtual.faults] switches on. It cannot be chosen for files,
+    which have their own faults.
+    """
     why = "for files have the faults that they have"
 
     def there(scene: Any) -> bool:
@@ -26,7 +28,9 @@ def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **cou
 
 
 def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
-    """A method that holds roll and pitch; without it nothing does, as the other one costs more."""
+    """An effect that is a method of holding roll and pitch. Without it they are not held, as the other method costs
+    more.
+    """
 
     def leave_out(table: Table, scene: Any) -> None:
         table.setdefault("stabilise", {})["method"] = "none"
@@ -44,14 +48,14 @@ def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple
 
 
 def _count_alike(table: Table, scene: Any) -> None:
-    """All files count the same time."""
+    """Remove offset and drift of the files' clocks, so that all files count the same time."""
     for file in table["files"]:
         file.pop("offset", None)
         file.pop("drift", None)
 
 
 def _keep_road(table: Table, scene: Any) -> None:
-    """InputError: files must take its place."""
+    """Raise InputError: the virtual measurement can be left out only if files replace it."""
     raise InputError(scene.file, "virtual", None, "can only give way to [[files]] that were measured: name them")
 
 

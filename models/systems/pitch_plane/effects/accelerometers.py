@@ -57,7 +57,7 @@ class Parameters(Strict):
     path: int = PATH
 
     def positions(self) -> dict[str, tuple[float, float, float]]:
-        """Places (m) of all sensors by name."""
+        """Positions (m) of all sensors by name."""
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
@@ -67,13 +67,13 @@ def names(p: Parameters) -> list[tuple[str, ...]]:
 
 
 def readings_of(result: Result, p: Parameters) -> np.ndarray:
-    """Readings (n, sensors, 3) in m/s^2 of a run's result."""
+    """Readings (n, sensors, 3) in m/s^2 of the accelerometers, from a run's result."""
     return np.stack([np.column_stack([result[channel] for channel in channels]) for channels in names(p)], axis=1)
 
 
 @dataclass(frozen=True)
 class Accelerometers:
-    """The sensors as an output of the run."""
+    """Output of a run that gives the readings of the sensors."""
 
     parameters: Parameters
 
@@ -89,7 +89,7 @@ class Accelerometers:
         }
 
     def _readings(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
-        """Readings (samples, sensors, 3) at the rows of the sensors' instants."""
+        """Readings (samples, sensors, 3) at ``rows``, the run's rows at the sensors' sampling times."""
         from models.sensors.sensor_array import on_bracket, readings
 
         p, y = self.parameters, run.states[rows]
@@ -106,7 +106,7 @@ class Accelerometers:
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with accelerometers among its results."""
+    """The assembly with accelerometer readings among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
     axes = {
         f"{sensor}, {axis}": channel

@@ -42,7 +42,9 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-    """Channels zeta1, zeta2 (m, down), starting with the tyres at rest under the first force."""
+    """Channels zeta1, zeta2 (m, down) of the contact points; at the start the tyres are at rest under the first
+    force.
+    """
     p, signal = assembly.parameters, assembly.input
     forces = signal.parts[0] if isinstance(signal, Stacked) else signal
     assert isinstance(forces, Sampled | Smooth)
@@ -59,7 +61,8 @@ def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) ->
 
 
 def compression(pieces: np.ndarray, period: float, stiffness: float, damping: float, times: np.ndarray) -> np.ndarray:
-    """Tyre compression e (n,) in m of d e' + k e = f at any times (n,) in s, exact for a polynomial f.
+    """Tyre compression e (n,) in m that solves d e' + k e = f at times (n,) in s, exact where the force f is a
+    polynomial between samples.
 
     pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
     On each piece e = P(t) + (e_0 - P(0)) exp(-t / tau) with tau = d / k and the particular solution
@@ -86,7 +89,7 @@ def _particular_solution(pieces: np.ndarray, tau: float) -> np.ndarray:
 
 
 def _starts(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
-    """Compression at the start of each piece (m): that of the end of the one before it."""
+    """Compression (m) at the start of each piece, equal to that at the end of the piece before."""
     powers = period ** np.arange(len(particular))
     gained = powers @ particular - particular[0] * math.exp(-period / tau)
     starts = np.empty(particular.shape[1])

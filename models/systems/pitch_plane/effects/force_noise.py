@@ -28,7 +28,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with noise on both forces."""
+    """The assembly with noise added to both wheel forces."""
     signal = assembly.input
     assert isinstance(signal, Sampled | Smooth)
     noisy = signal.values + p.deviation * normal(p.seed, p.path, len(signal.values), 2)

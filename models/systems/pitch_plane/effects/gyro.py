@@ -38,18 +38,18 @@ class Parameters(Strict):
 
 @dataclass(frozen=True)
 class Gyro:
-    """The gyro as an output of the run."""
+    """Output of a run that gives the reading of the gyro."""
 
     parameters: Any
 
     def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-        """Channel ``gyro`` (rad/s), nose up positive."""
+        """Channel ``gyro`` (rad/s), the gyro's reading of the pitch rate, positive nose up."""
         reading = noisy(self.parameters, GYRO, times, states[:, 7], assembly.scene, PLACE)
         return {"gyro": ("rad/s", "pitch rate as a gyro reads it, nose up", reading)}
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with a gyro among its results."""
+    """The assembly with a gyro's reading among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
     kept = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL)
     return replace(assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, kept))

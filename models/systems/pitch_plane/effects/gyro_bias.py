@@ -35,13 +35,13 @@ class Parameters(Strict):
 
 @dataclass(frozen=True)
 class Biased:
-    """A gyro whose samples carry the bias."""
+    """A gyro with a bias added to its samples."""
 
     gyro: Gyro
     parameters: Any
 
     def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-        """Channel ``gyro`` with the bias on it, and ``gyro_bias`` alone (both rad/s)."""
+        """Channels ``gyro``, the reading with its bias, and ``gyro_bias``, the bias alone (both rad/s)."""
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
         unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
         number = instant_numbers(times, rate)
@@ -58,6 +58,6 @@ class Biased:
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with a biased gyro in place of its plain one."""
+    """The assembly with its gyro replaced by one with a bias."""
     biased = tuple(Biased(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
     return replace(assembly, outputs=biased)

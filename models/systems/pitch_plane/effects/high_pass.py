@@ -27,5 +27,5 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle whose slow pitch is held back."""
+    """The force-excited vehicle with a spring and damper to the ground that hold back slow pitch."""
     return assembly.with_spring(PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio)))

@@ -92,7 +92,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle, drawn towards the estimate of its pitch."""
+    """The force-excited vehicle with a moment that draws its pitch towards the filter's estimate."""
     guide = guide_of(assembly, p)
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
@@ -110,7 +110,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 @dataclass(frozen=True)
 class Guide:
-    """Pitch that a guided run follows, at times i ``period`` (s).
+    """Estimated pitch that a guided run follows, at times i ``period`` (s).
 
     states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
@@ -137,7 +137,9 @@ _LATEST: dict[bytes, Guide] = {}
 
 
 def guide_of(assembly: Assembly, p: Parameters) -> Guide:
-    """The guide pitch for a force-excited assembly; raises InputError for a file that is none, RunFailed."""
+    """The estimated pitch that a force-excited assembly follows; InputError for an unusable file, RunFailed from the
+    filter.
+    """
     from models.systems.pitch_plane.pitch_filter import estimate
 
     measured, forces, p_vehicle = _measurement(assembly, p), assembly.input, assembly.parameters
@@ -184,7 +186,7 @@ def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurem
 
 
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
-    """The file's columns with their deviations; refuses what the filter could not use."""
+    """The measured columns of the file with their standard deviations; InputError for what the filter cannot use."""
     from models.core.time_series import read_time_series
     from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
 
@@ -214,7 +216,7 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
 
 
 def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
-    """A filter whose measurement contradicts its forces or its model would draw the vehicle anywhere."""
+    """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
     mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
     if mean > SURPRISE:
         raise InputError(
@@ -227,7 +229,7 @@ def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
 
 
 def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
-    """Objections to the filter by its own innovations."""
+    """Objections to the filter that follow from its own innovations."""
     if guide.consistency.consistent:
         return ()
     square = guide.consistency.figures[0]
@@ -254,12 +256,14 @@ def _assumption(guide: Guide) -> Assumption:
 
 
 def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
-    """Where each figure lies in its interval, from -1 to 1."""
+    """Position of each statistic in its interval, from -1 at the lower end to 1 at the upper one."""
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.figures}
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
-    """A moment that is slower than the pitch runs away cannot hold it : only vertical forces make it run."""
+    """Refuse a bandwidth at which the moment reacts more slowly than the pitch diverges. Only vertical forces make it
+    diverge.
+    """
     if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
         return
     share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total)
@@ -276,7 +280,7 @@ def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
 def _channels(
     guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
 ) -> Channels:
-    """The moment and what it follows, at the saved times."""
+    """Channels of the guiding moment and of the estimate that it follows, at the saved times."""
     grid = guide.period * np.arange(len(guide.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)

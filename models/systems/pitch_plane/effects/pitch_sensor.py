@@ -38,6 +38,6 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def pitch_reading(p: Any, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
-    """Channel ``pitch_reading`` (rad), nose up."""
+    """Channel ``pitch_reading`` (rad), a sensor's reading of the pitch, positive nose up."""
     reading = noisy(p, PITCH_SENSOR, times, states[:, 3], assembly.scene, PLACE)
     return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", reading)}

@@ -21,5 +21,5 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The assembly with the spring on its chassis."""
+    """The assembly with a rotational spring between chassis and ground."""
     return assembly.with_spring(PitchSpring("chassis", p.stiffness, p.damping, p.dead_band))

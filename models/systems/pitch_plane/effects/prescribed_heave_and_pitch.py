@@ -34,7 +34,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle with heave and pitch of its chassis as inputs, twice differentiable."""
+    """The force-excited vehicle whose chassis' heave and pitch are prescribed inputs, twice differentiable."""
     from models.systems.pitch_plane.effects.prescribed_pitch import prescribe
 
     columns = {"z3": METRES, "pitch": RADIANS}

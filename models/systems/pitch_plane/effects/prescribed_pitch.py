@@ -40,14 +40,15 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The force-excited vehicle with its pitch as an input, twice differentiable by a quintic spline."""
+    """The force-excited vehicle whose pitch is a prescribed input, a twice differentiable quintic spline."""
     return prescribe(assembly, "prescribed_pitch", p, "pitch", {"pitch": RADIANS})
 
 
 def prescribe(
     assembly: Assembly, effect: str, p: Any, mode: Mode, columns: Mapping[str, Mapping[str, float]]
 ) -> Assembly:
-    """The force-excited vehicle with the coordinates of ``mode`` as inputs, by a quintic spline through the samples.
+    """The force-excited vehicle with the coordinates of ``mode`` prescribed by a quintic spline through the samples of
+    a file.
 
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.

@@ -90,7 +90,7 @@ def _check_keys(file: str, p: Parameters) -> None:
 
 
 def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
-    """The profile, and the stations (m) at which it is only C2."""
+    """The road profile, and the stations (m) at which it is only twice continuously differentiable."""
     if p.source in ("opencrg", "csv"):
         profile = _measured(scene, p, distance)
         return profile, (profile.start, profile.start + profile.window_length)
@@ -131,7 +131,7 @@ def _measured(scene: Any, p: Parameters, distance: float) -> Any:
 
 
 def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: float) -> None:
-    """Refuse in the scene's own words what the road's file makes impossible."""
+    """Refuse a road file that is too short for the run-in or the run; the message names the scene's keys."""
     total = raw.end - raw.start
     if run_in > total:
         raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")

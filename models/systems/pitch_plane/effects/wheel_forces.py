@@ -41,7 +41,7 @@ class Parameters(Strict):
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
-    """The vehicle without tyres, driven by the two forces."""
+    """The vehicle without tyres, driven by two wheel forces from a file."""
     from models.core.time_series import read_time_series
 
     scene = assembly.scene
@@ -58,8 +58,9 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 def _doubts_about_forces(
     assembly: Assembly, p: Parameters, values: np.ndarray, period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
-    """Doubts about forces (n, 2) in N that cannot be this vehicle's, and that they balance its weight; InputError for
-    what is beyond doubt."""
+    """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
+    InputError for impossible forces.
+    """
     from models.measured.axle_forces import IN_FILE, AxleForces, check
     from models.measured.signal import Signal
 
@@ -121,7 +122,9 @@ def _steady(acceleration: float, run: Result) -> Watched:
 
 
 def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -> "list[Finding]":
-    """Samples that no wheel has felt: spikes, and what a range has cut off. A lifted wheel's zeros are neither."""
+    """Findings on samples that no wheel can have felt: spikes, and values that the sensor's range cut off. The zeros of
+    a lifted wheel are neither.
+    """
     from models.measured.checks import clipped, spikes
     from models.measured.checks.evidence import Evidence
     from models.measured.columns import MemoryColumns

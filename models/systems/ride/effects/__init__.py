@@ -8,18 +8,18 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_vehicle(says: str, cost: str, there: Callable[[Any], bool]) -> Entry:
-    """An effect that a vehicle file has, and no table of the scene."""
+    """An effect that belongs to the vehicle file and not to a table of the scene."""
     return Entry(says, "vehicle.file", cost, there=there, leave_out=_keep_vehicle)
 
 
 def _keep_vehicle(table: Table, scene: Any) -> None:
-    """InputError: another file must take its place."""
+    """Raise InputError: the effect can be left out only if another vehicle file is named."""
     allowed = 'has it: name a file without it, or let effects = "auto" leave it out'
     raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
 
 
 def _omissions_of_sort(sort: str) -> Callable[[Any], bool]:
-    """Whether a scene's vehicle and road hold omissions of a sort."""
+    """Return the test whether a scene's vehicle and road have effects of this sort, which can be left out."""
 
     def there(scene: Any) -> bool:
         from models.systems.ride.omissions import has_omissions
@@ -36,7 +36,7 @@ def _vehicle(scene: Any) -> Any:
 
 
 def _equal(key: str) -> Callable[[Table, Any], None]:
-    """The word of [road] without which wheels meet different heights."""
+    """Return the edit that sets ``key`` of [road] so that wheels meet equal heights."""
 
     def leave_out(table: Table, scene: Any) -> None:
         table.setdefault("road", {})[key] = "equal"
@@ -45,7 +45,7 @@ def _equal(key: str) -> Callable[[Table, Any], None]:
 
 
 def _straighten(table: Table, scene: Any) -> None:
-    """Slopes at rest stand for the curves."""
+    """Replace the springs' curves by their slopes at rest."""
     table["vehicle"]["small_motion"] = True
 
 
@@ -62,7 +62,7 @@ def _hold_mean_speed(table: Table, scene: Any) -> None:
 
 
 def _weight_first_output(table: Table, scene: Any) -> None:
-    """The first acceleration by Wk."""
+    """Weight the first acceleration among the outputs by Wk."""
     name = next(output.name for output in _vehicle(scene).outputs if output.kind == "acceleration")
     table["weighting"] = {name: "Wk"}
 

@@ -11,7 +11,9 @@ from models.core.scene_effects import Entry, Table
 
 
 def _of_parameters(says: str, keys: tuple[str, ...], cost: str, counts: dict[str, int], **more: Any) -> Entry:
-    """An effect that parameters of the scene's wheelset above zero name; its usual values are the chosen wheelset's."""
+    """An effect that is present where any of these parameters of the wheelset is above zero; its usual values are those
+    of the chosen wheelset.
+    """
 
     def there(scene: Any) -> bool:
         from models.systems.wheelset.of_scene import wheelset_of
@@ -51,7 +53,9 @@ def _has_profiles(scene: Any) -> bool:
 
 
 def _without_profiles(table: Table, scene: Any) -> None:
-    """Cones, heads of one radius, and flanges that are springs; InputError where the parameters have profiles."""
+    """Replace profiles by cones on rail heads of one radius, with springs as flanges. InputError where the parameters
+    have profiles.
+    """
     if scene.profiles is None:
         raise InputError(
             scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file without them"
@@ -60,7 +64,7 @@ def _without_profiles(table: Table, scene: Any) -> None:
 
 
 def _with_profiles(table: Table, scene: Any) -> None:
-    """S1002 on UIC60, in place of the flanges of cones."""
+    """Add the profiles S1002 on UIC60 in place of the cones' flange springs."""
     table["profiles"] = {}
     table.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
 
