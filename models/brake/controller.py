@@ -52,7 +52,8 @@ class Controller(Protocol):
 
 
 def is_steady(controller: Controller) -> bool:
-    """Whether it need be asked only once: what a steady class says does not hold for a ``sample`` derived from it."""
+    """Whether the controller needs to be asked only once. A derived class with its own ``sample`` is not steady merely
+    because its base class is."""
     declared: Mapping[str, object] = next(
         (vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {}
     )

@@ -35,13 +35,14 @@ class Axles:
         return self.front + self.rear
 
     def dynamic(self, z: float) -> tuple[float, float]:
-        """Loads (N) of front and rear at a deceleration z g."""
+        """Loads (N) of the front and the rear axle when the vehicle decelerates at z g."""
         moved = self.height / self.wheelbase * z * self.weight
         return self.front + moved, self.rear - moved
 
 
 def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
-    """Time (s) at which a speed is first fallen below, linear between samples; not a number if it never is."""
+    """Time (s) at which the speed first falls below ``speed``, interpolated linearly between samples; NaN if it never
+    does."""
     below = np.flatnonzero(speeds < speed)
     if below.size == 0 or below[0] == 0:
         return float("nan")
@@ -51,7 +52,7 @@ def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
 
 
 def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
-    """Way (m) at a time between two samples, at constant deceleration within that sample."""
+    """Distance (m) covered at a time between two samples, with constant deceleration between them."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
     rate = (speeds[i + 1] - speeds[i]) / long
@@ -88,7 +89,7 @@ def braking_rate(high: float, low: float, time: float) -> float:
 
 
 def mean_of_fastest(times: np.ndarray) -> float:
-    """Mean of the (at most three) least times within 1.05 of the least one.
+    """Mean of the shortest times: at most three, and only those within 1.05 times the shortest one.
 
     Source: UN R13, Annex 13, appendix 2; not checked against the text of the regulation.
     """
@@ -150,7 +151,8 @@ def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
 
 @dataclass(frozen=True)
 class Locks:
-    """Locks of each wheel (W,): time locked (s), share of the time, longest lock (s), above a speed of the vehicle."""
+    """How long each wheel (W,) was locked while the vehicle was above a speed: total time (s), ratio of that to the
+    time above the speed, and longest single lock (s)."""
 
     time: np.ndarray
     share: np.ndarray
@@ -158,7 +160,8 @@ class Locks:
 
 
 def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, least_speed: float = 15.0 * KMH) -> Locks:
-    """Locks above a speed (m/s): lengths (n,) of the samples in s, locked (n, W) whether a wheel stands, speeds (n,).
+    """Locked times of the wheels while the vehicle is above a speed (m/s). lengths (n,): durations of the samples (s);
+    locked (n, W): whether a wheel is locked; speeds (n,): of the vehicle (m/s).
 
     UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
     """

@@ -36,7 +36,7 @@ TURNING = Report._fields.index("turning")
 
 @inlined
 def report_of(rows):
-    """The ``Report`` whose numbers are these rows (7, W), in compiled functions; in Python ``Report(*rows)``."""
+    """``Report`` of views of the rows (7, W), for compiled functions; in Python, use ``Report(*rows)``."""
     return Report(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
@@ -54,7 +54,7 @@ class PlaneMotion(NamedTuple):
 
 
 def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
-    """The motion of a vehicle in the plane that has neither accelerations nor a report yet."""
+    """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
     return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
 
 
@@ -86,7 +86,7 @@ KNOWN = len(Wheels._fields)
 
 @inlined
 def wheels_of(rows):
-    """The ``Wheels`` whose numbers are these rows (11, W), in compiled functions; in Python ``Wheels(*rows)``."""
+    """``Wheels`` of views of the rows (11, W), for compiled functions; in Python, use ``Wheels(*rows)``."""
     return Wheels(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10])
 
 

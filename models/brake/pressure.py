@@ -51,7 +51,7 @@ class Air(NamedTuple):
 
 
 def resting_chambers(chambers: Chambers, sample: float) -> Air:
-    """No pressure anywhere but in the supply, all valves released; sample (s)."""
+    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample (s)."""
     wheels = chambers.fill.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
@@ -66,7 +66,7 @@ def resting_chambers(chambers: Chambers, sample: float) -> Air:
 
 @lean
 def chamber(pressure, valve, time, fill, empty, supply):
-    """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
+    """Pressure (bar) of a chamber after a time (s) in which its valve applies, holds or releases."""
     if valve >= APPLY:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
     if valve == RELEASE:
@@ -76,7 +76,8 @@ def chamber(pressure, valve, time, fill, empty, supply):
 
 @lean
 def press(valves, time, air, chambers, brakes):
-    """Go on for a time (s) with valves (W,) as they are: no pressure turns back, so the torque law holds."""
+    """Update pressures and torques over a time (s) with constant valve states (W,). Every pressure changes
+    monotonically, so the torque law holds."""
     taken = 0.0
     for i in range(valves.size):
         before = air.pressure[i]

@@ -60,12 +60,13 @@ class Sprung:
 
     @property
     def turns(self) -> np.ndarray:
-        """(towed,) numbers of the coordinates by which what is towed yaws beside what tows it."""
+        """Numbers (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
         return self._turning("rz")
 
     @property
     def leans(self) -> np.ndarray:
-        """Numbers of the coordinates of roll and pitch: of the chassis, then of what is towed beside what tows it."""
+        """Numbers of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the one before
+        it."""
         return np.concatenate(([ROLL, PITCH], self._turning("rx"), self._turning("ry")))
 
     def _turning(self, freedom: Freedom) -> np.ndarray:
@@ -75,9 +76,9 @@ class Sprung:
         return np.array([known.index(place) for place in places if place in known], dtype=np.int64)
 
     def in_plane(self, transfer: bool = True) -> Plane:
-        """Numbers of the vehicle and its wheels in the plane; of a train loads are those at rest, by its springs.
+        """``Plane`` of the vehicle and its wheels. In a train, loads are the static ones that its springs carry.
 
-        Each hitch is taken to lie in the middle plane of what tows by it.
+        Each hitch is taken to lie in the middle plane of the towing unit.
         """
         alone, free = truck(self.plane, transfer), self.handling.vehicle
         if not free.towed:
@@ -107,7 +108,8 @@ class Sprung:
 
 
 def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """reach (U, U) of ``Plane``, m: hitches (U - 1,) and centres (U,) ahead of the vehicle's centre."""
+    """reach (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,), both ahead of the
+    vehicle's centre."""
     reach = np.zeros((centres.size, centres.size))
     for k in range(1, centres.size):
         reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
@@ -116,8 +118,8 @@ def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 
 def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
-    """Mass (kg), yaw inertia (kg m^2) and place ahead (m) of the centre of a towed body with all that it carries, or of
-    the vehicle without what it tows."""
+    """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
+    all that it carries, or the vehicle without its trailers."""
     bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
     masses, places = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
     x, y, _ = masses @ places / masses.sum()
@@ -180,7 +182,7 @@ def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
 
 
 def _check_row(vehicle: SpatialVehicle) -> None:
-    """Refuse what is not towed in a row, or whose coupling does not yaw."""
+    """Refuse trailers that are not coupled one behind the other, or have a coupling without yaw."""
     before: str | None = None
     for name in vehicle.towed:
         hitch = vehicle.body(hitch_of(name))
@@ -210,7 +212,7 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 
 
 def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
-    """The vehicle drawn elsewhere on the ground."""
+    """The vehicle with all positions shifted by ``distance`` on the ground."""
 
     def at(part: Any, name: str) -> Vector:
         x, y, z = np.add(getattr(part, name), (distance[0], distance[1], 0.0))
@@ -227,7 +229,8 @@ def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
 
 
 def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
-    """The plane vehicle of a centred one, without what it tows; spin_inertias (kg m^2): of its wheels."""
+    """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
+    wheels."""
     bodies = without_trailer(vehicle)
     front_axle, rear_axle = (
         Axle(

@@ -85,7 +85,7 @@ class AtWheels(NamedTuple):
 
 @lean
 def wheel_forces_of(numbers):
-    """Views of the constant wheel quantities, which are the last numbers of a table for compiled forces."""
+    """``WheelForces`` of views of the last numbers in a table for compiled force functions."""
     wheels = int(numbers[TYRES])
     rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
     return WheelForces(rows[0], rows[1], rows[2], rows[3])
@@ -126,7 +126,8 @@ def forces(numbers, q, v, f):
 
 @lean
 def held(numbers, time, q, v, f):
-    """Add the forces to ``f``, for callbacks: pointers to doubles; nothing depends on the time."""
+    """Add the forces to ``f``. For callbacks: all arguments but the time are pointers to doubles; the time is not
+    used."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     forces(array(numbers, (int(head[COUNT]) + HELD * w,)), array(q, (n,)), array(v, (n,)), array(f, (n,)))
@@ -134,7 +135,8 @@ def held(numbers, time, q, v, f):
 
 @lean
 def set_held(block, t, n):
-    """``held`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``held``. All data are in one block of doubles at an address: f, q and v (n,), then
+    the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -142,8 +144,8 @@ def set_held(block, t, n):
 
 @lean
 def meet(contacts, regular, lag, angles, wheels):
-    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag
-    (W,) of ``Surfaces``; angles of the tyres' tables."""
+    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag (W,)
+    of ``Surfaces``; angles of the tyres' tables."""
     for i in range(contacts.load.size):
         slide(i, contacts.along[i], contacts.across[i], regular, lag, angles, wheels)
         wheels.load[i] = contacts.load[i]
@@ -151,7 +153,8 @@ def meet(contacts, regular, lag, angles, wheels):
 
 @lean
 def hold(known, before, after, step, motion, vehicle):
-    """Let the wheels hold the tyres' mean forces over a step (s) between torques (W,) of the brakes, and report them.
+    """Compute the tyres' mean forces over a step (s) between brake torques (W,), store them as the wheels' constant
+    forces, and fill the report.
 
     known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
@@ -186,7 +189,7 @@ class Units(NamedTuple):
 
 @lean
 def to_units(whole, turns, plane):
-    """Fill values (2 + U,) of the ``Units`` from those of all coordinates (n,): positions, rates or accelerations."""
+    """Fill values (2 + U,) of the ``Units`` from values of all coordinates (n,): positions, rates or accelerations."""
     for a in range(PLANE):
         plane[a] = whole[a]
     for k in range(turns.size):
@@ -195,7 +198,7 @@ def to_units(whole, turns, plane):
 
 @inlined
 def ended(q, units, fold):
-    """Whether positions (n,) leave the vehicle FINE, or how they end a run: it turns over, or a train jackknifes."""
+    """FINE, or how positions (n,) end a run: the vehicle turns over, or a train jackknifes."""
     status = FINE
     for k in range(units.turns.size):
         if not abs(q[units.turns[k]]) <= fold:
@@ -228,11 +231,12 @@ class OnEngine(NamedTuple):
 
 @inlined
 def relax(contacts, half, slope, lag, surfaces):
-    """Tyres answer at once; ``models.brake.sprung_relaxation`` has what stands here where they lag."""
+    """Do nothing: these tyres have no lag. ``models.brake.sprung_relaxation`` replaces this function for tyres that
+    lag."""
 
 
 def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
-    """Fill ``out`` (n,) with the accelerations of a ``FreeModel``; stands here for others, too."""
+    """Fill ``out`` (n,) with the accelerations of a ``FreeModel``; engines replace this function by their own."""
     out[:] = engine.acceleration(0.0, q, v)
 
 
@@ -296,10 +300,10 @@ def advance(motion, torques, step, steer, vehicle, course):
 
 
 def advance_with(**parts: Callable[..., Any]) -> Callable[..., Any]:
-    """``advance`` with other functions in the places of those that stand here for others; see ``samples.moved``."""
+    """``advance`` in which the engines' own functions replace this module's default ones; see ``samples.moved``."""
     return FunctionType(advance.__code__, globals() | parts, "advance")
 
 
 def compiled(name: str, **parts: Callable[..., Any]) -> Callable[..., Any]:
-    """``advance_with`` an engine's own compiled functions, compiled."""
+    """Compiled ``advance_with`` for an engine's own compiled functions."""
     return njit(cache=True, error_model="numpy")(named_closure(advance_with(**parts), name))

@@ -92,7 +92,7 @@ UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
 
 
 def check_way(road: Road, distance: float) -> None:
-    """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
+    """Refuse steps in which a wheel may travel a distance (m) longer than the shortest inner stretch of the road."""
     shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
     if distance > shortest:
         raise InputError(
@@ -105,7 +105,7 @@ def check_way(road: Road, distance: float) -> None:
 
 @inlined
 def is_uniform(road):
-    """Whether one surface is everywhere."""
+    """Whether the road has the same surface everywhere."""
     return road.starts.size == 1 and road.left[0] == road.right[0]
 
 

@@ -30,7 +30,7 @@ class MeasuredDrive:
 
 
 def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
-    """The drive of a file, or of a stretch (s, s) of its time; InputError for what is no drive."""
+    """The drive recorded in a file, or in a time interval (s, s) of it; InputError if the file holds no drive."""
     return _read_drive(path, stretch, path.stat().st_mtime_ns)
 
 
@@ -59,7 +59,8 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
 
 
 def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
-    """Values (n,) on an even grid, straight across spikes and gaps, and how many samples were left out for that."""
+    """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left out
+    for that."""
     kept = without_outliers(values)
     known = np.isfinite(kept)
     if known.sum() < FEWEST_SAMPLES:

@@ -50,8 +50,8 @@ class Faults(Strict):
 
 
 def amount(amounts: Amounts, signal: Signal) -> float:
-    """Amount of a fault that a scene gives for a signal: by its channel before its transducer before its quantity; 0 if
-    nothing is."""
+    """Amount of a fault for a signal in a scene: the value for its channel, else for its transducer, else for its
+    quantity, else 0."""
     return next((amounts[name] for name in _names(signal) if name in amounts), 0.0)
 
 
@@ -96,7 +96,8 @@ def measured(
 
 
 def quantised(values: np.ndarray, bits: int) -> np.ndarray:
-    """Values (n,) rounded to the steps of a converter of so many bits with some room above the largest one."""
+    """Values (n,) rounded to the steps of a converter with so many bits, whose range is a little larger than the
+    largest value."""
     largest = float(np.abs(values).max())
     if largest == 0.0:
         return values
@@ -116,7 +117,7 @@ def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period
 
 
 def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -> np.ndarray:
-    """Every ``stride``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
+    """Every ``stride``-th sample, delayed by ``delay`` (s); before the start, the value stays at the first sample."""
     if delay == 0.0:
         return true[::stride].copy()
     at = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
@@ -126,7 +127,7 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
 
 
 def _stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
-    """Normal samples (count,) that belong to a name."""
+    """Normal random samples (count,) that depend only on seed, path, source and the name."""
     return normal(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
 
 

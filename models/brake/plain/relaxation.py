@@ -36,8 +36,8 @@ def _lagging_slip(angle: float, speed: float, across: float, length: float, time
 
 @dataclass(eq=False)
 class LaggingTyres:
-    """Tyres that lag: lengths (W,) in m, slope (1/rad), angles (W,) as tan, the time (s) by which they are behind the
-    motion, and what slip angles are taken by, the damper's part included."""
+    """Tyres with relaxation: lengths (W,) in m, slope (1/rad), lagging angles (W,) as tan, and the time (s) by which
+    these lie behind the motion. ``taken`` holds the tan of the slip angles that forces use, with the damper's part."""
 
     length: np.ndarray
     slope: float
@@ -46,11 +46,13 @@ class LaggingTyres:
     taken: np.ndarray | None = None
 
     def reach(self, speeds: np.ndarray, half: float) -> None:
-        """Move on to half a step (s) after the speeds (2, W) along and across (m/s)."""
+        """Advance the lagging angles to half a step (s) after the motion with speeds (2, W) along and across the wheels
+        (m/s)."""
         self.angle, self.taken = lag_on(self.angle, speeds, self.behind + half, self.length, self.slope)
         self.behind = half
 
     def across(self, i: int, forwards: float) -> float:
-        """Speed (m/s) across wheel i at which it would have its slip angle at a speed (m/s) along it."""
+        """Speed (m/s) across wheel i that corresponds to its lagging slip angle at the speed ``forwards`` (m/s) along
+        it."""
         assert self.taken is not None
         return float(self.taken[i]) * forwards

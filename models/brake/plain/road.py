@@ -7,8 +7,8 @@ from models.brake.surfaces import Road
 
 
 def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surface]:
-    """Surface under each wheel; ways (W, 2, 2) : x, y (m) at the start and at the end of the step, straight between;
-    kinds (W,) : of tyres."""
+    """Surface under each wheel. ways (W, 2, 2) : x, y (m) at the start and at the end of the step, joined by a straight
+    line; kinds (W,) : kind of each wheel's tyre."""
     return [_surface_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
 
 
@@ -44,7 +44,8 @@ def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) 
 
 
 def in_row(place: np.ndarray, rates: np.ndarray, reach: np.ndarray, unit: int) -> tuple[np.ndarray, np.ndarray]:
-    """x, y and heading (3,) of a unit's centre, and their rates, from those (2 + U,) of a row of units.
+    """Position x, y and heading (3,) of a unit's centre, and their rates, from the coordinates (2 + U,) of a row of
+    units.
 
     reach (U,) : m, from the first centre to this one along each unit.
     """

@@ -81,7 +81,7 @@ class Suspension:
         return [self._contact(i, hub, motion, float(steer[i])) for i, hub in enumerate(hubs)]
 
     def _heading(self, i: int, motion: PlainMotion) -> np.ndarray:
-        """Axes (3, 3) of the body to whose heading a wheel keeps: the carrier, or a towed body, about the vertical."""
+        """Axes (3, 3) that define a wheel's heading: those of the carrier, or a towed body's turned upright."""
         if not self._towed[i]:
             carrier: np.ndarray = motion.axes(self._carrier)[PLACE]
             return carrier
@@ -120,7 +120,8 @@ class Suspension:
         return accelerations
 
     def _by_air(self, motion: PlainMotion) -> np.ndarray:
-        """Generalised forces (n,) of drag at the chassis' centre, against its speed where the vehicle heads."""
+        """Generalised forces (n,) of aerodynamic drag at the chassis' centre, opposite to its speed along the vehicle's
+        heading."""
         centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
         speed = float(centre[RATE] @ ahead)
         forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)

@@ -17,7 +17,7 @@ NEARLY = 0.98
 
 
 def weights(nodes: np.ndarray, value: float) -> np.ndarray:
-    """Weight (n,) of each node at a value, the end's one beyond it."""
+    """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
     inside = float(np.clip(value, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
     weights_at = np.zeros(nodes.size)
@@ -31,7 +31,7 @@ def weights(nodes: np.ndarray, value: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface under a wheel: numbers of two tables, and the share of the second."""
+    """Surface under a wheel: numbers of two friction tables, and the share of the second one in the mixture."""
 
     first: int
     second: int
@@ -54,7 +54,7 @@ class Friction:
         return mixed
 
     def ahead(self) -> Force:
-        """Force along the wheel by slip."""
+        """Force along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum("a,f,tafs->ts", weights(t.angles, self.angle), weights(t.loads, self.load), t.mu_x)
         return Force(t.slips, self.load * self.mixed(mu))
@@ -121,7 +121,8 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
 
 
 def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
-    """Sizes (2,) of the forces along and across, turned against the sliding of a wheel that is nearly locked."""
+    """Sizes (2,) of the forces along and across the wheel, turned towards its sliding direction as the wheel comes near
+    to locking."""
     sliding = np.array([motion.forwards, abs(motion.across)])
     speed = float(np.hypot(*sliding))
     if slip <= NEARLY or speed == 0.0:

@@ -21,7 +21,8 @@ class WallClock:
     _start: float | None = None
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample, asked for no sooner than at the sample's time on the wall clock."""
+        """The controller's commands for a sample. The controller is asked only when the wall clock has reached the
+        sample's time."""
         now = time.perf_counter()
         if self._start is None:
             self._start = now - 1e-9 * sample.time

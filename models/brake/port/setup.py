@@ -56,7 +56,7 @@ class PortTable(Strict):
 
     @property
     def patience(self) -> float:
-        """Time (s) until the controller must be there."""
+        """Time (s) within which the controller must be ready."""
         if self.start is not None:
             return self.start
         return self.timeout if self.port is None else BY_HAND
@@ -98,7 +98,7 @@ class ControllerRun:
 def opened(
     table: PortTable, run: ControllerRun, controller: Controller
 ) -> Iterator[tuple[Controller, WallClock | None]]:
-    """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
+    """The controller of one run as a context manager, and its wall clock if it is paced by one.
 
     controller : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
     """
@@ -121,7 +121,8 @@ def opened(
 
 @contextmanager
 def _possible_controllers(table: PortTable, run: ControllerRun, controller: Controller) -> Iterator[Controller]:
-    """The controllers that can answer at the port for this table."""
+    """The controller that the table names, as a context manager: behind a socket, in a hosted process or a replayed
+    log; else ``controller``."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
             with _told_of_scene(table, run):

@@ -24,7 +24,7 @@ AXES = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 
 
 def number(signal: Signal, hub: int) -> int:
-    """Number of a force's component among those of all hubs, of which it is at the ``hub``-th."""
+    """Index of a force's component among the components of all hubs; ``hub`` is the index of its hub."""
     return WRENCH * hub + 3 * (signal.quantity == "moment") + AXES[signal.component]
 
 
@@ -51,7 +51,7 @@ class SensorResponse:
         return np.asarray(rows @ q)
 
     def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
-        """(f, n): reading by coordinates, at own = i omega (f, 1)."""
+        """Row (f, n) that maps the coordinates to the sensor's reading, at i_omega = i omega (f, 1)."""
         axis, turn = AXES[signal.component], self.motion.turn(transducer.body)
         if signal.quantity == "angle":
             return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
@@ -64,7 +64,8 @@ class SensorResponse:
 
 
 def _built(vehicle: CutVehicle, frame: str) -> HubModel:
-    """A model that at half step 0 carries its static loads, and at half step i + 1 also a push on component i."""
+    """A model with static loads alone at half step 0. At half step i + 1 a push on component i is added to the static
+    loads."""
     hubs = WRENCH * len(vehicle.hubs)
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads

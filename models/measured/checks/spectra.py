@@ -88,7 +88,8 @@ def noise(recording: Recording, signal: Signal) -> float:
 
 
 def windowed_means(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Means (k,) under a Hann window of what each of these reads, (n,), and the covariance (k, k) of their errors.
+    """Means (k,), weighted by a Hann window, of the columns (n,) that the k functions read, and the covariance (k, k)
+    of the means' errors.
 
     Samples that are NaN in any are left out; one column at a time is in memory. The window takes away what a plain mean
     owes to where the record happens to begin and end. The covariance is the power of the lines just above the window's
