@@ -162,7 +162,7 @@ class Ellipse:
     def __call__(
         self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
     ) -> tuple[float, float, float]:
-        """Forces and moment; a : semi-axis along the direction of rolling (m)."""
+        """Forces fx, fy (N) and moment mz (N m); a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
             forces = point(tuple(map(float, given)), *self._fixed)
@@ -177,7 +177,7 @@ class Ellipse:
 
 
 def check_choices(cells: int, bound: str, flexibilities: str, march: str, falling: Falling | None = None) -> None:
-    """Raise InputError for an option that is not one, and for a march that knows no falling friction."""
+    """Raise InputError for an unknown option, or for falling friction with a march that does not support it."""
     whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     for name, value, known in (
         ("bound", bound, tuple(POWERS)),
@@ -191,7 +191,8 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
 
 
 def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
-    """CONTACT (n,) as the kernels read it, and the shape of what was given; those without load have axes of 0.1 m."""
+    """Inputs as records CONTACT (n,) for the kernels, and their common shape. Contacts without load get semi-axes of
+    0.1 m."""
     axis = "a semi-axis in m, zero or more"
     given = together(
         a=quantity("a", ellipse.a, axis, 0.0),

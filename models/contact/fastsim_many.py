@@ -38,7 +38,7 @@ def forces(contacts, strips, cells, kind, march, answers):
 
 @lean
 def forces_within(contacts, strips, cells, kind, march, room, answers):
-    """``forces`` that makes no array; room : ``Workspace``."""
+    """``forces`` without allocating arrays; room : ``Workspace`` for intermediate values."""
     slips, block, m = room.slips, room.blocks[0], strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], answers[c]
@@ -62,7 +62,7 @@ def forces_within(contacts, strips, cells, kind, march, room, answers):
 
 @lean
 def touches(contact):
-    """Whether there is anything that friction could hold."""
+    """Whether the contact has load and friction, so that tangential forces can be transmitted."""
     return contact.mu * contact.load > NEGLIGIBLE_BOUND
 
 
@@ -155,7 +155,7 @@ def strip_slip(contact, strips, s, slip):
 
 @lean
 def _fill(block, first, count, contacts, strips, slips):
-    """The strips from number ``first`` on into the lanes; those beyond ``count`` stay at rest."""
+    """Put rigid slips of ``count`` strips, from number ``first`` on, into the lanes; further lanes get zero slip."""
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(LANES):
         if j >= count:
@@ -169,7 +169,8 @@ def _fill(block, first, count, contacts, strips, slips):
 
 @lean
 def _collect(block, first, count, contacts, strips, answers):
-    """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
+    """Add the lanes' sums to the forces of their ellipses, and their slipping cells, weighted by length, to the slip
+    area."""
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]
@@ -184,7 +185,8 @@ def _collect(block, first, count, contacts, strips, answers):
 
 @lean
 def add_strip(contact, strips, s, sums, answer):
-    """Add to the forces of a contact those of strip number s, of its sums of q_x, q_y and t q_y over the cells."""
+    """Add the forces of strip number s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its
+    cells."""
     part, (x, y, turn) = contact.mu * contact.load * strips.part[s], sums
     answer.fx += part * x
     answer.fy += part * y

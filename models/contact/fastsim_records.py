@@ -58,7 +58,7 @@ class Cells(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that a march writes over: a SLIP for each contact, one BLOCK."""
+    """Arrays for intermediate values of a march: one SLIP per contact, and one BLOCK."""
 
     slips: Array
     blocks: Array
@@ -66,11 +66,11 @@ class Workspace(NamedTuple):
 
 @inlined
 def strips_in(table):
-    """``Strips`` that lie in a table (4, m) of a net."""
+    """``Strips`` as views of a grid's table (4, m)."""
     return Strips(table[0], table[1], table[2], table[3])
 
 
 @inlined
 def cells_in(table, peak):
-    """``Cells`` that lie in a table (5, n) of a net."""
+    """``Cells`` as views of a grid's table (5, n)."""
     return Cells(table[0], table[1], table[2], table[3], table[4], peak)

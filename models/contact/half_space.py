@@ -61,7 +61,7 @@ def _primitives(x: Array, y: Array) -> Array:
 
 
 def _angle(opposite: Array, adjacent: Array) -> Array:
-    """atan(opposite / adjacent), pi/2 where adjacent is zero."""
+    """Arc tangent of opposite / adjacent; pi/2 where adjacent is zero."""
     return np.arctan2(opposite * np.sign(adjacent), np.abs(adjacent))
 
 
@@ -80,12 +80,12 @@ class Convolution:
         self._spectrum = fft.rfft2(np.moveaxis(rolled, (0, 1), (-2, -1)), workers=1)
 
     def __call__(self, values: Array) -> Array:
-        """Values (ny, nx, in) to their sums (ny, nx, out)."""
+        """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""
         spectrum = fft.rfft2(np.moveaxis(values, -1, 0), self._size, workers=1)
         sums = fft.irfft2(np.einsum("ijyx,jyx->iyx", self._spectrum, spectrum), self._size, workers=1)
         return np.moveaxis(sums[:, : self.cells[0], : self.cells[1]], 0, -1)
 
 
 def offsets(cells: int, step: float) -> Array:
-    """Distances (m) between the centres of two of ``cells`` cells: (2 cells - 1,), ascending."""
+    """All differences (m) between the centres of two cells in a row of ``cells`` cells: (2 cells - 1,), ascending."""
     return np.arange(1 - cells, cells) * step

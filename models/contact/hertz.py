@@ -64,7 +64,8 @@ def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
 
 
 def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact of bodies brought nearer to each other by ``approach`` (m) from first touch; zero or less is a gap.
+    """Contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less means a
+    gap.
 
     Otherwise as ``by_load``.
     """
@@ -103,7 +104,7 @@ def by_axes(
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
-    """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
+    """Both curvatures as arrays; raises InputError where they do not make a Hertzian contact."""
     answer = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
@@ -130,7 +131,8 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
 def _contact(
     A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
 ) -> Hertz:
-    """The contact from its short axis; ``curvature_sum`` is K = B + D. Where it is zero, so is everything."""
+    """The contact computed from its short semi-axis; all results are zero where this axis is. ``curvature_sum`` is K =
+    B + D."""
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
@@ -141,7 +143,7 @@ def _contact(
 
 
 def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
-    """``aspect`` of each ratio of curvatures, of any shape: three arrays of that shape."""
+    """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
     answer = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
     return answer[0], answer[1], answer[2]
 
@@ -156,7 +158,7 @@ def _aspects(curvatures: Array) -> Array:
 
 @njit(cache=True)
 def aspect(curvatures: float) -> tuple[float, float, float]:
-    """Ratio g of the short axis to the long one, and the integrals B and D there.
+    """Ratio g of the short to the long semi-axis, and the elliptic integrals B and D at this g.
 
     curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.

@@ -61,7 +61,8 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
 
 
 def _check_taping(wheel: ContactProfile, path: Path) -> None:
-    """Refuse a wheel whose y and z count from elsewhere, its flange's back or the axle."""
+    """Refuse a wheel profile whose y or z is not measured from the taping line, but from the flange's back or the
+    axle."""
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
     if not abs(middle) <= OFF_TAPING:
         raise InputError(
@@ -103,7 +104,7 @@ def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
 
 
 def _columns(lines: list[str], path: Path) -> Points:
-    """Two columns of text, in m."""
+    """Two columns of numbers from text, converted to m."""
     plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
     rows = [(k, _parse_numbers(line, k, path)) for k, line in plain if line.strip()]
     for k, row in rows:
@@ -203,7 +204,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
 
 
 def _upright_points(y: Array, z: Array, kind: Kind) -> Points:
-    """The points with the rail's top up, or the wheel's flange down and at negative y."""
+    """Points turned so that the rail's top is up, or the wheel's flange is down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])
         return (y, z) if ends >= np.median(z) else (y, -z)

@@ -55,7 +55,7 @@ def overlap_pressure(surface, height, shape):
 
 @compiled
 def mesh_of(box, cells):
-    """Sizes dx, dy of a mesh of a net of cells x cells over a box."""
+    """Cell sizes dx, dy of a grid of cells x cells over a rectangle."""
     return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
 
 
@@ -82,7 +82,7 @@ def crude_net(surface, cells, shape):
 
 @compiled
 def resultant(surface, points, shape):
-    """Sum of W p dA over the box from points x points midpoints."""
+    """Integral of W p over the rectangle, by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
     dx, dy = mesh_of(box, points)
     for j in range(points):
@@ -375,7 +375,8 @@ def step_on(px, py, u, v, bound, middle, slips):
 
 @compiled
 def gather(net, traction, box, cells):
-    """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
+    """Mean tractions (2, cells, cells) on the coarse grid; each strip cell counts by its overlap with the coarse
+    cell."""
     (y, low_x, high_x, width, _), sums = net, np.zeros((2, cells, cells))
     dx, dy = mesh_of(box, cells)
     steps = traction.shape[1]

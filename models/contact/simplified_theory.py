@@ -244,7 +244,7 @@ def _total(parts: Sequence[PatchPressure]) -> float:
 
 
 def _shallow(patches: list[Patch], approach: float) -> list[float]:
-    """Depths (m) of patches at an approach (m), about: a part of what is left above the bottom."""
+    """Rough depths (m) of patches at an approach (m): a fixed share of the approach beyond each patch's first touch."""
     over = [approach * np.cos(patch.lean) - patch.low for patch in patches]
     return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
 
@@ -252,7 +252,7 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
 def _patches_at_common_approach(
     patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """The patches at their common approach (m), or near it where a load (N) is given."""
+    """Patches at their common approach (m); if a load (N) is given, the approach that carries it is found from here."""
     start = np.array([*_shallow(patches, approach), approach])
     (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
     parts = []
@@ -266,7 +266,7 @@ def _patches_at_common_approach(
 def _gathered(
     approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """The sum of the patches; area and peak from strips with exact ends."""
+    """Normal contact summed over the patches; area and peak pressure come from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
     return NormalContact(approach, _total(parts), area, peak, parts, material_pair, options)
@@ -312,7 +312,7 @@ def roll(
 
 
 def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
-    """Strips of a patch as ``march`` takes them."""
+    """``FineNet`` of a patch, as ``march`` expects it."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
@@ -335,7 +335,7 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
 
 
 def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
-    """Pressure and tractions by strip and cell."""
+    """Pressure, tractions and slip in each cell of each strip."""
     y, low, high, width, pressure = net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]

@@ -68,7 +68,8 @@ class RollingContact(ABC):
 
     @abstractmethod
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces at creepages and spin; with ``fields`` also what happens in every cell, patch by patch."""
+        """Forces at the given creepages and spin; with ``fields``, also pressure, traction and slip in every cell of
+        each patch."""
 
 
 class OnEllipse(RollingContact):
@@ -86,7 +87,7 @@ class OnEllipse(RollingContact):
 
 
 class LinearTheory(OnEllipse):
-    """Forces without slip, in proportion to the creepages and without a bound."""
+    """Linear theory: no slip, forces proportional to the creepages and not limited by friction."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces; there are no cells and no fields."""
@@ -95,8 +96,8 @@ class LinearTheory(OnEllipse):
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """Sentence against the linear theory's forces ``used`` (n,) divided by mu N; "" where friction can carry them
-    all."""
+    """Warning that the linear theory's force ratios ``used`` (n,), force to mu N, exceed the friction limit; "" if none
+    does."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""
@@ -133,7 +134,8 @@ class ExactOnEllipse(OnEllipse):
 
 
 class OnPatches(RollingContact):
-    """Patches of any shape, whose depths and loads are those of the theory of 1983; its load is along the normals."""
+    """Patches of any shape; their depths and loads come from the simplified theory of 1983. The load acts along the
+    normals."""
 
     def __init__(
         self, normal_contact: NormalContact, friction: float, area: float, peak: float, approach: float
@@ -144,11 +146,12 @@ class OnPatches(RollingContact):
 
     @property
     def lever(self) -> float:
-        """Lever of the moment (m), of the patch that reaches farthest."""
+        """Lever of the moment (m) for the patch with the largest extent."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
     def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
-        """Fields with y along the contour of the rail, so that several patches lie beside one another."""
+        """Fields whose y is the position along the rail's contour, so that several patches can be shown in one
+        picture."""
         pairs = zip(fields, self.pressed.patches, strict=True)
         return tuple(replace(cells, y=cells.y + part.patch.contour_position) for cells, part in pairs)
 
@@ -167,7 +170,8 @@ class Simplified(OnPatches):
 
 
 class Exact(OnPatches):
-    """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
+    """Half-space theory with Coulomb friction for pressure and tractions; the load of each patch comes from the theory
+    of 1983."""
 
     def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
         parts = normal_contact.patches
@@ -185,7 +189,7 @@ class Exact(OnPatches):
 
 
 def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
-    """The sum over patches that do not feel each other's tractions."""
+    """Sum of forces over the patches, none of which is affected by the tractions of another one."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
     for grid in grids:
         patch, (x, y) = solve_rolling(grid, friction, *motion, material_pair), np.meshgrid(grid.x, grid.y)
@@ -204,7 +208,7 @@ MARGINS = (1.2, 1.6, 2.2)
 
 
 def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
-    """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
+    """Exact pressure of one patch at the load from the simplified theory, in the patch's own coordinates."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:
         dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free

@@ -47,7 +47,8 @@ class Distance:
 
     @property
     def curvatures(self) -> tuple[float, float]:
-        """Second derivatives (1/m) in the middle of x and y, over four nodes, along and across."""
+        """Second derivatives (1/m) of the distance along x and along y at x = y = 0, from differences over four node
+        spacings."""
         second_differences = []
         for x, y in ((4.0 * self.dx, 0.0), (0.0, 4.0 * self.dy)):
             low, here, high = self.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
@@ -85,7 +86,7 @@ class Distance:
         return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
 
     def part(self, x: slice, y: slice) -> "Distance":
-        """The distance on a part of the nodes."""
+        """The distance restricted to some of its nodes."""
         return Distance(self.x[x], self.y[y], self.height[y, x])
 
 
@@ -138,7 +139,7 @@ def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Dis
 
 
 def _continued(rows: Array) -> Array:
-    """One more row before and after, on the parabola through the three nearest."""
+    """The rows with one more at each end, extrapolated by the parabola through the three nearest rows."""
     first = 3.0 * (rows[0] - rows[1]) + rows[2]
     last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
     return np.vstack([first, rows, last])

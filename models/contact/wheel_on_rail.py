@@ -110,11 +110,11 @@ class WheelAndRail:
     wheelset: Wheelset
 
     def centre(self, pose: Pose) -> Array:
-        """Middle of the axle in the track (m)."""
+        """Position of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
     def outline(self, pose: Pose) -> Array:
-        """Points (n, 3) of the wheel nearest to straight rails, in the track (m)."""
+        """Points (n, 3) of the wheel's surface nearest to straight rails, in the track's coordinates (m)."""
         y, radius = self.wheel.y, self.wheelset.radius + self.wheel.z
         lead = np.sin(pose.roll) * np.tan(pose.yaw)
         sine = -self.wheel.curve(y, 1) * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
@@ -139,7 +139,7 @@ class WheelAndRail:
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:
-        """Least vertical gap (m), between the points by a parabola."""
+        """Least vertical gap (m), refined between the points by a parabola."""
         gap = self.gaps(pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
         rise, bend = _parabola(gap, k)
@@ -147,7 +147,7 @@ class WheelAndRail:
 
 
 def _parabola(gap: Array, k: int) -> tuple[float, float]:
-    """Slope and curvature per step of the parabola through three gaps."""
+    """First and second derivative, per step, of the parabola through the gaps at k - 1, k, k + 1."""
     return (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
 
 
@@ -203,13 +203,14 @@ def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
 
 
 def _parabola_minimum(gap: Array, k: int) -> float:
-    """Where the parabola through three gaps is least, in steps from the one in the middle."""
+    """Offset, in steps from point k, at which the parabola through three gaps has its minimum."""
     rise, bend = _parabola(gap, k)
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
 def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
-    """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
+    """Pose of the wheelset in which both wheels just touch. ``left`` : the mirrored left side, if it differs from the
+    right one."""
     other = left or side
 
     def right_over_left(roll: float) -> float:
@@ -222,7 +223,7 @@ def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRa
 
 
 def touches_of(side: WheelAndRail, pose: Pose) -> list[TouchingPlace]:
-    """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
+    """Places where a wheel touches the rail or nearly does: minima of the vertical gap, one between each two ridges."""
     points, gap = side.gaps(pose)
     touches = []
     for first, last in pairwise([0, *ridges(gap), gap.size - 1]):

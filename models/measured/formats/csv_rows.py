@@ -57,12 +57,12 @@ class Layout:
 
     @property
     def start(self) -> datetime | None:
-        """When time was 0; None where the rows do not say."""
+        """Date and time at time 0; None where the rows do not give it."""
         return self.stamps.start if self.stamps else None
 
     @property
     def numbers(self) -> list[int]:
-        """Columns of numbers."""
+        """Columns that hold numbers."""
         return [i for i in range(len(self.names)) if i not in self.texts]
 
 
@@ -75,7 +75,8 @@ def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
 
 
 def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
-    """Byte of every thousandth row and of their end, number of rows, bytes left over after the last line end."""
+    """Byte position of every thousandth row and of the end, number of rows, and number of bytes after the last line
+    end."""
     begin, size = layout.begin, layout.unit.itemsize
     marks, count, place, last = [begin], 0, begin, begin
     with path.open("rb") as file:
@@ -94,7 +95,7 @@ def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
 
 
 def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
-    """Bytes where lines without a value begin that end the file, of at most a thousand characters."""
+    """Byte positions of the empty lines at the end of the file; only its last thousand characters are searched."""
     size = layout.unit.itemsize
     begin = max(layout.begin, last - TAIL * size)
     with path.open("rb") as file:
@@ -127,7 +128,8 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
 
 
 def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndarray:
-    """Numbers (rows, columns) of the columns of numbers and of those beyond the last heading, NaN for marks."""
+    """Numbers (rows, columns) of the columns of numbers and of any beyond the last heading; NaN where a mark means "no
+    value"."""
     columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
     if text.translate(None, _PLAIN + layout.separator.encode()):
         wrong = _culprit(path, layout, text, line_number)
@@ -162,7 +164,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
 
 
 def _unquoted(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
-    """Rows without quotes; a comma within them is a decimal sign where the numbers have it."""
+    """Text of rows with quotes removed; a comma inside quotes is a decimal sign where numbers are written so."""
     if b'"' not in text:
         return text
     codes = np.frombuffer(text, np.uint8).copy()
@@ -194,7 +196,7 @@ def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int
 
 
 def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
-    """Error at the first cell that is not a number; None where there is none such."""
+    """Error at the first cell that is not a number; None if all are."""
     comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)

@@ -45,7 +45,7 @@ LINEAR = {3: 0, 4: 1}
 
 @dataclass(frozen=True)
 class MdfFile(Opened):
-    """``places`` (group, index) of every channel in the file."""
+    """A reader of an MDF file; ``places`` holds the group and index of every channel in the file."""
 
     places: tuple[tuple[int, int], ...]
 
@@ -61,7 +61,8 @@ class MdfFile(Opened):
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """Give asammdf's file, without a word on the terminal; InputError where it is damaged or the package missing."""
+    """asammdf's open file, with its terminal output suppressed; InputError where the file is damaged or the package
+    missing."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -87,7 +88,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Keep quiet what asammdf prints, and what it has to say when it takes down a file that it could not open."""
+    """Suppress what asammdf prints, also while it cleans up a file that it could not open."""
     kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with redirect_stdout(io.StringIO()):
@@ -174,7 +175,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
 
 
 def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
-    """Texts that can name a channel's group: as acquired, its source, the first line of its comment, the channel's
+    """Texts that can serve as the name of a channel's group: acquisition name, source, first comment line, channel's
     source."""
     sources = [
         f"{getattr(source, 'name', '')} {getattr(source, 'path', '')}".strip()
@@ -185,7 +186,7 @@ def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
 
 
 def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
-    """Why a group cannot be used; empty where it can."""
+    """Reason why a group cannot be used; empty if it can."""
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
@@ -199,7 +200,7 @@ def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
 
 
 def _why_channel_unusable(group: Any, i: int, version: int) -> str:
-    """Why a channel is no number per sample; empty where it is."""
+    """Reason why a channel does not give one number per sample; empty if it does."""
     channel = group.channels[i]
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
     if version == 4 and channel.flags & ALL_INVALID:
@@ -211,7 +212,8 @@ def _why_channel_unusable(group: Any, i: int, version: int) -> str:
 
 
 def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
-    """Whether a channel's bits are within its records: the library copies unchecked, and may take the process down."""
+    """Whether a channel's bits lie inside its records. The library copies without this check and could crash the
+    process."""
     records, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
@@ -236,7 +238,7 @@ def _resolution(channel: Any, version: int) -> float:
 
 
 def _plain(comment: str) -> str:
-    """Return a comment without the XML around it."""
+    """Text of a comment without XML tags."""
     if not comment.lstrip().startswith("<"):
         return comment.strip()
     try:

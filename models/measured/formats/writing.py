@@ -85,7 +85,7 @@ def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) ->
 
 
 def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) -> ChannelGroup:
-    """The only group of a format with one clock."""
+    """The single group of channels, for a format that has only one clock."""
     if len(groups) != 1:
         raise InputError(
             path, "groups", len(groups), f"{format_name} has one sampling rate: write a file for each, or MDF 4"
@@ -94,7 +94,7 @@ def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) ->
 
 
 def missing(path: Path, format_name: str, package: str) -> InputError:
-    """Error for a package that is not installed."""
+    """Error for a format whose package is not installed."""
     return InputError(path, "", None, f"{format_name} files need {package}: pip install 'twinrig[measured]'")
 
 
@@ -246,7 +246,7 @@ def write_rpc(
 
 
 def _frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
-    """Values in frames of equal length, the last one filled up with the last values."""
+    """Values in frames of equal length; the last frame is padded with the last values."""
     kept = np.empty((0, len(group.names)))
     for first, values in group.rows(path):
         if (np.abs(values) > np.finfo("<f4").max).any():
@@ -300,7 +300,7 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
 
 
 def _record(path: Path, key: str, value: str) -> bytes:
-    """One parameter."""
+    """One header parameter as bytes."""
     try:
         text = value.encode("latin-1")
     except UnicodeEncodeError as error:
