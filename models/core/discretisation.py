@@ -53,7 +53,7 @@ class Estimate:
 
     @property
     def warned(self) -> bool:
-        """Whether a reader must be warned."""
+        """Whether the error is so large that the user must be warned."""
         return not self.share <= WARNED
 
     def advice(self, step_unit: str) -> str:
@@ -64,13 +64,13 @@ class Estimate:
 
     @property
     def refused(self) -> bool:
-        """Whether the channel is no answer; what no step mends is told, and not refused."""
+        """Whether the error makes the channel useless. An error that no smaller step reduces gives a warning only."""
         return not self.share <= REFUSED and self.step != 0.0
 
 
 def size_of(values: np.ndarray) -> float:
-    """Size of a channel, to which its error is relative: the standard deviation over the first axis, or the size of
-    what is still."""
+    """Size of a channel, to which its error is related: its standard deviation along the first axis, or its magnitude
+    if it is constant."""
     largest = float(np.abs(values).max(initial=0.0))
     deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
@@ -111,13 +111,14 @@ def _rms(values: np.ndarray) -> float:
 
 
 def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
-    """Rows of ``times`` (n,) that are nearest to the wanted ones (m,), both rising."""
+    """Indices of the times in ``times`` (n,) nearest to the wanted ones (m,); both must be ascending."""
     after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
     return after - (wanted_times - times[after - 1] < times[after] - wanted_times)
 
 
 class Series(NamedTuple):
-    """Channels (n, ...) of a run by name, at its times (n,) in s; units of those that its result does not have."""
+    """Channels (n, ...) of a run by name, at its times (n,) in s, and units of the channels that the run's result does
+    not contain."""
 
     times: np.ndarray
     channels: Mapping[str, np.ndarray]
@@ -187,7 +188,8 @@ def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> d
 def _by_half_steps(
     fine: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
-    """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
+    """Estimates from part of the run repeated with half the step. The error found there is scaled to the run's own step
+    by the order of the method, and to the rest of the run by its growth."""
     finer = rerun(0.5, FINE_WINDOW)
     slack = 1e-9 * finer.times[-1]
     part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
@@ -203,9 +205,11 @@ def _by_half_steps(
 
 
 def _later(gap: np.ndarray, values: np.ndarray) -> float:
-    """Rms of an error over a whole run by that over its first rows, of which ``gap`` (k, ...) is the difference.
+    """Ratio of the error's rms over the whole run to that over the first rows, in which ``gap`` (k, ...) is the
+    difference of two runs.
 
-    Errors go on to grow with the power of time that they have there, or as the channel (n, ...) gets rougher.
+    The error is assumed to keep growing with the power of time found there, or with the roughness of the channel (n,
+    ...).
     """
     if len(gap) < 4:
         return 1.0
@@ -218,16 +222,14 @@ def _later(gap: np.ndarray, values: np.ndarray) -> float:
 
 
 def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
-    """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
-    being that of the run."""
+    """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
     share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
 def _whole_divisor(minimum: float) -> int:
-    """Least whole number from ``minimum`` on whose part of a step is a short decimal, so that it divides what the step
-    divides."""
+    """Smallest number 2^i 5^j that is at least ``minimum``; a step divided by it stays a short decimal."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))
     return min((number for number in powers if number >= minimum), default=1)
 
@@ -254,15 +256,15 @@ def of_tolerance(
 
 
 def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
-    """Estimate of the error that a grid of ``cells`` leaves; ``step`` is the number of cells, at most so many, for
-    GOAL."""
+    """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL, at most
+    ``maximum_cells``."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS)
 
 
 def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
-    """An error on top of another, as that of an input on top of that of the run which it drives.
+    """Sum of two errors, such as that of a run and that of the input which drives it.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
@@ -294,22 +296,22 @@ def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_uni
 
 
 def errors_of(run: Result) -> dict[str, Estimate]:
-    """Estimates that a result says, by channel; empty where none was made."""
+    """Estimates stored in a result, by channel; empty if no estimate was made."""
     said = json.loads(run.data.attrs.get("error", "{}"))
     return {name: Estimate(**values) for name, values in said.get("channels", {}).items()}
 
 
 def not_estimated(run: Result, why: str) -> Result:
-    """The result that says why no number stands for its error, such as a law whose switches do not repeat."""
+    """The result with a statement why its error is not estimated, such as a force law that switches differently in
+    every run."""
     run.data.attrs["error"] = json.dumps({"why": why})
     return run
 
 
 def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
-    """The result with what a theory itself leaves, beside what was said of its cells; ``method``: words that say
-    whence.
+    """The result with the error of the theory itself, stated beside that of the grid; ``method`` : text on its source.
 
-    No grid lessens it, so that it is neither warned of nor refused.
+    A finer grid does not reduce this error, so it leads to no warning and no refusal.
     """
     said = json.loads(run.data.attrs["error"])
     said["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
@@ -318,9 +320,9 @@ def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Re
 
 
 def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
-    """The result of an ensemble with the standard errors of its channels, of ``samples`` paths.
+    """The result of an ensemble with the standard errors of its channels, from ``samples`` paths.
 
-    Beside it stands what was said of the steps before.
+    The errors of the time step stay in the result as well.
     """
     said = json.loads(run.data.attrs["error"])
     said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
@@ -329,14 +331,15 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
 
 
 def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
-    """A standard error as an estimate; ``step`` is the number of samples that would hold it to WARNED."""
+    """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
+    WARNED."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
 
 def worst_of(run: Result) -> Estimate | None:
-    """The estimate of the largest share; None where none was made."""
+    """The estimate with the largest relative error in a result; None if there are no estimates."""
     return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
 
 

@@ -32,7 +32,8 @@ def evaluate(coefficients, period, start, step, count, derivatives):
 
 @njit(cache=True, nogil=True)
 def interpolate(values, index, fraction):
-    """Values (n, columns) the given parts of a period after the samples ``index``, linear up to the next sample."""
+    """Values (n, columns), linearly interpolated from each sample ``index`` by ``fraction`` of a period towards the
+    next sample."""
     rows, columns = values.shape
     out = np.empty((len(index), columns))
     for i in range(len(index)):

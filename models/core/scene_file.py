@@ -86,7 +86,7 @@ AUTO = "auto"
 
 
 def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
-    """The table with ``effects = "auto"`` as the study that makes the choice."""
+    """The table of a scene with ``effects = "auto"``, rewritten as the study that chooses the effects."""
     plain = dict(table)
     if plain.get("effects") == AUTO:
         del plain["effects"]
@@ -190,14 +190,14 @@ def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tup
 
 
 def _entry(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
-    """Place in a list, counted from 0 as in messages; written : file, key and value of the change."""
+    """Index in a list from its text, counted from 0 as in messages; written : file, key and value of the change."""
     if not (number.isdecimal() and int(number) < len(listed)):
         raise InputError(*written, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
     return int(number)
 
 
 def _value(text: str) -> Any:
-    """A value as in a scene file; text needs no quotes."""
+    """Value parsed as in a scene file; text may stand without quotes."""
     for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
         try:
             parsed = tomllib.loads(f"x = {written}")
@@ -212,5 +212,5 @@ BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]
 
 
 def _with_digits(number: re.Match) -> str:
-    """The number with a digit on both sides of its decimal point."""
+    """The number as text, with at least one digit on both sides of the decimal point."""
     return f"{number[1] or '0'}.{number[2] or '0'}"

@@ -72,7 +72,7 @@ def _dotted(place: str, keys: tuple[str, ...]) -> str:
 
 
 def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
-    """The table that holds the last key, None where no table of ours does."""
+    """The model class of the table that holds the last key; None if no class of the project describes it."""
     parents = iter(keys[:-1])
     for key in parents:
         field = model.model_fields.get(key)
@@ -131,7 +131,7 @@ ERROR_SENTENCES = {
 
 
 def _facts(field: FieldInfo | None) -> str:
-    """Unit and meaning of a key, in brackets."""
+    """Text with unit and meaning of a key, in brackets."""
     if field is None:
         return ""
     extra = field.json_schema_extra

@@ -26,8 +26,9 @@ class MujocoState(NamedTuple):
 
 @dataclass(frozen=True)
 class Turning:
-    """Three angles: their first coordinate, the quaternion's place in qpos, the axes (3, 3) of the body's frame in the
-    design position as columns, and whether the quaternion says how the body lies in space (free) or turned (ball)."""
+    """Three angles in place of a quaternion: index of their first coordinate, index of the quaternion in qpos, axes (3,
+    3) of the body's frame in the design position as columns, and whether the quaternion is the attitude in space (free
+    joint) or relative (ball joint)."""
 
     first: int
     place: int
@@ -36,7 +37,7 @@ class Turning:
 
 
 class Coordinates:
-    """Those of one model; the order is MuJoCo's of its degrees of freedom."""
+    """Coordinates of one model, in the order of MuJoCo's degrees of freedom, and their conversion to MuJoCo's state."""
 
     def __init__(self, model: mujoco.MjModel, design: mujoco.MjData) -> None:
         """design : data of the model in the design position, with kinematics computed."""
@@ -77,7 +78,8 @@ class Coordinates:
 
 
 def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
-    """For every coordinate (n,), those of its joint that turn or shift a body along three axes at once with it."""
+    """For every coordinate (n,), the slice of its joint's coordinates that together turn or shift a body along three
+    axes."""
     groups = list[slice]()
     for j in range(model.njnt):
         first = int(model.jnt_dofadr[j])

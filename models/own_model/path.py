@@ -136,7 +136,7 @@ def paths(
 
 
 def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
-    """Keep a path, or why there is none."""
+    """Store the path of a build, or the reason why it failed."""
     try:
         with np.errstate(all="ignore"):  # what blows up is told
             path = run()
@@ -150,7 +150,7 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
 
 
 def blown_up(path: np.ndarray) -> bool:
-    """Whether a path has left all measure."""
+    """Whether the path contains numbers that are infinite, NaN or absurdly large."""
     return not (np.isfinite(path).all() and np.abs(path).max() < LARGEST)
 
 
@@ -193,7 +193,7 @@ def file_path(
 
 
 def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
-    """How many states lie before a disturbance has grown to what counts as different."""
+    """Number of states before a small disturbance grows so much that two paths count as different."""
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
     grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= ALIKE * np.maximum(size, 1.0)))
     return max(2, int(grown[0])) if len(grown) else steps + 1
@@ -231,7 +231,8 @@ def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -
 
 
 def _ledger(legs: Sequence[Leg], path: np.ndarray, step: float) -> float | None:
-    """Kinetic energy less the work of all forces by Simpson's rule, as a share; None for fewer than three states."""
+    """Change of kinetic energy less the work of all forces (Simpson's rule), relative to the largest kinetic energy;
+    None for fewer than three states."""
     if len(path) < 3:
         return None
     kinetic, work, first = list[float](), 0.0, 0

@@ -64,7 +64,7 @@ def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarra
 
 
 def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates (n,) that states are drawn between."""
+    """Lowest and highest coordinates (n,) between which random states are drawn."""
     high = np.full(model.nv, ANGLE)
     low = -high
     for j in range(model.njnt):
@@ -83,7 +83,7 @@ def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates (n,) of the file's ranges, infinite where there is none.
+    """Lowest and highest coordinates (n,) of the ranges in the file, infinite where there is no range.
 
     The middle one of three angles keeps away from a quarter turn all the same.
     """

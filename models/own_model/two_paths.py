@@ -24,7 +24,7 @@ class PathGap:
     failed: str = ""
 
     def line(self) -> str:
-        """For the terminal."""
+        """One line of text for the terminal."""
         if self.failed:
             return f"paths of both files from one state are not compared: {self.failed}"
         until = "" if self.horizon >= DURATION else f", where a disturbance of {DISTURBED:g} makes them different"

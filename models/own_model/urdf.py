@@ -32,7 +32,7 @@ class Misread:
     parsed: np.ndarray
 
     def sentence(self) -> str:
-        """In words."""
+        """A sentence on the two values."""
         said = [", ".join(f"{number:.6g}" for number in np.ravel(each)) for each in (self.in_file, self.parsed)]
         return f"{self.kind} of {self.owner}: ({said[0]}) {self.unit} in the file, ({said[1]}) as MuJoCo parsed it"
 
@@ -55,7 +55,7 @@ class _Mass:
     inertia: np.ndarray | None = None
 
     def add(self, mass: float, centre: np.ndarray, inertia: np.ndarray) -> None:
-        """Another one, fixed to this one."""
+        """Add another mass that is rigidly fixed to this one."""
         if self.centre is None or self.inertia is None:
             self.mass, self.centre, self.inertia = mass, centre, inertia
             return
@@ -139,7 +139,7 @@ def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dic
 
 
 def _masses(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
-    """Mass, centre and inertia of all links that are fixed to one another, by the one that moves."""
+    """Mass, centre and inertia of each group of links that are fixed to one another, by the name of its moving link."""
     sums = dict[str, _Mass]()
     for element in root.iter("link"):
         inertial, link = element.find("inertial"), links.get(element.get("name", ""))

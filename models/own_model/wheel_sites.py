@@ -61,7 +61,7 @@ def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document
 
 
 def place(model: mujoco.MjModel, document: Document, site: int) -> str:
-    """How messages call a site."""
+    """Text by which messages name a site."""
     name = model.site(site).name
     line = document.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")

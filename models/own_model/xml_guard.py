@@ -41,7 +41,7 @@ class Document:
     elements: tuple[XmlElement, ...]
 
     def line(self, tags: tuple[str, ...], name: str) -> str:
-        """ "FILE:LINE" of the first element with one of the tags and the name; "" where there is none."""
+        """Position "FILE:LINE" of the first element with one of the tags and the name; "" if there is none."""
         for element in self.elements:
             if element.tag in tags and element.attributes.get("name") == name:
                 return f"{element.file}:{element.line}"
@@ -89,7 +89,7 @@ class _Folders(NamedTuple):
 
 
 def guarded(path: Path) -> Document:
-    """The file's elements; InputError for what must not reach the parser."""
+    """The file's elements, after checks; InputError for content that must not reach the parser."""
     folder, elements = path.resolve().parent, list[XmlElement]()
     _read(path, _Folders(folder, folder), elements, 0)
     root = elements[0].tag
@@ -150,7 +150,7 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
 
 
 def _modest(text: str) -> bool:
-    """Whether an amount of memory, as MuJoCo writes it (100M), is below 4 GB."""
+    """Whether an amount of memory, in MuJoCo's notation such as 100M, is below 4 GB."""
     units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
     number, unit = (text[:-1], units[text[-1:].upper()]) if text[-1:].upper() in units else (text, 1)
     try:
