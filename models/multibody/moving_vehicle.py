@@ -74,7 +74,7 @@ def carried_velocity(frame, place):
 
 @lean
 def in_space(frame, place):
-    """Where a point at a place (m) in the carrier's axes lies on the ground of space."""
+    """Position x, y on the ground of a point at a position (m) in the carrier's axes."""
     return (
         frame.x + frame.cosine * place[0] - frame.sine * place[1],
         frame.y + frame.sine * place[0] + frame.cosine * place[1],

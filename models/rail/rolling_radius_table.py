@@ -67,7 +67,7 @@ class RollingRadiusTable:
 
     @cached_property
     def potential(self) -> Array:
-        """Integral (n,) of the difference from the first row on, the square of the table's unit."""
+        """Integral (n,) of the difference from the first row on, in the square of the table's unit."""
         y, dr = self.displacements, self.differences
         return np.append(0.0, np.cumsum(np.diff(y) * (dr[1:] + dr[:-1]) / 2.0))
 
@@ -77,7 +77,7 @@ class RollingRadiusTable:
         return float(self.displacements[0]), float(self.displacements[-1])
 
     def between(self, low: float, high: float) -> tuple[Array, Array]:
-        """Displacements and differences of the part from ``low`` to ``high``, both ends in it."""
+        """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
         first, last = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
         ends = self.difference(low, "right"), self.difference(high, "left")
@@ -97,14 +97,14 @@ class RollingRadiusTable:
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
     def _row_before(self, displacement: float, side: Any) -> tuple[int, float]:
-        """The row before a displacement, and the share of the way from there to the next one."""
+        """Index of the row before a displacement, and the position between that row and the next, as a share."""
         y = self.displacements
         i = int(np.clip(np.searchsorted(y, displacement, side) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
     def thinned(self) -> "RollingRadiusTable":
-        """The table without every other row, both ends kept: what its spacing costs."""
+        """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
         kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
         return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
 
@@ -152,6 +152,6 @@ def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float
 
 
 def rolling_radius(side: WheelAndRail, pose: Pose) -> float:
-    """Radius (m) of a wheel where it comes nearest to its rail."""
+    """Radius (m) of a wheel at the point nearest to its rail."""
     across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
     return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))

@@ -57,7 +57,7 @@ class Laws(NamedTuple):
 
 @lean
 def add(total, factor, values):
-    """Add a multiple of a row (copies,) to another; nothing where the factor is 0."""
+    """Add ``factor`` times a row (copies,) to another row; nothing is done where the factor is 0."""
     if factor != 0.0:
         for c in range(total.size):
             total[c] += factor * values[c]
@@ -65,7 +65,7 @@ def add(total, factor, values):
 
 @lean
 def on_curve(curves, spring, argument, force):
-    """Add what a spring's curve over travel or rate (copies,) gives to its force (copies,) in N."""
+    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel or rate, ``argument`` (copies,)."""
     offset, slope = curves.offset[spring], curves.slope[spring]
     for c in range(force.size):
         force[c] += offset + slope * argument[c]
@@ -78,9 +78,10 @@ def on_curve(curves, spring, argument, force):
 
 @lean
 def off_road(u, x, road, tyres, pressed, rate, lost):
-    """Fill what a tyre that only pushes has beside a linear one (copies,) in N: 0 on the road, its pull off it.
+    """Fill ``lost`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0 on the
+    road, and cancels the pull of a lifted tyre.
 
-    pressed, rate (copies,) are written over.
+    pressed, rate (copies,) are overwritten.
     """
     n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[u]
     load, stiffness, damping = tyres.load[u], tyres.stiffness[u], tyres.damping[u]
@@ -98,8 +99,8 @@ def off_road(u, x, road, tyres, pressed, rate, lost):
 
 @lean
 def rates(x, road, laws, force, out, room):
-    """Fill the rates (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the forces
-    (s + u, copies) in N that are not linear; room (2, copies) is written over."""
+    """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
+    nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
     for s in range(springs):
         travel, slip, bent = room[0], room[1], force[s]
@@ -127,7 +128,7 @@ def rates(x, road, laws, force, out, room):
 
 @lean
 def output(p, x, road, rate, force, laws, out):
-    """Fill one output (copies,) of states with their rates."""
+    """Fill one output (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
     out[:] = 0.0
     for j in range(2 * n):
@@ -142,7 +143,7 @@ def output(p, x, road, rate, force, laws, out):
 
 @lean
 def sum_up(value, sums, p, first):
-    """Add powers of output p (copies,) to their sums, from copy ``first`` on."""
+    """Add the first four powers of output p (copies,) to their sums, in columns from copy ``first`` on."""
     for c in range(value.size):
         square = value[c] * value[c]
         sums[0, p, first + c] += value[c]
@@ -153,7 +154,7 @@ def sum_up(value, sums, p, first):
 
 @lean
 def states_ahead(x, time, rate, moved):
-    """Fill the states (2 n, copies) that rates lead to in a time (s)."""
+    """Fill ``moved`` with the states (2 n, copies) after a time (s) at constant rates."""
     for j in range(x.shape[0]):
         for c in range(x.shape[1]):
             moved[j, c] = x[j, c] + time * rate[j, c]

@@ -89,7 +89,7 @@ NEGLIGIBLE_SHARE = 1e-10
 
 
 def singular(mass: np.ndarray) -> bool:
-    """Whether nothing inert moves with some motion."""
+    """Whether the mass matrix is singular: some motion involves no inertia."""
     return bool(_range_and_kernel(mass)[1].size)
 
 
@@ -157,7 +157,8 @@ def first_order(
 
 
 def _direct(read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
+    """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, B, and noise in
+    the rates of the road's heights."""
     seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
     size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
     told = abs(seen) > NEGLIGIBLE_SHARE * (size + abs(read.road_rate_factors) @ abs(noise))
@@ -177,7 +178,7 @@ def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _range_and_kernel(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bases of what a symmetric matrix acts on and of what it does not; single coordinates where it is diagonal."""
+    """Bases of the range and of the null space of a symmetric matrix; single coordinates where it is diagonal."""
     if not len(matrix):
         return matrix, matrix
     scale = np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))

@@ -41,7 +41,8 @@ def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) ->
 
 
 def state_space(system: DelayedSystem) -> "control.StateSpace":
-    """The system with the noise of each axle as inputs of its own, axle after axle; delays are for the user to apply.
+    """State-space model in which each axle's noise is a separate input, axle after axle; the user must apply the
+    delays.
 
     Inputs are named w1_1, w1_2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
     """

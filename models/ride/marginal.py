@@ -67,7 +67,7 @@ class MarginalParts:
 
     @property
     def marginal(self) -> int:
-        """Number of marginal states."""
+        """Number of marginal states, those with eigenvalues on the imaginary axis."""
         return len(self.M)
 
 
@@ -178,7 +178,7 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
 
 
 def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
-    """Take the coupling form[:k, k:] out of a block triangular form = W A V, by a Sylvester equation, in place."""
+    """Remove the coupling form[:k, k:] of a block triangular form = W A V in place, by solving a Sylvester equation."""
     if 0 < k < len(form):
         from control import lyap
 
@@ -212,7 +212,7 @@ PARALLEL = 1e8
 
 @dataclass(frozen=True)
 class Growth:
-    """Per output, of its variance in the long run: rate * t^power (t in s), power 0 where it does not grow."""
+    """Long-run growth of each output's variance: rate * t^power (t in s), with power 0 where it does not grow."""
 
     rate: np.ndarray
     power: np.ndarray

@@ -46,7 +46,8 @@ class RoadInPath:
 def road_in_path(
     vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None = None
 ) -> RoadInPath:
-    """The form of a vehicle on a road, with weighted outputs as in ``weighted``; raises its errors.
+    """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``weighted``; raises the errors of that
+    function.
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
@@ -116,7 +117,8 @@ class Responses:
         return E
 
     def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
-        """e^(A h) and what e^(A (h - u)) makes of inputs at the points of the step: (n a, g m)."""
+        """Matrix exponential e^(A h) over a length h, and the effect of inputs at the points of the step through e^(A
+        (h - u)): (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in POINTS])
         inputs = np.einsum("g,gij,jam->iagm", WEIGHTS * length, left, self.form.inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)

@@ -85,7 +85,8 @@ class StatisticallyLinear:
 
     @property
     def distance(self) -> float:
-        """Largest relative distance of the gains to the fixed point: last change * c / (1 - c), Banach's bound."""
+        """Largest relative distance of the gains from the fixed point: last change * c / (1 - c) with contraction c,
+        Banach's bound."""
         c = self.contraction
         return self.changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
 
@@ -121,7 +122,8 @@ Law = tuple[float, float, float]
 
 @dataclass
 class _Moments:
-    """Motion of the bent springs: mean travel, deviations of travel and rate, each (springs,)."""
+    """Moments of the nonlinear springs' motion: mean travel, and standard deviations of travel and rate, each
+    (springs,)."""
 
     mean: np.ndarray
     travel: np.ndarray
@@ -129,7 +131,7 @@ class _Moments:
 
 
 class _Search:
-    """One vehicle on one road at one speed, its bent springs watched by outputs of their own."""
+    """Fixed-point search for one vehicle, road and speed; extra outputs read the motion of the nonlinear springs."""
 
     def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
@@ -164,14 +166,14 @@ class _Search:
         return self._result(gains, moments, position, changes)
 
     def _gains(self, moments: _Moments) -> np.ndarray:
-        """Stiffness and damping (springs, 2) that stand for springs which move like this."""
+        """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
         laws = zip(self.springs, self._laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
     def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
-        """Statistical linearisation of every spring's laws over travel and rate: mean force, gain and variance that the
-        gain leaves out."""
+        """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
+        the force that the gain does not represent."""
         moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
         return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
 
@@ -190,7 +192,8 @@ class _Search:
         return _Moments(self.rows @ position, travel, rate), position
 
     def _mean(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
-        """Mean position (n,) where all mean forces balance, by Newton's method; motions that nothing holds stay 0."""
+        """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
+        stay 0."""
         damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
         for _ in range(NEWTON):
             laws = [of_travel(s, m, d) for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)]
@@ -231,7 +234,7 @@ class _Search:
         )
 
     def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
-        """Means (p,) of the outputs; the force of a bent spring is not its gain times its mean travel."""
+        """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
         means = np.array([output.displacement_factors @ position for output in linear.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
             if isinstance(spec, PartOutput) and spec.kind == "force" and spec.part in springs:
@@ -241,7 +244,8 @@ class _Search:
     def _left_out(
         self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
     ) -> np.ndarray:
-        """Shares (p,) of the outputs' variances by the neglected residual forces, each law separately."""
+        """Ratios (p,) of the variance that the neglected residual forces would add to each output's own variance; each
+        force law counts separately."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
         n = len(linear.mass)
@@ -256,7 +260,7 @@ class _Search:
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
     def _own_forces(self) -> np.ndarray:
-        """(p, 2 springs): outputs that read the force of a bent spring itself."""
+        """Matrix (p, 2 springs) with 1 where an output is the force of a nonlinear spring itself."""
         names = [s.name for s in self.springs] * 2
         return np.array(
             [
@@ -267,12 +271,14 @@ class _Search:
 
 
 def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    """Corner (1/s) of left-out forces by the deviations of what moves the spring and of its rate."""
+    """Corner frequency (1/s) of a residual force's spectrum, from the standard deviations of the spring's motion and of
+    its rate."""
     return HARMONIC * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
 
 
 def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
-    """The vehicle with forces along rows (f, n) in place of the road's heights; ``reading`` (p, f): read at once."""
+    """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
+    forces on the outputs."""
     none = np.zeros(len(rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, none)
@@ -289,7 +295,7 @@ def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
 
 
 def _sentence(name: str, share: float, status: str) -> str:
-    """Sentence on how far the left-out share may change an output's standard deviation."""
+    """Sentence on how much the neglected share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
@@ -303,5 +309,5 @@ def _sentence(name: str, share: float, status: str) -> str:
 
 
 def promised(share: float) -> float:
-    """Relative error that the deviation of an output with this left-out share was found to keep."""
+    """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
     return next((error for most, error, _ in GRADES if share <= most), EXTRAPOLATION_ERROR)

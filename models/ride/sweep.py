@@ -94,7 +94,7 @@ Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 
 
 def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
-    """Variances by solving for the covariance; a vehicle that is unstable is told with its speed."""
+    """Variances from solving for the covariance; the error for an unstable vehicle states its speed."""
     try:
         exact = stationary(system, accuracy)
     except Unstable as error:
@@ -105,7 +105,7 @@ def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
 def _fast_variances(
     system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
 ) -> Answer | str:
-    """Variances by the fast route, or the reason why that cannot be trusted here."""
+    """Variances by the fast method, or a text that says why it is unreliable here."""
     quick = modal(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
@@ -129,7 +129,7 @@ class Modes:
 
     @property
     def blurred(self) -> float:
-        """Relative rounding of the slowest decay: the fastest motion's, times the condition."""
+        """Relative rounding error of the slowest decay rate: that of the fastest motion, times the condition number."""
         return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
 
 
@@ -156,7 +156,7 @@ BLURRED = 1e-11
 
 
 class Shared:
-    """Eigen-decompositions of the blocks met so far: roads and speeds that share a block share its modes."""
+    """Cache of eigen-decompositions, so that roads and speeds with the same block share its modes."""
 
     def __init__(self) -> None:
         self.known: dict[bytes, Modes] = {}
@@ -182,7 +182,8 @@ class Modal:
 
 
 def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: Shared) -> Modal | str:
-    """Variances of a system as ``excited`` and ``weighted`` build it, or the reason in words why there are none here.
+    """Variances of a system as built by ``excited`` and ``weighted``, or a text that says why they cannot be computed
+    here.
 
     vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
     the states of weightings stand last.
@@ -218,7 +219,7 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
 
 
 def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """X of A X + coupling = X diag(values) for a diagonalised A."""
+    """Solution X of A X + coupling = X diag(values), for a diagonalised A."""
     return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
 
 

@@ -67,7 +67,8 @@ class PlainHubs:
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Rows of the hubs and of the guide at a time (s): the nearest ones, or by differences of a step's three."""
+        """Inputs of the hubs and of the guide at a time (s): the nearest rows, or a parabola through the three rows of
+        a step."""
         last, place = len(self.hub_inputs.hubs) - 1, 2.0 * t / self.step
         if not self.any_time:
             nearest = min(max(round(place), 0), last)
@@ -94,7 +95,7 @@ class PlainHubs:
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
     def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs by a row of the hub inputs, and their wrenches (h, 6)."""
+        """Generalised forces (n,) of all hubs for one row of the inputs, and the hubs' wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
@@ -127,7 +128,8 @@ class PlainHubs:
     def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""
+        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its guide or hold
+        it there."""
         hub_inputs, moments = self.hub_inputs, np.zeros(2)
         if guide is None:
             return np.linalg.solve(mass, force), moments

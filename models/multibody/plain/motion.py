@@ -92,7 +92,7 @@ class Bodies:
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
 
     def _arm(self, vehicle: SpatialVehicle, name: str) -> np.ndarray:
-        """(4, 4): shift from the parent's centre, or from the origin, to a body's own."""
+        """Translation (4, 4) from the parent's centre, or from the origin, to the centre of a body."""
         parent, arm = vehicle.body(name).parent, np.eye(4)
         arm[:3, 3] = self.position[name] - (self.position[parent] if parent else 0.0)
         return arm
@@ -103,7 +103,7 @@ class Bodies:
         return self.places.index(place) if place in self.places else -1
 
     def points(self, places: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
-        """Points (body, or None for the space; m in the design position) as this vehicle has them."""
+        """``Points`` of this vehicle, from pairs of body (None for space) and position in the design position (m)."""
         rows = [self.row[body] if body else GROUND for body, _ in places]
         arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
@@ -122,7 +122,7 @@ class Bodies:
         return PlainMotion(matrices)
 
     def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
-        """Rows of matrices behind joint j, by the product rule, from those before it."""
+        """Rows of the matrices behind joint j, from those before the joint, by the product rule."""
         rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
         turned = (rows[:REST].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
         rows[FIRST + j] = turned[PLACE]
@@ -131,7 +131,8 @@ class Bodies:
         return rows
 
     def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mass matrix (n, n), and forces (n,) of weights (gravity (3,), m/s^2) less what inertia asks without q''."""
+        """Mass matrix (n, n), and forces (n,): weights by gravity (3,) in m/s^2, less inertia forces without the q''
+        terms."""
         columns = motion.matrices[1:, FIRST:]
         count = self.size
         weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)

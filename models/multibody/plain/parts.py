@@ -14,7 +14,7 @@ from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDa
 
 
 def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | None:
-    """Body in whose axes a part's axis is fixed, None for the space: its own frame, or the system's default."""
+    """Body in which the axis of a spring or bar is fixed (None for space): the part's own choice, or ``default``."""
     return getattr(element, "frame", None) or default
 
 
@@ -57,7 +57,8 @@ class PlainParts:
         self._design = self.travels(bodies.move(still, still), still, still).travel
 
     def travels(self, motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
-        """Travels at coordinates and rates (n,) in whose motion all bodies are."""
+        """Travels of all springs and bars at coordinates and rates (n,), for which ``motion`` holds the motion of the
+        bodies."""
         axes, apart = motion.at(self._axes), motion.at(self._two) - motion.at(self._one)
         axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]
         all_ways = ((apart @ axis) + (axes @ way))[:, :, 0]

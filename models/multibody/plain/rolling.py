@@ -54,7 +54,7 @@ class Ledger(NamedTuple):
 
 
 class State(NamedTuple):
-    """Accelerations (n,) at one state, and what acts there."""
+    """Accelerations (n,) at one state, with the report of the tyres and the ledger of energy."""
 
     acceleration: np.ndarray
     tyres: TyreReport
@@ -116,8 +116,8 @@ class PlainRolling:
         self._shares_of_tyres(tyres)
 
     def _shares_of_tyres(self, tyres: tuple[Tyre, ...]) -> None:
-        """Shares of steering, brake and drive of every tyre: wheels of an axle share evenly, and so do axles behind;
-        what is towed is not driven."""
+        """Each tyre's share in steering, brake and drive. Wheels of an axle share evenly, and so do rear axles;
+        trailers are not driven."""
         axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
         beside, behind, front = np.array([np.sum(axles == axle) for axle in axles]), max(axles.max(), 1), axles == 0
         self._steered = front.astype(float)
@@ -231,7 +231,7 @@ class PlainRolling:
         return axles
 
     def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
+        """Creep forces along and across (N) and moments (N m), (w, 3), from sliding velocities ``slides`` (w, 4)."""
         of, ones = self.handling.tyres, np.ones(len(slides))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
@@ -254,7 +254,7 @@ class PlainRolling:
         return total, moments
 
     def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of a moment that what carries wheel i takes over from the wheel's body."""
+        """Generalised forces (n,) when the body that carries wheel i takes over a moment from the wheel's body."""
         return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
@@ -268,7 +268,8 @@ class PlainRolling:
         return np.where(self._rotors >= 0, torque, 0.0)
 
     def _turn_wheels(self, motion: PlainMotion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of torques on the wheels, and against them on what carries these."""
+        """Generalised forces (n,) of torques on the wheels, and of the opposite torques on the bodies that carry
+        them."""
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
             total[self._rotors[i]] += torques[i]
