@@ -51,7 +51,7 @@ class IdealBicycle:
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
     def rolling(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """N (9, 3) with v = N u for the rates u of FREE_RATES, and v (9,)."""
+        """Matrix N (9, 3) in v = N u, with the rates u of FREE_RATES, and v (9,)."""
         contact = self.contacts(self.bodies.move(q, np.zeros(COUNT)))[1]
         N = np.zeros((COUNT, 3))
         N[FREE_RATES] = np.eye(3)
@@ -68,7 +68,8 @@ class IdealBicycle:
         return np.concatenate([v, np.linalg.solve(N.T @ mass @ N, N.T @ (force + self.applied(v) - mass @ bias))])
 
     def applied(self, v: np.ndarray) -> np.ndarray:
-        """Forces (9,) of control and friction of the steering, at the speed of the rear wheel."""
+        """Generalised forces (9,) of control and steering friction; the control depends on the speed of the rear
+        wheel."""
         force, control = np.zeros(COUNT), self.control
         speed = v[REAR] * self.bicycle.rear_wheel.radius
         force[STEER] = -control.lean_rate_gain(speed) * v[LEAN] - control.friction * v[STEER]
@@ -97,7 +98,7 @@ class IdealBicycle:
         return float(0.5 * v @ mass @ v + self.bicycle.gravity * self._masses @ levels)
 
     def run(self, state: np.ndarray, duration: float, rows: int = 501, tolerance: float = 1e-9) -> Ride:
-        """From a state (12,) for a duration (s), by DOP853; RunFailed where the bicycle lies on the ground."""
+        """Integrate from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the ground."""
 
         def lies(time: float, state: np.ndarray) -> float:
             return FALLEN - abs(state[LEAN])

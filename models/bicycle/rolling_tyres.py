@@ -86,7 +86,7 @@ class RollingBicycle:
 
     @property
     def driven(self) -> Driven:
-        """What an engine builds."""
+        """Description from which an engine builds the bicycle."""
         gravity = np.array([0.0, 0.0, -self.bicycle.gravity])
         return Driven(self.vehicle, gravity, self.numbers, bicycle_forces, set_bicycle_forces)
 
@@ -128,7 +128,7 @@ def _table(bicycle: RollingBicycle) -> np.ndarray:
 
 
 def _tyres(bicycle: RollingBicycle) -> np.ndarray:
-    """(2, PER_TYRE): numbers of both tyres, columns as of a car's, which names more of them."""
+    """Numbers (2, PER_TYRE) of both tyres, in the columns of a car's tyres, of which the bicycle needs only some."""
     t, table = bicycle.tyre, np.zeros((WHEELS, forces.PER_TYRE))
     vertical, width = t.stiffness**2 * t.vertical, t.half_width / t.stiffness
     wheels = (
@@ -150,7 +150,7 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
 
 @lean
 def _touch(tyre, vehicle, wheel):
-    """Load of a tyre, which acts where the wheel's lowest point is; fills the ``WheelContact``."""
+    """Load of a tyre, which acts at the wheel's lowest point; fills the ``WheelContact``."""
     patch, slip, way, report, ledger = wheel.patch, wheel.slip, wheel.way, wheel.report, vehicle.ledger
     spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre[forces.POINT]))
     link, spin = (
@@ -187,7 +187,8 @@ def _touch(tyre, vehicle, wheel):
 
 @lean
 def _steer(numbers, vehicle):
-    """Torque of control and friction on the steering, to the left, by the speed of the rear wheel's centre."""
+    """Add the steering torque (to the left) of control and friction, which depends on the speed of the rear wheel's
+    centre."""
     v = vehicle.rates
     missing = max(numbers[UNTIL] - numbers[SPEED_GAIN] * abs(vehicle.frame.ahead) - numbers[SPEED_BIAS], 0.0)
     torque = -numbers[GAIN] * missing * v[LEAN] - numbers[FRICTION] * v[STEER]

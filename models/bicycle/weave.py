@@ -43,7 +43,7 @@ class Observation:
 
     @property
     def mean(self) -> np.ndarray:
-        """(3,) of ``parts``."""
+        """Means (3,) of ``parts`` over the windows."""
         return self.parts.mean(axis=0)
 
     @property
@@ -68,7 +68,7 @@ def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
 
 
 def observations(folder: str | Path) -> list[Observation]:
-    """All speeds of a folder, rising; InputError that names file, place and value where it cannot be read."""
+    """Observations of a folder by ascending speed; InputError with file, position and value where it cannot be read."""
     folder, rows = Path(folder), _windows(Path(folder) / "windows.csv")
     recordings = {label: _recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
@@ -90,7 +90,7 @@ def observations(folder: str | Path) -> list[Observation]:
 
 
 def _windows(path: Path) -> list[tuple[str, float, int, int]]:
-    """Rows of windows.csv."""
+    """Rows of the file windows.csv."""
     if not path.is_file():
         raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
     rows = []
@@ -110,7 +110,7 @@ def _windows(path: Path) -> list[tuple[str, float, int, int]]:
 
 
 def _recording(folder: Path, label: str) -> dict[str, np.ndarray]:
-    """Columns of the recording of a label."""
+    """Columns of the recording with a given label."""
     paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
     if len(paths) != 1:
         allowed = f"{len(paths)} recordings end in _{label}kph.csv or .csv.gz, one is needed"

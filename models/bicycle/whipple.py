@@ -90,7 +90,7 @@ class Control(Strict):
     speed_bias: float = quantity("m/s", "measured speed at standstill", default=0.0, signed=True)
 
     def lean_rate_gain(self, speed: float) -> float:
-        """Steer torque by lean rate (N m s/rad) at a speed (m/s)."""
+        """Ratio of steer torque to lean rate (N m s/rad) at a speed (m/s)."""
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing
 
@@ -129,7 +129,7 @@ class Whipple(Strict):
     front_wheel: Wheel
 
     def changed(self, **values: Any) -> "Whipple":
-        """The same bicycle but for some values, read as strictly."""
+        """The bicycle with some values changed, checked as in a file."""
         return read(Whipple, {name: getattr(self, name) for name in type(self).model_fields} | values, "", "bicycle")
 
     @cached_property
@@ -169,7 +169,7 @@ class Whipple(Strict):
         return LinearBicycle(M, C1, K0, K2)
 
     def state_matrix(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
-        """(4, 4): rates of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
+        """State matrix (4, 4) of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
         stiffness = self.gravity * K0 + speed**2 * K2
@@ -183,7 +183,8 @@ class Whipple(Strict):
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
     def weave(self, speed: float, control: Control = UNCONTROLLED) -> complex:
-        """The oscillation with positive imaginary part (1/s), the faster of two; nan where there is none."""
+        """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster of two; NaN if
+        there is none."""
         values = self.eigenvalues(speed, control)
         fastest = complex(values[np.argmax(values.imag)])
         return fastest if fastest.imag > 1e-9 * np.abs(values).max() else complex(np.nan, np.nan)
@@ -205,7 +206,8 @@ class Whipple(Strict):
 
     @property
     def weave_speed(self) -> float | None:
-        """Speed (m/s) from which on the free bicycle's weave decays: the last root of Hurwitz' condition; None."""
+        """Lowest speed (m/s) above which the uncontrolled bicycle's weave decays: the last root of Hurwitz' condition;
+        None if there is none."""
         E, D, C, B, A = self.characteristic
         roots = _positive_roots(B * C * D - A * D * D - B * B * E)
         oscillating = [v for v in roots if D(v) * B(v) > 0.0]  # a pair +-i w has w^2 = D / B
@@ -213,13 +215,14 @@ class Whipple(Strict):
 
     @property
     def capsize_speed(self) -> float | None:
-        """Speed (m/s) from which on the free bicycle falls over slowly: where the stiffness is singular; None."""
+        """Speed (m/s) above which the uncontrolled bicycle slowly falls over, where the stiffness becomes singular;
+        None if there is none."""
         roots = _positive_roots(self.characteristic[0])
         return roots[-1] if roots else None
 
 
 def _product(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
-    """Coefficients of a product of quadratics in s."""
+    """Coefficients of the product of two quadratics in s."""
     total = [Polynomial([0.0]) for _ in range(5)]
     for i, a in enumerate(one):
         for j, b in enumerate(two):
@@ -228,7 +231,8 @@ def _product(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
 
 
 def _positive_roots(condition: Polynomial) -> list[float]:
-    """Roots v > 0 of a polynomial of even or odd powers of v alone, in v^2: it is of degree two at most there."""
+    """Positive roots v of a polynomial with only even or only odd powers of v, solved as one of at most second degree
+    in v^2."""
     scale = np.abs(condition.coef).max()
     lowest = int(np.argmax(np.abs(condition.coef) > 1e-12 * scale))
     in_square = Polynomial(condition.coef[lowest::2])

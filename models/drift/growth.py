@@ -52,7 +52,7 @@ class RigidPitch:
 
     @property
     def total(self) -> float:
-        """I + J (kg m^2)."""
+        """Total pitch inertia I + J (kg m^2)."""
         return self.inertia + self.carried
 
     def moment(self, forces: np.ndarray) -> np.ndarray:
@@ -67,12 +67,13 @@ class RigidPitch:
         return deviation**2 * period * (self.front**2 + self.rear**2) / self.total**2
 
     def growth(self, rates: np.ndarray) -> np.ndarray:
-        """lambda^2 (1/s^2) of fast pitch rates (rad/s), value by value; forces vertical."""
+        """Squared growth rate lambda^2 (1/s^2) for each of the fast pitch rates (rad/s); the forces are vertical in
+        space."""
         return rates**2 * self.inertia / self.total
 
 
 def rigid_pitch(p: Parameters) -> RigidPitch:
-    """The rigid vehicle of a parameter set."""
+    """``RigidPitch`` of a pitch-plane parameter set."""
     mass, coupling = p.m1 + p.m2 + p.m3, p.b * p.m1 - p.a * p.m2
     carried = p.m1 * p.b**2 + p.m2 * p.a**2 - coupling**2 / mass
     return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
@@ -182,7 +183,8 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
 
 
 def _log_gain(log_x: float) -> float:
-    """Logarithm of 6 (sinh x - x) / x^3 from that of x = 2 lambda t: neither need be a number itself."""
+    """Logarithm of 6 (sinh x - x) / x^3 from the logarithm of x = 2 lambda t; works where x or the result would
+    overflow."""
     x = math.exp(log_x)
     if x > LARGEST_EXPONENT:
         return math.log(3.0) + x - 3.0 * log_x

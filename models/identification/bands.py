@@ -20,7 +20,7 @@ class ErrorModel:
     reach: float
 
     def half_width(self, predicted: np.ndarray) -> np.ndarray:
-        """(n,)."""
+        """Half-widths (n,) of the band around predictions (n,)."""
         return self.reach * np.sqrt(self.base**2 + (self.share * predicted) ** 2)
 
 
@@ -47,19 +47,19 @@ class Bands:
     half_width: np.ndarray
 
     def inside(self) -> np.ndarray:
-        """(channels,): share of what was measured that lies inside."""
+        """Share (channels,) of the measured samples that lie inside the band."""
         return self._mean(np.abs(self._error()) <= self.half_width)
 
     def rms(self) -> np.ndarray:
-        """(channels,): root mean square of prediction less measurement."""
+        """Root mean square (channels,) of prediction less measurement."""
         return np.sqrt(self._mean(self._error() ** 2))
 
     def relative(self) -> np.ndarray:
-        """(channels,): the same by the root mean square of the measurement."""
+        """Ratio (channels,) of the rms error to the root mean square of the measurement."""
         return self.rms() / np.array([channel.size for channel in self.problem.channels])
 
     def width(self) -> np.ndarray:
-        """(channels,): mean half-width by the rms error."""
+        """Ratio (channels,) of the mean half-width to the rms error."""
         return self._mean(self.half_width) / self.rms()
 
     def _error(self) -> np.ndarray:
@@ -71,7 +71,8 @@ class Bands:
 
 
 def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
-    """Bands of a stretch: ``problem`` is that of the fit with the drive and the measurement of the stretch."""
+    """Bands for a stretch of measurement; ``problem`` is the fit's problem with the drive and the measurement of that
+    stretch."""
     values = uncertainty.fit.values
     predicted = problem.predicted(values)
     slopes = problem.jacobian(values, problem.predicted)

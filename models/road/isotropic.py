@@ -60,7 +60,8 @@ class DensityPart:
 
 @dataclass(frozen=True)
 class IsotropicRoad:
-    """A road whose track density is the sum of parts."""
+    """A road with the same statistics in all directions; its track density is the sum of several terms
+    ``DensityPart``."""
 
     parts: tuple[DensityPart, ...]
 
@@ -73,7 +74,7 @@ class IsotropicRoad:
         return np.sum([part.density(wavenumber, distance) for part in self.parts], axis=0)
 
     def coherency(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Cross density over the density of one track."""
+        """Coherency of two tracks ``distance`` (m) apart: ratio of their cross density to the density of one track."""
         return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
 
 

@@ -88,7 +88,8 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.nd
 
 
 def _exponentials(m: np.ndarray) -> np.ndarray:
-    """Matrix exponentials of m (n, 3, 3), all at once: power series of m / 2^k with small entries, squared k times.
+    """Matrix exponentials of all matrices m (n, 3, 3) at once: power series of m / 2^k with small entries, squared k
+    times.
 
     scipy's own goes matrix by matrix through a threaded library, and takes many times as long where others run.
     """
@@ -102,7 +103,8 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
 
 
 def spread(walks: np.ndarray) -> np.ndarray:
-    """1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: reduction of the mean rotation by noise, in local components."""
+    """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: rate at which noise reduces the mean rotation matrix, in local
+    components."""
     return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
 
 
@@ -164,7 +166,7 @@ def angle_variance(
 
 
 def _check(minimum: float = math.ulp(0.0), **given: float) -> None:
-    """Refuse the first number that is below the least one."""
+    """Refuse the first number that is below ``minimum``."""
     for name, value in given.items():
         if not value >= minimum:
             raise InputError("", name, value, f"must be {'0 or more' if minimum == 0.0 else 'above 0'}")

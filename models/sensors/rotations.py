@@ -28,7 +28,7 @@ SKEWED = 1e-6
 
 
 class GimbalLock(InputError):
-    """Cardan angles were asked for where roll and yaw cannot be told apart; quaternions go on without harm.
+    """Cardan angles were requested where roll and yaw cannot be distinguished; quaternions are not affected.
 
     sample : index of the first such orientation; pitch : its pitch (rad).
     """
@@ -106,7 +106,7 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
 
 
 def _check_turned(rates: np.ndarray, period: float) -> None:
-    """Refuse angular rates that turn the body too far between two samples."""
+    """Refuse angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * period > HALF_TURN:
         samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"

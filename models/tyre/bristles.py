@@ -43,7 +43,8 @@ def net(cells: int) -> Grid:
 
 
 def shape_factor(cells: int) -> float:
-    """C / (a^2 b k) of a patch with ``cells`` cells: slip stiffness by the bristles' stiffness; near the exact 8/3."""
+    """Ratio of the slip stiffness to a^2 b k, with bristle stiffness k, for a patch with ``cells`` cells; near the
+    exact 8/3."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT.items():
         contacts[name] = value
@@ -76,7 +77,7 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
 
 @lean
 def _creepages(sign, patches, slides):
-    """Creepages of tyres that roll forwards (sign 1) or backwards (-1)."""
+    """Creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities."""
     for i in range(len(patches)):
         patch, speed = patches[i], max(abs(slides[i, 3]), FADING_SPEED)
         patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed
@@ -85,7 +86,8 @@ def _creepages(sign, patches, slides):
 
 @lean
 def _mix(slides, backwards, answers):
-    """Forces of rolling forwards with their share, and those of rolling backwards, seen from ahead, with theirs."""
+    """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
+    view."""
     for i in range(len(answers)):
         share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), answers[i], backwards[i]
         answer.fx = share * answer.fx - (1.0 - share) * behind.fx

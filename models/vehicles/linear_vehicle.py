@@ -66,7 +66,7 @@ class LinearVehicle:
 
     @property
     def axles(self) -> tuple[float, ...]:
-        """Places x (m) of the axles, from the front."""
+        """Positions x (m) of the axles, the front one first."""
         places = {wheel.axle: wheel.x for wheel in self.wheels}
         return tuple(places[i] for i in sorted(places))
 
@@ -77,14 +77,15 @@ class LinearVehicle:
 
     @cached_property
     def read(self) -> OutputRows:
-        """Factors of all outputs."""
+        """``OutputRows`` of all outputs."""
         return OutputRows(
             *(np.array([getattr(output, factor) for output in self.outputs]) for factor in OutputRows._fields)
         )
 
 
 def poles(vehicle: LinearVehicle) -> np.ndarray:
-    """Eigenvalues (2 n,) in 1/s, slow ones first; of a pair the one with the negative imaginary part first."""
+    """Eigenvalues (2 n,) in 1/s in order of increasing magnitude; of a conjugate pair, the one with negative imaginary
+    part comes first."""
     n = len(vehicle.mass)
     motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     values = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), motion]))
@@ -92,9 +93,9 @@ def poles(vehicle: LinearVehicle) -> np.ndarray:
 
 
 def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
-    """Shift of every eigenvalue (2 n,) of the unloaded vehicle by its load, complex, in 1/s.
+    """Complex change (1/s) of each eigenvalue (2 n,) of the unloaded vehicle by the load.
 
-    The eigenvalues of the two are paired so that the sum of all distances is the least.
+    Eigenvalues of both vehicles are paired such that the sum of all distances is smallest.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -24,7 +24,7 @@ from models.vehicles.pitch_plane import Parameters
 
 
 def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
-    """Numbers that the compiled equations read: the parameters (15,), then stiffness, damping and dead band of each
+    """Array for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each pitch
     spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
     return np.concatenate((p.array(), *springs))
@@ -67,7 +67,8 @@ def pushing_tyres(y, u, p):
 
 @register_jitable
 def newton_euler(y, wheels, struts, cosine, p, dy):
-    """Balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel), suspension forces f3, f4."""
+    """Accelerations from the balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel),
+    suspension forces f3, f4."""
     (f1, f2), (f3, f4) = wheels, struts
     for i in range(4):
         dy[i] = y[4 + i]
