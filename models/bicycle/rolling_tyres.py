@@ -65,7 +65,8 @@ UNCHANGED_TYRE = BicycleTyre()
 
 @dataclass(frozen=True, eq=False)
 class RollingBicycle:
-    """The bicycle on its tyres, as engines build it: ``driven``. InputError for what only the linear equations take."""
+    """The bicycle on its tyres; ``driven`` is what engines build. InputError for features that only the linear
+    equations have."""
 
     bicycle: Whipple
     tyre: BicycleTyre = UNCHANGED_TYRE

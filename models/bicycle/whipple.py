@@ -95,9 +95,10 @@ class Control(Strict):
         return self.torque_gain * self.gain * missing
 
     def viscous(self, slowness: float) -> "Control":
-        """The same with viscous friction in place of the dry one, of the same work at a motion of the steering.
+        """The same control with viscous instead of dry friction, which does the same work in a given motion of the
+        steering.
 
-        slowness : mean of |steer rate| by mean of its square, s/rad.
+        slowness : ratio (s/rad) of the mean of |steer rate| to the mean of its square.
         """
         added = self.friction + slowness * self.dry_friction
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
@@ -177,7 +178,7 @@ class Whipple(Strict):
         return np.vstack([np.eye(2, 4, 2), below])
 
     def eigenvalues(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
-        """(4,) 1/s, sorted by real and imaginary part, at a speed (m/s)."""
+        """Eigenvalues (4,) in 1/s at a speed (m/s), sorted by real, then imaginary part."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))

@@ -81,7 +81,7 @@ def equivalent_deceleration(speed: float, distance: float) -> float:
 
 
 def braking_rate(high: float, low: float, time: float) -> float:
-    """z of a vehicle that takes ``time`` (s) from one speed to a lower one (m/s).
+    """Braking rate z of a vehicle that takes ``time`` (s) to slow down from one speed to a lower one (m/s).
 
     From 40 to 20 km/h it is 0.566 / t, from 45 to 15 km/h 0.849 / t (UN R13, Annex 13; not checked against the text).
     """
@@ -116,7 +116,11 @@ def adhesion_rear(z: float, axles: Axles) -> float:
 
 
 def adhesion_trailer(z: float, weight: float, load: float) -> float:
-    """k of one axle of a trailer from the braking rate of the train (weight in N) with it alone braked: z P g / F_dyn.
+    """Adhesion k of one trailer axle, z P g / F_dyn, from the braking rate of the train (weight in N) when only that
+    axle brakes.
+
+    load: F_dyn, N. The formula is ours. Rolling resistance is not subtracted, because wheels have none here; that of a
+    whole train would be a third of the force of one axle on ice.
 
     load: F_dyn, N. Ours; nothing is taken off for wheels that roll, as none has rolling resistance here, and a whole
     train's would be a third of what one axle does on ice.
@@ -142,7 +146,8 @@ def split_rate(k_low: float, k_high: float) -> float:
 
 
 def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
-    """Yaw rate divided by that of the circle at the momentary speed, r R / v: 1 of a vehicle that stays on its circle.
+    """Ratio r R / v of the yaw rate to that of the circle at the present speed: 1 for a vehicle that stays on its
+    circle.
 
     Source: ISO 7975 and ISO 14794, one second after the brake is applied; not checked against the text of the standard.
     """

@@ -92,8 +92,8 @@ def settle(motion, steer, regular, starts, vehicle, frame):
 
 @inlined
 def slide(i, u, v, regular, lag, angles, wheels):
-    """Take the slip angle of wheel i by the speeds (m/s) u of its centre along it and v of its tyre across it, or in
-    place of v by what lags behind it: lag (W,) of ``Surfaces``."""
+    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
+    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v."""
     forwards = u if wheels.start[i] >= 0.0 else -u
     if not math.isnan(lag[i]):
         v = lag[i] * max(forwards, regular)
@@ -155,8 +155,8 @@ def share_out(loads, places):
 
 @inlined
 def respond(motion, before, after, step, vehicle, frame):
-    """Fill ``frame.out`` with the accelerations by the tyres' forces if they were those of the ``motion``: the map
-    whose fixed point is wanted. before, after (W,) : torques at the ends of the step."""
+    """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
+    ``motion``. A step's solution is a fixed point of this map. before, after (W,) : torques at the ends of the step."""
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
     load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start

@@ -35,7 +35,7 @@ class QuarterPath(NamedTuple):
 
 
 class Quarter(Strict):
-    """A quarter vehicle: one wheel and the mass that it carries."""
+    """A quarter vehicle: one wheel, and the vehicle mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
     radius: float = quantity("m", "of the wheel")

@@ -39,9 +39,10 @@ LEADING: tuple[tuple[str, Freedom], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Sprung:
-    """The vehicle as the engines build it, and the plane one that has its mass, axles and wheels, without what it tows.
+    """A vehicle on its suspension as engines build it, and the plane vehicle with the same mass, axles and wheels,
+    without trailers.
 
-    spins : (W,) kg m^2, of its wheels and of those of what it tows
+    spins : (W,) kg m^2, inertias of the wheels, including those of trailers
     """
 
     handling: Handling
@@ -136,8 +137,12 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
 def sprung(
     vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
 ) -> Sprung:
-    """A vehicle of two axles with two wheels each, and what it tows; spin_inertia (kg m^2): of a wheel
-    whose tyre names none.
+    """A two-axle vehicle with two wheels per axle, and its trailers; spin_inertia (kg m^2): for wheels whose tyres name
+    no inertia.
+
+    front : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs determine
+    it; forces : who computes the trailers' springs, see ``Handling``. Raises InputError for a vehicle with other axles,
+    with trailers that do not form a row, or without steering.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
     here; forces : whose the springs of what is towed are, see ``Handling``. Raises InputError for a vehicle of other
@@ -154,8 +159,8 @@ def sprung(
 
 
 def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
-    """Tyres axle by axle, the left one first; InputError unless two are on each of the vehicle's two axles, and on
-    each one behind them, which is towed."""
+    """Tyres axle by axle, left before right; InputError unless the vehicle has two axles, and these and all trailer
+    axles have two tyres each."""
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     names, ahead = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
     pairs = list(zip(tyres[::2], tyres[1::2], strict=False))
@@ -201,7 +206,7 @@ def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:
-    """(3,) m: centre of mass, in the design position, of a vehicle without what it tows."""
+    """Centre of mass (3,) in m, in the design position, of a vehicle without its trailers."""
     bodies = without_trailer(vehicle)
     masses = np.array([body.mass for body in bodies])
     return masses @ np.array([body.position for body in bodies]) / masses.sum()

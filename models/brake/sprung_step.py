@@ -176,10 +176,11 @@ PLANE = 3
 
 
 class Units(NamedTuple):
-    """The vehicle and what it tows as units in the plane.
+    """The vehicle and its trailers as units in the plane.
 
-    turns (U - 1,) : numbers of the coordinates by which each one behind yaws beside the one before; leans (L,) : of
-    those of roll and pitch; motion (2, 2 + U) : place of the first and headings of all, and their rates.
+    turns (U - 1,) : numbers of the yaw coordinates of each trailer relative to the unit before it; leans (L,) : numbers
+    of the roll and pitch coordinates; motion (2, 2 + U) : position of the first unit and headings of all, and their
+    rates.
     """
 
     turns: np.ndarray

@@ -47,8 +47,7 @@ class YawResponse:
 
 
 def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
-    """Step response of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it
-    is not.
+    """Step response from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
     vehicles); not checked against the text of the standard.

@@ -28,7 +28,7 @@ class Road(NamedTuple):
 
 
 class OnRoad(NamedTuple):
-    """A vehicle in the plane on its tyres and its road: what stays as it is over a run.
+    """A vehicle in the plane with its tyres and road: all data that stay constant during a run.
 
     kind (W,): which of the road's kinds of tyre each wheel has; slope: largest cornering coefficient of the tables
     (1/rad); tables: surface by surface and kind by kind.

@@ -61,7 +61,8 @@ def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
-    """Unit, group and what ``wheels`` gives, the front ones on the drawbar, which is unit ``first``."""
+    """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
+    unit ``first``."""
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
     place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
     place[:2, 0] = 0.0

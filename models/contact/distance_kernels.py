@@ -101,7 +101,8 @@ def least_of_row(row):
 
 @njit(cache=True)
 def lowest(cube, square, linear):
-    """Share of the segment at which cube t^3 + square t^2 + linear t has its minimum, 0 where it has none inside."""
+    """Position (0 to 1) in a segment of the minimum of cube t^3 + square t^2 + linear t; 0 if there is no minimum
+    inside."""
     root = square * square - 3.0 * cube * linear
     if root <= 0.0:
         return 0.0

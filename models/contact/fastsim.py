@@ -59,7 +59,7 @@ LEAST_CELLS, MOST_CELLS = 3, 2000
 
 @dataclass(frozen=True)
 class RollingEllipse:
-    """One elliptic contact that rolls, or many: every value a number, or arrays of any shapes that broadcast.
+    """One rolling elliptic contact, or many: each field is a number or an array, and all arrays broadcast.
 
     a, b : semi-axes along and across the direction of rolling (m); load : N, zero or less makes all forces zero; mu :
     coefficient of friction, 0 to 10; xi_x, xi_y : creepages; spin : 1/m, signs as in ``models.contact``
@@ -76,7 +76,7 @@ class RollingEllipse:
 
 @dataclass(frozen=True)
 class Creep:
-    """Forces on the wheel; every field has the common shape of what was given.
+    """Creep forces on the wheel; every field has the common shape of the inputs.
 
     fx, fy : N. mz : N m, about the centre. stick : share of the area that sticks. dissipation : -(fx xi_x + fy xi_y +
     mz spin) in J per metre rolled, times the rolling speed the power in W; never negative (on fewer than 20 cells per

@@ -22,7 +22,7 @@ ROUNDED = 1.0 + 2e-15
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The net of one ellipse, in its own scale, as tables of doubles hold it.
+    """Grid of one ellipse in dimensionless form, as tables of doubles.
 
     strips : (4, strips), rows as the fields of ``Strips``
     cells : (5, cells), rows as the fields of ``Cells``
@@ -42,7 +42,8 @@ class Grid:
 
 
 def strips_of(ratio: Array, cells: int) -> Array:
-    """Strips that a net of ``cells`` per strip has on ellipses of a/b = ``ratio``: an even number of at least as many.
+    """Number of strips of a grid with ``cells`` cells per strip, for ellipses of a/b = ``ratio``: even, and at least
+    ``cells``.
 
     Under spin the traction turns about a pole, within a distance of a: strips of a narrow ellipse must not be wider.
     An even number, because a strip through the pole of pure spin would stand for both its sides.

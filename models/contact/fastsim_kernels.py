@@ -36,7 +36,7 @@ def lateness(z):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def advance(traction, slip, bound):
-    """Traction in the next cell, and 1 if it slips there or 0, by the second-order march.
+    """Traction in the next cell by the second-order march, and 1 if it slips there, else 0.
 
     traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
     and y in the middle of the step, as traction, and the change of the second over it; bound : in the next cell, where

@@ -94,7 +94,13 @@ def stiffness(contact, bound, kind):
 
 @lean
 def blend(contact, bound, kind):
-    """Part of the one flexibility, 0 to 1, and its derivatives to xi_x, xi_y and spin sqrt(a b).
+    """Weight, 0 to 1, of the common mean flexibility against three separate ones, and the weight's derivatives with
+    respect to xi_x, xi_y and spin sqrt(a b).
+
+    The weight grows with x, y and z, ratios of the linear theory's tractions to the bound. Lateral creepage that
+    opposes spin contributes less: the pole about which the rigid slip turns then lies in the patch, and much of the
+    area near it still sticks while the remaining area slides. A second term brings the weight to 1 where the whole area
+    slides, so that force and slip have the same direction.
 
     It grows with x, y and z, the reach of the linear theory's tractions by the bound. Lateral creepage against spin
     reaches less: the pole about which the rigid slip turns lies in the patch then, and near it much still sticks when
@@ -143,8 +149,9 @@ def mean_flexibility(contact, turn, kind):
 
 @lean
 def strip_slip(contact, strips, s, slip):
-    """Rigid slip (u, v0, v1) of strip number s, of that of its contact: the traction by the bound in the strip's middle
-    that it builds up over one cell, along x and, at the position t, along y (v0 + v1 t)."""
+    """Rigid slip (u, v0, v1) of strip number s from that of its contact. It is the traction that would build up over
+    one cell without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position
+    t."""
     spread = strips.spread[s]
     return (
         spread * (slip.x - slip.spin * contact.b * strips.y[s]),

@@ -33,8 +33,8 @@ q_y, t q_y and of slipping cells; the state. One record, as the compiler must kn
 
 
 class Strips(NamedTuple):
-    """Strips of an ellipse, (m,) each: y/b, half length by a, that by the bound in the strip's middle, share of the
-    load per bound."""
+    """Strips of an ellipse, (m,) each: position y/b, ratio of half length to a, ratio of this to the bound in the
+    strip's middle, and share of the load per bound."""
 
     y: Array
     half: Array
@@ -43,8 +43,8 @@ class Strips(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a strip, (n,) each, about the step that ends in the cell's centre: t there, the bound g there, t in the
-    middle of the step, g where it starts (more by a rounding), 1/(8 g) in its middle.
+    """Cells of a strip, (n,) each, for the step that ends in the cell's centre: position t and bound g there, t in the
+    middle of the step, g at its start (enlarged by a rounding), and 1/(8 g) in its middle.
 
     peak : pressure in the middle of the ellipse times a b / N.
     """

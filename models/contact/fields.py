@@ -15,7 +15,7 @@ from models.core.errors import InputError
 
 @dataclass(frozen=True)
 class Fields:
-    """Pressure and tractions in the cells of one contact area; every array has one and the same shape.
+    """Pressure and tractions in the cells of one contact area; all arrays have the same shape.
 
     x, y : centres of the cells (m). dx, dy : their sizes (m). pressure, px, py : Pa, tractions on the wheel.
     slips : whether the cell slips. inside : whether it belongs to the contact area.

@@ -20,7 +20,8 @@ X, Y, Z = 0, 1, 2
 
 
 def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
-    """Displacement difference (m) at a point by a unit traction (1 Pa) on a rectangle dx by dy (m).
+    """Relative displacement (m) of the two bodies at a point, caused by a unit traction (1 Pa) on a rectangle dx by dy
+    (m).
 
     x, y : (...) coordinates of the point from the rectangle's centre (m), broadcast against each other.
     Returns (..., 3, 3): [i, j] is the displacement of body 1 relative to body 2 along i by a traction along j that acts

@@ -32,7 +32,7 @@ LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
 
 @dataclass(frozen=True)
 class Hertz:
-    """The contact of two bodies; every field has the common shape of what was given.
+    """Hertzian contact of two bodies; every field has the common shape of the inputs.
 
     Where nothing touches, axes, pressure, approach and load are exactly zero.
 

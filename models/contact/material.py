@@ -86,7 +86,8 @@ class MaterialPair:
         return 2.0 * abs(self.mismatch) / friction
 
     def require_likeness(self) -> None:
-        """Raise InputError for a pair too unlike to leave K out where there is friction (see LARGEST_MISMATCH)."""
+        """Raise InputError if the materials differ so much that K must not be neglected where there is friction (see
+        LARGEST_MISMATCH)."""
         if abs(self.mismatch) > LARGEST_MISMATCH:
             raise InputError(
                 "",

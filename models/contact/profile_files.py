@@ -83,7 +83,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
-    """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
+    """Numbers in one line; raises InputError with the line if it has too few numbers or other text."""
     if DECIMAL_COMMA.search(text.strip()):
         raise InputError(
             path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], "has decimal commas: write decimal points"

@@ -229,7 +229,8 @@ def _at_quarter_cells(values: Array) -> Array:
 
 
 def _solve_tractions(state: _State) -> tuple[_State, int]:
-    """Tractions that meet all conditions, by sweeps and Newton's steps in turn, and the rounds taken."""
+    """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
+    rounds."""
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
         if done == MOST_ROUNDS:

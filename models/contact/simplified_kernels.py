@@ -216,9 +216,10 @@ def tangential(traction, dx, dy, nu):
 
 @compiled
 def tangential_fit(u, traction, cover, dx, dy, kind):
-    """W_1 = W_2 (m/Pa) by least squares of u = W p + a, both (2, cells, cells); 0 where none can be fitted.
+    """Flexibility W_1 = W_2 (m/Pa) from the least-squares fit u = W p + a, u and p both (2, cells, cells); 0 if no fit
+    is possible.
 
-    Of both directions together, weighted by the covered shares; by DISPLACEMENT or by GRADIENT along x.
+    Both directions are fitted together, weighted by the covered shares, by DISPLACEMENT or by its GRADIENT along x.
     """
     both = square = 0.0
     for k in range(2):
@@ -352,10 +353,10 @@ def march(net, mu, flexibility, motion, traction):
 
 @compiled
 def step_on(px, py, u, v, bound, middle, slips):
-    """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
+    """Traction after a step, and whether it slips; without slip the rigid slip would subtract (u, v) from the traction.
 
-    A traction that slips on keeps to the bound and turns towards -(u, v): with psi between the two, tan(psi/2) shrinks
-    by exp(-|(u, v)| / middle), ``middle`` the bound half way.
+    A traction that continues to slip stays on the bound and turns towards -(u, v): with psi between the two, tan(psi/2)
+    shrinks by exp(-|(u, v)| / middle), where ``middle`` is the bound in the middle of the step.
     """
     x, y = px - u, py - v
     size = math.hypot(x, y)

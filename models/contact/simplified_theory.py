@@ -161,7 +161,7 @@ def press(
     approach: float | None = None,
     options: SimplifiedOptions = PLAIN,
 ) -> NormalContact:
-    """Area, pressure and approach of two bodies, by a load (N) or by a rigid approach (m).
+    """Normal contact of two bodies under a load (N), or at a rigid approach (m): area, pressure and approach.
 
     bodies : their undeformed distance, or the patches of a wheel on a rail.
 
@@ -320,9 +320,10 @@ def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -
 
 
 def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[float]:
-    """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
+    """Flexibility W_1 = W_2 (m/Pa) of each patch from the least-squares fit u = W p + a on the coarse grids, with
+    displacements u by the tractions of all patches.
 
-    W_3 where no traction can be fitted.
+    It is W_3 if no traction can be fitted.
     """
     options, pair = normal_contact.options, normal_contact.pair
     nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]

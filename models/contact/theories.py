@@ -54,7 +54,8 @@ class Pressing:
 
 
 class RollingContact(ABC):
-    """Two bodies pressed together, to be rolled by one theory; ``order``: of the error in the size of a cell."""
+    """Two bodies pressed together whose rolling one theory computes; ``order``: convergence order of the error in the
+    cell size."""
 
     order = 1.0
 

@@ -103,7 +103,7 @@ class TouchingPlace:
 
 @dataclass(frozen=True, eq=False)
 class WheelAndRail:
-    """One wheel on one rail. rail : as it lies in the track, y from the middle of the track."""
+    """One wheel on one rail. rail : in its position in the track, y from the middle of the track."""
 
     wheel: ContactProfile
     rail: ContactProfile
@@ -160,7 +160,8 @@ def wheel_on_rail(
     track: Track | None = None,
     wheelset: Wheelset | None = None,
 ) -> list[TouchingPlace]:
-    """Touching places of the right wheel, the one that touches first, others by their gap while this is below 0.2 mm.
+    """Touching places of the right wheel: first the one in contact, then others with vertical gaps below 0.2 mm in
+    ascending order.
 
     wheel, rail : profiles; the rail upright, ``track.inclination`` turns it (0 for one that is measured as it lies).
     lateral_shift : of the wheelset to the right (m). yaw : rad. For the left wheel give both with the other sign.
@@ -236,7 +237,7 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[TouchingPlace]:
 def _touching_place(
     side: WheelAndRail, pose: Pose, points: Array, gap: Array, indices: tuple[int, int, int]
 ) -> TouchingPlace:
-    """One touching place, where the parabola through three gaps is least, and the distance around it."""
+    """One touching place, at the minimum of the parabola through three gaps, with the undeformed distance around it."""
     first, k, last = indices
     share = _parabola_minimum(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
@@ -274,7 +275,8 @@ def distance_over(
 
 
 def _rail_heights(rail: ContactProfile, contact_point: Array, angle: float) -> tuple[Array, Array]:
-    """The rail over its tangent plane: s along it and n into the rail (m), where s ascends around the place."""
+    """Coordinates (m) of the rail relative to its tangent plane: s along it and n into the rail, where s ascends around
+    the place."""
     y, z = rail.y - contact_point[1], rail.z - contact_point[2]
     s, n = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
     backward, here = np.flatnonzero(np.diff(s) <= 1e-9), int(np.argmin(np.abs(s)))

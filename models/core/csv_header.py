@@ -78,7 +78,7 @@ class Head:
 
 
 def heading(text: str) -> tuple[str, str]:
-    """Name and unit of one heading; the unit is the last pair of brackets, empty where there is none."""
+    """Name and unit in one heading; the unit is in the last pair of brackets, and is empty if there are none."""
     match = _HEADING.fullmatch(text)
     name, unit = match.groups("") if match else (text, "")
     return name.strip(), unit.strip()

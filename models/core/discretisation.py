@@ -77,7 +77,8 @@ def size_of(values: np.ndarray) -> float:
 
 
 def observed_order(fine: float, coarse: float, declared: float) -> float:
-    """Order by two differences of neighbouring runs, from LEAST_ORDER to the declared one."""
+    """Order of convergence from the differences between successive runs, limited to LEAST_ORDER up to the declared
+    order."""
     if not (fine > 0.0 and coarse > 0.0 and math.isfinite(fine) and math.isfinite(coarse)):
         return declared if fine == 0.0 else LEAST_ORDER
     return float(np.clip(math.log2(coarse / fine), LEAST_ORDER, declared))
@@ -237,8 +238,8 @@ def _whole_divisor(minimum: float) -> int:
 def of_tolerance(
     run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
 ) -> Result:
-    """The result of an adaptive method with the errors of its channels, by a run whose tolerance is ``factor`` times
-    as large: its error is taken to be larger by the power FALL of that only, so that what is told is rather too large.
+    """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
+    times as large. The error is assumed to grow only with the power FALL of the tolerance, so that it is overestimated.
     ``sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
@@ -344,8 +345,8 @@ def worst_of(run: Result) -> Estimate | None:
 
 
 def error_lines(run: Result) -> list[str]:
-    """Printed lines on a result's error: the worst channel of steps and of cells, the worst of both first, with a
-    warning and what to use where one is due; then what its theory and its sample leave."""
+    """Printed lines on a result's error. First the worst channels for the time step and for cells, the worse one first,
+    with a warning and advice if needed; then the errors of its theory and of its sample."""
     said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
     text = [f"error not estimated: {said['why']}"] if "why" in said else []
     shares = {name: estimate.share for name, estimate in sorted(told.items(), key=lambda entry: entry[1].share)}

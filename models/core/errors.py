@@ -65,7 +65,7 @@ def suggestion(name: object, choices: tuple[str, ...]) -> str:
 
 
 def similar_file(path: Path) -> str:
-    """Phrase that offers the file of the same kind in the same folder whose name is most like that of ``path``."""
+    """Phrase that offers the file with the most similar name among those of the same kind in the folder of ``path``."""
     try:
         stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
     except OSError:

@@ -26,7 +26,7 @@ _version = cache(version)
 
 
 class Channel(NamedTuple):
-    """An array with the names of its axes (one name, or one for each), its unit and its meaning."""
+    """An array with the names of its axes (one name, or one per axis), its unit and its meaning."""
 
     axes: str | tuple[str, ...]
     values: Any
@@ -77,7 +77,7 @@ class Result:
 
     @property
     def seconds(self) -> float:
-        """Seconds of the march; of a result that was read from a file there are none."""
+        """Computing time of the run (s); a result that was read from a file does not have it."""
         return float(self.data.attrs["seconds"])
 
     def save(self, path: Path | str) -> None:

@@ -156,7 +156,8 @@ def _first_sentence(file: Path) -> str:
 
 
 def module_of(system: str, name: str) -> Any:
-    """``Effect`` of a name; any other attribute is its file's own. Raises InputError for a file that is none."""
+    """The ``Effect`` with a name, from the system's table or from the effect's own file. Raises InputError for an
+    unknown name, or a file that lacks something."""
     if entry := _table(system).get(name):
         return _of_entry(entry)
     try:
@@ -176,7 +177,7 @@ def module_of(system: str, name: str) -> Any:
 
 
 def named_effects(scene: Any) -> tuple[str, ...]:
-    """Effects that a scene names; none that it could name by a table alone is imported to know it."""
+    """Effects that a scene names; effects that only a table can name are not imported for this."""
     there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
     there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
     return tuple(sorted(there))
@@ -207,7 +208,8 @@ def _is_in_own_tables(file: Path) -> bool:
 
 
 def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
-    """Parameters of every table [effects.NAME]; raises InputError for what is no effect or has another place."""
+    """Parameters of every table [effects.NAME]; raises InputError for an unknown effect, or for one that another key
+    names."""
     return {name: _read(name, values, system, file) for name, values in tables.items()}
 
 
@@ -375,7 +377,7 @@ def rebuilt(table: Table, scene: Any) -> Any:
 
 
 def lines(scene: Any, width: int = 10) -> list[str]:
-    """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
+    """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
     said = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
     return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]

@@ -58,7 +58,7 @@ class SceneFile(Strict):
                 raise InputError(self.file, key, value, allowed)
 
     def path(self, name: str, place: str = "") -> Path:
-        """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
+        """Path of a file that the scene names at ``place``: in the scene's folder, or else in the working folder."""
         return existing(name, Path(self.folder), self.file, place)
 
 
@@ -151,7 +151,7 @@ _WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 
 
 def _apply(table: dict[str, Any], change: str) -> None:
-    """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
+    """Set one nested key from KEY.KEY=VALUE; the value is parsed as TOML, and is text if that fails."""
     key, equals, text = (part.strip() for part in change.partition("="))
     if not equals or not all(key.split(".")):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
@@ -160,7 +160,7 @@ def _apply(table: dict[str, Any], change: str) -> None:
 
 
 def set_key(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set one nested key, as "run.step" or "manoeuvres.0.speed", to a plain value; None takes the key out.
+    """Set one nested key, such as "run.step" or "manoeuvres.0.speed", to a plain value; None removes the key.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
     """
@@ -176,7 +176,7 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
-    """The table or list that holds a nested key, made where there is none, and the key's place in it.
+    """The table or list that holds a nested key, created if missing, and the key or index within it.
 
     value, file : what a message shows as offending, and where it was written.
     """

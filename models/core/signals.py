@@ -98,7 +98,8 @@ class Sampled:
         return interpolate(self.values, index, part)
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (channels,): the bits of ``sample``, by scalars, as solvers ask one by one."""
+        """Values at one time (s), shape (channels,), identical to those of ``sample`` but faster for the single times
+        that solvers need."""
         position, last = time / self.period, len(self.values) - 1
         nearest = round(position)
         snapped = nearest if abs(position - nearest) < SNAP else position

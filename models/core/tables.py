@@ -99,7 +99,7 @@ def read_table(
 
 
 def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
-    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
+    """Write columns name -> (unit, values) with all digits, so that reading returns identical numbers."""
     names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
     line = ",".join(["%.17g"] * len(names)) + "\n"
     rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
@@ -107,7 +107,7 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
 
 
 def whole_text(path: str | Path) -> str:
-    """Whole text of a file; whatever prevents reading it is the user's to repair."""
+    """Whole text of a file; InputError for anything that prevents reading it."""
     try:
         data = Path(path).read_bytes()
         return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
@@ -184,7 +184,7 @@ def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tup
 
 
 def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
-    """Name and factor to SI of one heading such as ``left [mm]``."""
+    """Name and factor to SI of one column heading, such as ``left [mm]``."""
     match = _HEADING.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
     if name not in columns:

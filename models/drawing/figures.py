@@ -110,8 +110,8 @@ def heading(figure: Figure, title: str, results: Results | None = None) -> None:
 
 
 def drawing(size: tuple[float, float] | None = None) -> Figure:
-    """An empty figure of so many inches, or of matplotlib's size: without pyplot, which takes longer to import than
-    most figures take to draw and keeps each until it is closed."""
+    """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
+    import and keeps every figure until it is closed."""
     figure = Figure(figsize=size)
     FigureCanvasAgg(figure)
     return figure
@@ -136,7 +136,7 @@ def subplot_mosaic(
 def panels(
     count: int, across: int, height: float, wide: float = COLUMN_WIDTH, **more: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of so many panels, ``across`` of them beside each other, each so many inches high; no place is empty.
+    """A figure of ``count`` panels without empty places, ``across`` of them side by side, each ``height`` inches high.
 
     more : as for ``subplots``; panels that share an axis show its numbers once.
     """

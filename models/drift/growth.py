@@ -80,7 +80,8 @@ def rigid_pitch(p: Parameters) -> RigidPitch:
 
 
 def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
-    """Part of ``values`` (n,) above ``cutoff`` (Hz), without delay, by the gain x^4 / (1 + x^4) at x = f / cutoff.
+    """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
+    cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
     mirror image, for a period of the cut-off where it is that long.

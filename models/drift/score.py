@@ -175,7 +175,7 @@ def verdict(figures: RunFigures, deviations: Errors, effects: Iterable[str], lim
 
 
 def consistent(run: Result) -> bool | None:
-    """Whether the Kalman filter of a run was as surprised by its measurement as it expected; None without one.
+    """Whether the innovations of a run's Kalman filter are as large as the filter expects; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
     CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.

@@ -73,7 +73,7 @@ class PathJob(Protocol):
 
 
 class PathFailed(RuntimeError):
-    """A path that could not be computed, by its number; a job raises it, so that the message can name the path."""
+    """A path that could not be computed, with its number; jobs raise it so that the message can name the path."""
 
     def __init__(self, path: int, reason: str) -> None:
         super().__init__(path, reason)
@@ -152,7 +152,8 @@ def run_paths(
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
-    """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
+    """Arrays of all paths 0 to ``paths`` - 1; bitwise the same on any executor, in any order and after any
+    interruption.
 
     The arguments are those of ``each_block``.
     """
@@ -169,7 +170,8 @@ def each_block(
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
-    """Arrays of the blocks of paths 0 to ``paths`` - 1, in their order, each as soon as those before it are there.
+    """Arrays of the blocks of paths 0 to ``paths`` - 1, in order; each is given as soon as all earlier ones are
+    finished.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool

@@ -36,7 +36,7 @@ class Counted:
 
 
 def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Counted:
-    """Count a load (n,); raises InputError for one without a sample, or with one that is not finite."""
+    """``Counted`` of a load (n,); raises InputError for an empty load, or one that is not finite."""
     load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = cycles(turns)

@@ -25,8 +25,8 @@ class ErrorModel:
 
 
 def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
-    """From residuals (n,) of predictions (n,), best of stretches that took no part in the fit: their squares against
-    those of the prediction, neither part below 0."""
+    """Error model fitted to residuals (n,) of predictions (n,), preferably from stretches that were not used in the
+    fit. Squared residuals are regressed on squared predictions, with both coefficients at least 0."""
     from scipy.optimize import nnls
 
     squares = np.column_stack([np.ones(len(predicted)), predicted**2])

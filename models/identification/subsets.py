@@ -146,7 +146,8 @@ def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subs
 def chosen(
     deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
 ) -> Choice:
-    """Every subset of the candidates fitted and judged; together : sets by name that are left out as a whole, too."""
+    """Fits of every subset of the candidates, ranked; together : named sets of candidates whose joint removal is
+    tested, too."""
     everything = fit_all(deviations, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
     told = [name for name in candidates if name not in blind]

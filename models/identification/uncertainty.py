@@ -161,8 +161,8 @@ def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
-    """values (k,) of one parameter, and by how much the misfit rises there, the others fitted anew: (k,) in units of
-    which 3.84 is the limit of 95 %; ``parabola`` (k,) : what the standard error says."""
+    """Profile of one parameter: its values (k,), and the rise of the misfit (k,) at each after all other parameters are
+    refitted, in units in which 3.84 is the 95 % limit; ``parabola`` (k,) : the rise according to the standard error."""
 
     name: str
     values: np.ndarray

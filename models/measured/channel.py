@@ -55,7 +55,7 @@ class Source(Protocol):
 
     @property
     def start(self) -> datetime | None:
-        """Date and time at time 0, with its zone; None where the file does not give it."""
+        """Date and time at time 0, with time zone; None where the file does not give them."""
 
     @property
     def comment(self) -> str:

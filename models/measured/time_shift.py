@@ -28,8 +28,8 @@ class ChannelPair:
 
 @dataclass(frozen=True)
 class Shift:
-    """seconds : what the measurement's clock shows at the run's time 0; correlation : of both then, the mean over the
-    channels that move, 1 at best, NaN where none moves and the shift is 0."""
+    """Time shift between run and measurement. seconds : time on the measurement's clock at the run's time 0;
+    correlation : mean at this shift over the channels that move, at best 1, NaN where none moves and the shift is 0."""
 
     seconds: float
     correlation: float

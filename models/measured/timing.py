@@ -175,11 +175,11 @@ def _step(times: np.ndarray, rising: np.ndarray) -> float:
 
 
 def rounded(times: np.ndarray) -> tuple[float, float] | None:
-    """Start and period (s) of an even clock whose times (n,) were rounded so coarsely that some repeat themselves, or
-    that the clock seems to jitter; None where rounding is fine, or where no even clock explains the times.
+    """Start and period (s) of an even clock whose times (n,) were rounded coarsely, so that some repeat or the clock
+    seems to jitter; None if the rounding is fine, or no even clock explains the times.
 
-    Rounding, up or down or to the nearest, moves a time by less than the spacing of rounded ones. So all times less
-    those of the clock lie in a band that wide, which few clocks fit: with the fewest digits of its rate it is taken.
+    Rounding moves a time by less than the spacing of rounded times. The differences from the right clock therefore lie
+    in a band of that width, and few clocks satisfy this. The one whose rate has the fewest digits is taken.
     """
     width, count = _spacing(times), np.arange(len(times))
     if width is None:

@@ -67,7 +67,7 @@ class Joints:
 
 
 def joints(vehicle: CutVehicle) -> Joints:
-    """Joints in the order of the coordinates; those of one body share the place of the first."""
+    """Joints in the order of the coordinates; all joints of a body have the same position, that of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
     anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])

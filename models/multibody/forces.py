@@ -118,7 +118,8 @@ force of its load, velocity of its centre (3 each)."""
 
 @lean
 def control(numbers, first, which, count, t):
-    """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
+    """Value and rate of a control at a time (s). Its rate is 0 at every knot; between knots it follows the smoothest
+    polynomial of degree 5."""
     knots = numbers[first + 2 * which * count :]
     if t <= knots[0]:
         return knots[count], 0.0

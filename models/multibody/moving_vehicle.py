@@ -68,7 +68,7 @@ def carrier_frame(q, v):
 
 @lean
 def carried_velocity(frame, place):
-    """Velocity (m/s) that the carrier gives a point at a place (m), both in its axes."""
+    """Velocity (m/s), by the carrier's motion, of a point at a position (m), both in the carrier's axes."""
     return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
 
 

@@ -56,8 +56,8 @@ class Controls:
 
 @dataclass(frozen=True)
 class Push:
-    """A force from outside, as of wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up as the
-    vehicle heads, however it leans; at ``point`` (m) of a body, in the design position."""
+    """An external force, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up. The
+    axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
 
     body: str
     point: Vector

@@ -117,7 +117,7 @@ class _Reader:
             self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
 
     def _check_gravity(self) -> None:
-        """Refuse gravity along another direction than down; tell another one than that of scenes."""
+        """Refuse gravity that does not act downwards; add a note if it differs from that of scenes."""
         gravity, name = np.array(self.model.opt.gravity), "option gravity"
         if np.any(gravity[:2]) or gravity[2] > 0.0:
             self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")

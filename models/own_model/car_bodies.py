@@ -34,9 +34,9 @@ class Mass(NamedTuple):
 
 @dataclass(frozen=True)
 class CarBodies:
-    """bodies : parents before their riders; chassis : its name; of : name of the body that a body of the file is one
-    with; coordinates : of the suspension's joints, with the sign of their axes; spin : of every wheel that spins, by
-    the name of its tyre, kg m^2 about its axle."""
+    """Bodies of the car. bodies : parents before children; chassis : its name; of : for each body of the file, the name
+    of the body that contains it; coordinates : of the suspension's joints, with the sign of their axes; spin : inertia
+    about the axle (kg m^2) of every spinning wheel, by the name of its tyre."""
 
     bodies: tuple[Body, ...]
     chassis: str

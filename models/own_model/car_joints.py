@@ -71,7 +71,7 @@ def told(model: mujoco.MjModel, document: Document, joint: int) -> str:
 
 
 def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[int, ...]:
-    """Bodies from the ground to the one that has all six freedoms; those before it have next to no mass."""
+    """Bodies from the ground to the one that completes all six freedoms; those before it are almost massless."""
     numbers, name = moving(model), document.path.name
     roots = [b for b in numbers if int(model.body_parentid[b]) not in numbers]
     if len(roots) > 1:

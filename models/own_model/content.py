@@ -37,7 +37,8 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Content:
-    """kind : as ``--without`` names it; names : of what it is, with "FILE:LINE" where known; why : no equal."""
+    """Content of a file that needs attention. kind : its name for ``--without``; names : of the elements concerned,
+    with "FILE:LINE" where known; why : reason why other builds cannot represent it."""
 
     kind: str
     names: tuple[str, ...]

@@ -58,7 +58,8 @@ def constant_leg(twin: TwinModel, steps: int) -> list[Leg]:
 
 
 def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
-    """Read a CSV with columns ``time [s]`` and one for each actuator, by name (``actuator 3`` where it has none).
+    """Read a CSV file with columns ``time [s]`` and one per actuator, called by its name (``actuator 3`` if it has
+    none).
 
     Raises InputError for what ``read_table`` refuses, a first time that is not 0, and a control out of its range.
     """

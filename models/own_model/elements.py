@@ -111,8 +111,8 @@ def elements(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write an element's value into a model for ``described``; KeyError where it has no such element, ValueError where
-    this one cannot have that value."""
+    """Write a value of an element into a model for ``described``; KeyError if the model has no such element, ValueError
+    if the element cannot have this value."""
     kind, number = _place(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")
@@ -191,7 +191,7 @@ def _of_freedoms(field: str) -> tuple[Callable, Callable]:
 
 
 def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """Where a joint's spring is at rest, from the design position; nothing where there is no spring."""
+    """Rest position of a joint's spring relative to the design position; empty if there is no spring."""
     at = int(model.jnt_qposadr[j])
     several = int(model.jnt_type[j]) in (BALL, FREE)
     return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]

@@ -59,8 +59,8 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two files: how far their accelerations are apart, elements that differ with the most influential first, how far
-    they are apart when all of these are taken over, and what has no partner in the other file."""
+    """Comparison of two files: agreement of their accelerations; different elements, the most influential first; the
+    remaining disagreement when all of these are taken over; and coordinates that only one file has."""
 
     apart: Agreement | None
     differences: tuple[Difference, ...]
@@ -90,7 +90,7 @@ class Comparison:
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
     def rest(self) -> str:
-        """What is left when all elements are taken over that can be."""
+        """Text on the disagreement that remains when all possible elements are taken over."""
         if self.unexplained <= ALIKE:
             return f"with these taken over, both move alike: {short(self.unexplained)} is left"
         untried = any(each.influence is None for each in self.influential)
@@ -135,8 +135,8 @@ class _Trial:
     base: Reference
 
     def influence(self, model: mujoco.MjModel) -> float | None:
-        """Largest relative change by a changed model: of accelerations, or of the mass matrix where these stay; None
-        where it cannot be built."""
+        """Largest relative change that a changed model causes in accelerations, or in the mass matrix if these do not
+        change; None if it cannot be built."""
         try:
             change = agreement("", self.base, self.moved(model))
             return change.acceleration if change.acceleration > STILL else change.mass
@@ -201,7 +201,8 @@ def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
 
 
 def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
-    """Elements that differ; trials : of the first and of the second file, None where there are no common states."""
+    """Elements that differ between the files; trials : one for the first and one for the second file, None if they have
+    no common states."""
     rows, listed, others = list[Difference](), elements(first.model), elements(second.model)
     rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):

@@ -13,7 +13,7 @@ CONSTRAINTS = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon or actuator of a file; its number where it has none."""
+    """Name of a joint, body, tendon or actuator of a file; its number if it has no name."""
     name: str = getattr(model, kind)(number).name
     return f"{kind} {name!r}" if name else f"{kind} {number}"
 

@@ -155,7 +155,8 @@ def blown_up(path: np.ndarray) -> bool:
 
 
 def path_by(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
-    """States (steps + 1, 2 n) of a build from coordinates and rates (n,), leg by leg, by steps of so many seconds."""
+    """States (steps + 1, 2 n) of a build, integrated from coordinates and rates (n,) section by section, with ``step``
+    seconds per step."""
     path = np.concatenate(start)[None]
     for leg in legs:
         q, v = np.split(path[-1], 2)
@@ -179,8 +180,8 @@ def file_path(
     integrator: str = "RK4",
     held: np.ndarray | None = None,
 ) -> np.ndarray:
-    """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), by so many steps of
-    so many seconds; held : controls (steps, nu), constant without."""
+    """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), over the number and
+    size of steps in ``grid``; held : controls (steps, nu), constant if not given."""
     (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
@@ -210,7 +211,8 @@ def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
 
 
 def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
-    """How many states of a path lie before it strikes a limit, and whose; less one whose step may have met it."""
+    """Number of states of a path before it reaches a joint limit, and the joint's name; one less, since the step before
+    may already be affected."""
     struck = limits_struck(twin) if ranges(twin.model) else lambda q: ()
     for i, row in enumerate(path):
         if names := struck(row[: twin.size]):

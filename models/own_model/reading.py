@@ -147,7 +147,7 @@ def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
 
 
 def is_line(model: mujoco.MjModel, tendon: int) -> bool:
-    """Whether a tendon goes straight from one site to another."""
+    """Whether a tendon runs straight from one site to another."""
     first, site = int(model.tendon_adr[tendon]), mujoco.mjtWrap.mjWRAP_SITE
     return bool(model.tendon_num[tendon] == 2 and (model.wrap_type[first : first + 2] == site).all())
 

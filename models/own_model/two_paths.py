@@ -15,8 +15,9 @@ from models.own_model.states import random_states
 
 @dataclass(frozen=True)
 class PathGap:
-    """horizon : until when (s) paths are compared, as of ``PathReport``; distance : largest difference of a coordinate
-    or rate up to there, by the largest of the first file, at least 1; worst : whose; failed : why there is none."""
+    """Difference of two files' paths. horizon : time (s) up to which paths are compared, as in ``PathReport``; distance
+    : largest difference of a coordinate or rate, relative to the largest value in the first file, at least 1; worst :
+    which coordinate; failed : why there is no comparison."""
 
     horizon: float
     distance: float

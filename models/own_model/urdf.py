@@ -39,7 +39,7 @@ class Misread:
 
 @dataclass
 class _Link:
-    """A link in the design position: its place and axes, the moving link that it is fixed to, and its joint."""
+    """A link in the design position: its position and axes, the moving link to which it is fixed, and its joint."""
 
     place: np.ndarray
     axes: np.ndarray
@@ -112,7 +112,7 @@ def _same(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
 
 
 def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """Links by name in the design position, and anchors and axes in space of the hinges and slides by name."""
+    """Links by name in the design position; for hinges and slides by name, anchors and axes in space."""
     joints = list(root.iter("joint"))
     children = {_end(joint, "child") for joint in joints}
     links = {

@@ -23,7 +23,7 @@ PLUGINS = ("plugin", "extension")
 
 @dataclass(frozen=True)
 class XmlElement:
-    """tag, attributes, and where it stands: file, line, and the tags around it, outermost first."""
+    """An element: tag, attributes, and its location: file, line, and the enclosing tags, outermost first."""
 
     tag: str
     attributes: dict[str, str]
@@ -81,8 +81,8 @@ class _Reader:
 
 
 class _Folders(NamedTuple):
-    """allowed : nothing may lie outside of it; base : where MuJoCo looks for what is included: the folder of the model
-    file, not of the file that includes; an attached model has its own."""
+    """Folders of included files. allowed : folder that must contain all of them; base : folder in which MuJoCo looks
+    for them, that of the model file, not of the including file; an attached model has its own."""
 
     allowed: Path
     base: Path
@@ -120,7 +120,7 @@ def _read(path: Path, folders: _Folders, elements: list[XmlElement], depth: int)
 
 
 def _include(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
-    """Read what an element includes or attaches, unless it lies outside."""
+    """Read a file that an element includes or attaches; InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
     target = (folders.base / name).resolve()
     if not target.is_relative_to(folders.allowed):

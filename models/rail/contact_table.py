@@ -122,7 +122,8 @@ class WheelsetPlacement:
 
 @dataclass(frozen=True, eq=False)
 class LoadedWheel:
-    """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
+    """One wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
+    wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
     known. approach : vertical (m). lifted : vertical part of the creep forces, upwards on the rail (N). normal : that
@@ -190,7 +191,7 @@ class WheelsetContact:
         return _standing(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
 
     def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
-        """The right wheel, and the left one in its mirror, each lowered until it touches and pressed on its rail.
+        """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """

@@ -47,8 +47,8 @@ def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) ->
 
 
 def hunting(values: np.ndarray) -> np.ndarray:
-    """The hunting mode: of eigenvalues (..., 9) the least damped with an imaginary part above 0; NaN if there is
-    none."""
+    """Eigenvalue of the hunting mode: among eigenvalues (..., 9) with positive imaginary part, the least damped one;
+    NaN if there is none."""
     oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
     root = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
     return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

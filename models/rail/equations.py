@@ -67,9 +67,9 @@ Along = tuple[float, float, float]
 
 
 class Body(NamedTuple):
-    """The body and its suspension (SI): inertia along and across the axle; half spacing, springs and dampers of one
-    side, weight that each side carries, height at which the springs bear no more than that; lean of the track; whether
-    there is a spring or a damper."""
+    """The wheelset's body and suspension (SI): inertia along and across the axle; half spacing of the springs, springs
+    and dampers of one side, weight on each side, height at which the springs carry exactly that weight; lean of the
+    track; whether there is a spring or a damper."""
 
     mass: float
     along: float

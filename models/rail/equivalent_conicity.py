@@ -241,7 +241,8 @@ def harmonic_linearised_conicity(
 
 @dataclass(frozen=True)
 class ConicityRow:
-    """Equivalent conicity at one amplitude (m), by the standard and by the first harmonic, and the wave's centre (m).
+    """Equivalent conicity at one amplitude (m), according to the standard and to the first harmonic, and the wave's
+    centre (m).
 
     spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
     such wave.

@@ -67,11 +67,11 @@ LARGEST_AMPLITUDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One periodic motion. state (10,) : at its maximum of y; period : s, of so many steps.
+    """One periodic motion. state (10,) : at a maximum of y; period : s, with the number of steps in it.
 
-    slopes (9, 11) : of the state after a period, the angle of spin left out, by the state before, the speed and the
-    period, by SIZES, 1 m/s and the period. error : change of the unknown by halving the step, frequency_error : Hz;
-    both NaN where it was not halved.
+    slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the state
+    before, the speed and the period, in units of SIZES, 1 m/s and the period. error : change of the unknown when the
+    step is halved, frequency_error : Hz; both NaN where the step was not halved.
     """
 
     equations: Equations
@@ -267,7 +267,7 @@ def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
 def attained(
     equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
-    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None where it dies out.
+    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None if the motion dies out.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.

@@ -124,7 +124,7 @@ def rolling_radii_of(
     displacements: Array,
     report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
-    """The table of two wheels on their rails; the left one is described as a right one seen in a mirror.
+    """Rolling radius table of two wheels on their rails; the left wheel is described as a mirrored right one.
 
     displacements : (n,) m, rising. Those at the ends at which not both wheels touch are left out. told : called with
     the share that is done. Raises InputError where fewer than three are left.

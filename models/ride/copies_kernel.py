@@ -26,8 +26,8 @@ class Curves(NamedTuple):
 
 
 class PushingTyres(NamedTuple):
-    """Tyres that only push: wheel (u,) of each among those on the road, load at rest (u,) in N, stiffness (u,) in N/m,
-    damping (u,) in N s/m, heights (u, n): rise of each by the coordinates."""
+    """Tyres that only push: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping (u,)
+    in N s/m, heights (u, n): rise of the wheel per coordinate."""
 
     wheel: np.ndarray
     load: np.ndarray
@@ -162,7 +162,8 @@ def states_ahead(x, time, rate, moved):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def march(states, roads, step, first, every, laws, sums):
-    """Step copies (s) by the classical Runge-Kutta method, and add up powers of their outputs on the way.
+    """Advance the copies by steps (s) of the classical Runge-Kutta method, and sum up powers of their outputs on the
+    way.
 
     states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; sums (4, p, copies) gain
     the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.

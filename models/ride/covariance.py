@@ -47,7 +47,7 @@ class StationaryCovariance:
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (p,) of the outputs, inf where there is none."""
+        """Standard deviations (p,) of the outputs, inf where an output has no finite variance."""
         return np.sqrt(self.variance)
 
 

@@ -153,7 +153,8 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 def _halve_panels(
     over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
+    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most ``limit``
+    (p,)."""
     variance, error = np.zeros_like(limit), np.zeros_like(limit)
     taken, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):

@@ -72,7 +72,8 @@ class MarginalParts:
 
 
 def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
-    """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable, InputError where it cannot be told.
+    """Marginal and stable part of x' = A x + u, with A (n, n); raises Unstable, or InputError where they cannot be
+    separated.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """

@@ -42,7 +42,8 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class VarianceEstimate:
-    """Variances of outputs over the copies: time (N,), s; variance, error (N, p), unit^2, inf where there is none.
+    """Variances of outputs estimated from the copies: time (N,), s; variance, error (N, p), unit^2, inf where a
+    variance is infinite.
 
     ``error`` is the standard error. The mean is known to be zero.
     """

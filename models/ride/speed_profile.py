@@ -50,7 +50,7 @@ class SpeedProfile:
         return self.paths[piece] + since * (self.speeds[piece] + acceleration * since / 2.0)
 
     def time(self, path: np.ndarray | float) -> np.ndarray:
-        """Time (s) at which a place (m) is passed; minus or plus infinity for a place never passed.
+        """Time (s) at which a position (m) is passed; minus or plus infinity if it never is.
 
         At a place of standstill: the time of arrival.
         """

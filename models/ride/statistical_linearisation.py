@@ -45,7 +45,8 @@ HARMONIC = 2.0
 
 @dataclass(frozen=True)
 class BentSpring:
-    """A spring with curves or friction as it moves: gains (N/m, N s/m) that stand for it, mean travel (m) and force.
+    """A nonlinear spring (curves or friction) in motion: its equivalent gains (N/m, N s/m), mean travel (m) and mean
+    force.
 
     deviation, rate : standard deviations of travel (m) and its rate (m/s). ``force``: mean force less the preload (N).
     ``left_out``: share of the variance of its force that the gains leave out.
@@ -79,7 +80,7 @@ class StatisticallyLinear:
 
     @property
     def contraction(self) -> float:
-        """Factor by which changes shrank from one iteration to the next, the worst while they were above rounding."""
+        """Largest ratio of a change to the change one iteration before, among changes above rounding."""
         seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * GAIN_TOLERANCE]
         return max(seen[len(seen) // 2 :], default=0.0)
 
@@ -289,7 +290,7 @@ def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> Lin
 
 
 def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
-    """Largest change of a gain, by the gain or, where that is next to nothing, by the largest of its kind."""
+    """Largest relative change of a gain; a very small gain is related to the largest gain of its kind instead."""
     size = np.maximum(abs(wanted), 1e-6 * abs(wanted).max(axis=0, initial=np.finfo(float).tiny))
     return float((abs(wanted - gains) / size).max(initial=0.0))
 

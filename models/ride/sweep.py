@@ -30,9 +30,10 @@ LOSS = 1e-9
 
 @dataclass(frozen=True)
 class Sweep:
-    """variance (cases, speeds, outputs), inf where there is none, with status and reason for each; units (outputs,).
+    """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
+    units (outputs,).
 
-    ``direct``: how many of the points went the direct way, by the reason for which the fast one was not taken.
+    ``direct``: number of points computed by the direct method, by the reason for not using the fast one.
     """
 
     cases: tuple[str, ...]
@@ -134,8 +135,8 @@ class Modes:
 
 
 def modes(A: np.ndarray) -> Modes:
-    """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled parts, so that equal parts stay exactly
-    equal."""
+    """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled blocks, so that equal blocks give exactly
+    equal results."""
     count, label = connected_components(A != 0, directed=False)
     values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
     worst = 1.0
@@ -170,7 +171,8 @@ class Shared:
 
 @dataclass(frozen=True)
 class Modal:
-    """Per output (p,): variance, ``floor`` that rounding makes of zero, and ``relative_error`` that may be left.
+    """Results per output (p,): variance, ``floor`` that rounding makes of a zero variance, and bound
+    ``relative_error``.
 
     fastest : rate of the system in 1/s
     """

@@ -54,7 +54,7 @@ class VaryingSpeed:
     P: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """Standard deviation (N,) of one output; raises InputError if there is none of that name."""
+        """Standard deviation (N,) of one output; raises InputError for an unknown name."""
         if name not in self.names:
             raise InputError("", "output", name, "must be an output of the vehicle", self.names)
         return self.deviation[:, self.names.index(name)]

@@ -107,7 +107,7 @@ def read_tracks(
 
 
 def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
-    """Densities by Welch's method; ``window_length`` in m, by default such that eight windows fit.
+    """Spectral densities by Welch's method; ``window_length`` in m, by default so that eight windows fit.
 
     Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
     """

@@ -35,7 +35,8 @@ def random_walk(deviation: float, rate: float) -> float:
 def measured_attitude(
     rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range, seed: int = 0
 ) -> np.ndarray:
-    """Quaternions (n + 1, paths, 4) that noisy rates give, held over each period and integrated by exact rotations.
+    """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are held over each period and integrated by
+    exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
@@ -50,7 +51,8 @@ def true_attitude(rates: np.ndarray, period: float, start: np.ndarray) -> np.nda
 
 
 def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) of E = S~ S^T: what turns the true attitude into the measured one, in global components."""
+    """Quaternions (..., 4) of the error E = S~ S^T, the rotation from the true to the measured attitude, in global
+    components."""
     return product(measured, conjugate(true))
 
 

@@ -55,7 +55,7 @@ class Quality:
 
     @property
     def rigid(self) -> bool | None:
-        """Whether the body passes for rigid; None where no equation is left over to tell."""
+        """Whether the readings agree with a rigid body; None if no redundant equation can check it."""
         if self.redundancy == 0:
             return None
         return self.share <= LIMIT or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected

@@ -115,7 +115,7 @@ class TyreTable:
         return mu_x[:, 0, :], g * h
 
     def figures(self, load: float) -> dict[str, float]:
-        """The main figures of a tyre under one load (N), by name and unit."""
+        """Characteristic values of a tyre under one load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
         return {

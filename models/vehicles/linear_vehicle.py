@@ -9,7 +9,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class WheelPosition:
-    """Where a wheel meets the road: x (m) forward, y (m) to the left, and its axle, 0 the frontmost."""
+    """Position of a wheel on the road: x (m) forward, y (m) to the left, and the number of its axle, 0 the
+    frontmost."""
 
     name: str
     x: float
@@ -37,7 +38,7 @@ class Output:
 
 
 class OutputRows(NamedTuple):
-    """Rows of all outputs' matrices, as ``Output`` has them of one output: (p, n), those by the road (p, w)."""
+    """Factors of all outputs as matrices, each row one ``Output``: (p, n), and (p, w) for those of the road."""
 
     acceleration_factors: np.ndarray
     rate_factors: np.ndarray

@@ -58,7 +58,7 @@ def tyres(y, u, p):
 
 @register_jitable
 def pushing_tyres(y, u, p):
-    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). What is not a number stays so."""
+    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). NaN in the states gives NaN."""
     e1, e2 = y[0] - u[0], y[1] - u[1]
     f1 = max(min(p[6] * e1 + p[10] * (y[4] - u[2]), 2.0 * p[6] * e1), 0.0)
     f2 = max(min(p[7] * e2 + p[11] * (y[5] - u[3]), 2.0 * p[7] * e2), 0.0)

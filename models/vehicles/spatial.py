@@ -332,7 +332,7 @@ class SpatialVehicle:
 
     @property
     def lifts(self) -> bool:
-        """Whether any tyre may leave the road."""
+        """Whether at least one tyre may leave the road."""
         return any(tyre.pushes_only for tyre in self.tyres)
 
     def with_tyres(self, pushes_only: bool) -> "SpatialVehicle":
@@ -348,7 +348,7 @@ class SpatialVehicle:
         )
 
     def body(self, name: str) -> Body:
-        """The body of that name; KeyError if there is none."""
+        """The body with a given name; KeyError if there is none."""
         return {body.name: body for body in self.bodies}[name]
 
     def chain(self, name: str | None) -> tuple[str, ...]:

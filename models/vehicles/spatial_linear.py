@@ -55,14 +55,14 @@ class Kinematics:
         self._shifts = _shifts_of(tuple(bodies))
 
     def coordinate(self, body: str, freedom: str) -> np.ndarray:
-        """Row (n,) that picks one coordinate out of q, zeros where the body does not have it."""
+        """Row (n,) that selects one coordinate from q; zeros if the body does not have it."""
         row = np.zeros(self.size)
         if (body, freedom) in self._index:
             row[self._index[body, freedom]] = 1.0  # type: ignore[index]
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n): displacement of a point (m) by the coordinates, read-only; zeros on the ground, None."""
+        """Displacement (3, n) of a point (m) per coordinate, read-only; zeros on the ground, None."""
         x, y, z = point
         place = body, (x, y, z)
         if place not in self._shifts:
@@ -78,7 +78,7 @@ class Kinematics:
         return columns
 
     def turn(self, body: str) -> np.ndarray:
-        """(3, n): small rotation of a body (rad) by the coordinates."""
+        """Small rotation (3, n) of a body (rad) per coordinate."""
         columns = np.zeros((3, self.size))
         for _, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
@@ -87,7 +87,7 @@ class Kinematics:
         return columns
 
     def bend(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n, n): second derivatives of a point (m) by the coordinates."""
+        """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
         first = self.shift(body, point)
         second = np.zeros((3, self.size, self.size))
         motions = self._motions(body)

@@ -102,7 +102,7 @@ class Suspension:
         return TyreContact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
 
     def _load(self, i: int, hub: np.ndarray) -> float:
-        """Load (N) of a tyre that never pulls, neither by its spring nor by its damper."""
+        """Load (N) of a tyre whose spring and damper together never pull."""
         tyre = self.tyres[i]
         elastic = self.loads[i] - tyre.stiffness * (hub[PLACE, 2] - tyre.point[2])
         return float(max(elastic - tyre.damping * hub[RATE, 2], 0.0)) if elastic > 0.0 else 0.0

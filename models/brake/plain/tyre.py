@@ -69,9 +69,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class WheelMotion:
-    """Motion of a wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds
-    along and across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those
-    at it."""
+    """Motion of a wheel's centre: speed along the wheel at the start of a step and its mean rate of change (m/s,
+    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``regular`` (m/s) that
+    replaces lower ones."""
 
     start: float
     rate: float

@@ -20,7 +20,8 @@ LOCKED = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """Tyre force by slip: slips (s,) from 0 to 1 and forces (s,) in N there; odd in the slip."""
+    """Tyre force as a function of slip: slips (s,) from 0 to 1, and the forces (s,) in N at these; the force is odd in
+    the slip."""
 
     slips: np.ndarray
     forces: np.ndarray

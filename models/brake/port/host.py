@@ -24,7 +24,7 @@ HEAD = struct.Struct("<4sI")
 
 
 class Guest(NamedTuple):
-    """The controller that a process of its own is to make: name "module:Name" or "file.py:Name" of a callable, or else
+    """Description of a controller that a separate process creates: "module:Name" or "file.py:Name" of a callable, or
     the path of an FMU.
 
     folder : of the callable's path, or to which the FMU is unpacked; wheels : their number; sample : s; parameters : of

@@ -75,10 +75,9 @@ class PortTable(Strict):
 
 @dataclass(frozen=True)
 class ControllerRun:
-    """Facts of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
-    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
-    slow: whether valves can apply slowly.
-    """
+    """Data of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, which identifies
+    logs; folder: from which paths start; file: name of the scene, for messages; procedure, engine: names that file
+    names may contain; slow: whether valves can apply slowly."""
 
     radius: np.ndarray
     sample: float

@@ -98,7 +98,7 @@ def _received_bytes(received: bytes) -> str:
 
 @contextmanager
 def listening(address: int = 0) -> Iterator[socket.socket]:
-    """A socket that waits for a controller at a port of this machine, any free one if 0; raises InputError."""
+    """A socket that waits for a controller at a port of this machine (0 for any free port); raises InputError."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

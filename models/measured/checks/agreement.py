@@ -49,11 +49,12 @@ class SignalGroup:
 
 @dataclass(frozen=True)
 class MeasurementFault:
-    """late : size in s; factor : recorded by true value; swapped, of hubs, and crossed, of two channels : size is the
-    share that is explained only then; lever : size in m by which the point that moments are about lies above the hub.
+    """One fault. late : size in s; factor : size is the ratio of recorded to true value; swapped (hubs) and crossed
+    (two channels) : size is the share that only the exchange explains; lever : size is the height (m) above the hub of
+    the point to which moments refer.
 
-    error : standard error of the size, of random errors alone; of swapped and crossed the share that is left when they
-    are put right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
+    error : standard error of the size from random errors alone; for swapped and crossed, the unexplained share after
+    correction. fall : decrease of chi square. exchanged : hubs, each with the one whose channels it has.
     """
 
     kind: Kind

@@ -24,9 +24,10 @@ INERTIAL = ("acceleration", "angular rate", "angle")
 
 @dataclass(frozen=True)
 class Evidence:
-    """places : of accelerometers and gyros by name; claimed : white noise (SI) that is stated, by name of signal.
+    """Data on which the checks work. places : of accelerometers and gyros by name; claimed : stated white noise (SI),
+    by name of signal.
 
-    plane : of the pitch-plane vehicle, where the recording drives that and no vehicle in space.
+    plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
     """
 
     recording: Recording
@@ -53,7 +54,7 @@ class Evidence:
         return {s.at: s for s in self.forces if s.quantity == "force" and s.component == "z"}
 
     def place(self, signal: Signal) -> TransducerPlace | None:
-        """Where a signal is measured; None where neither the scene nor the vehicle says."""
+        """Position at which a signal is measured; None where neither the scene nor the vehicle gives it."""
         if signal.at in self.places or self.vehicle is None:
             return self.places.get(signal.at)
         bodies = {body.name: body for body in self.vehicle.uncut.bodies}

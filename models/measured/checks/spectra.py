@@ -46,8 +46,8 @@ class Spectra:
 def spectra(
     recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
 ) -> Spectra | None:
-    """Cross spectra in a band (Hz), in SI units squared by window sums squared; None where too little is unbroken, or
-    the band has no line.
+    """Cross spectra in a band (Hz), in SI units squared by window sums squared; None if too few segments are complete,
+    or if the band contains no frequency line.
 
     stretch : first sample and number of samples that are looked at; else all.
     """

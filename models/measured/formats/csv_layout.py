@@ -157,7 +157,7 @@ def read_first_lines(path: Path) -> Top:
 
 
 def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
-    """Whole lines of text, until one that holds a zero character or has no end."""
+    """Complete lines of text, up to the first one that contains a zero character or has no line end."""
     size = top.unit.itemsize
     ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
     for number, end in enumerate(ends[:FIRST_ROWS_LINES].tolist(), start=1):
@@ -331,7 +331,7 @@ def _is_text(cells: list[str]) -> bool:
 
 
 def find_units(path: Path, top: Top, header: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
-    """Units of the columns from a row beneath the headings; empty where there is none."""
+    """Units of the columns from a row below the headings; empty if there is no such row."""
     stamped = any(map(is_stamp, first_rows(top, header)[clock][:1]))
     rows = [(line, [_bare(cell) for cell in header.cells(line)]) for line in header.between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)

@@ -217,7 +217,7 @@ def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> Input
 
 
 def _remedy(layout: Layout, cell: str) -> str:
-    """Advice on what to write in place of a cell that is no number."""
+    """Advice on what to write instead of a cell that is not a number."""
     if _THOUSANDS.fullmatch(cell):
         return "write numbers without separators of thousands"
     if ("." if layout.decimal == "," else ",") in cell:

@@ -249,7 +249,7 @@ def _plain(comment: str) -> str:
 
 
 def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
-    """When time was 0; None, and a word about it, where the file does not say in which zone."""
+    """Date and time at time 0; None, with a finding, where the file does not give the time zone."""
     if not getattr(header, "abs_time", 0):
         return None, [notice(path, "note", "the file does not say when it was measured")]
     if version == 4 and header.time_flags & LOCAL:

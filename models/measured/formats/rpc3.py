@@ -95,7 +95,7 @@ def open_rpc(path: Path) -> RpcFile:
 
 
 def read_parameters(path: Path) -> dict[str, str]:
-    """Parameters of the header by name; the first three are at fixed places and say how many follow."""
+    """Parameters of the header by name; the first three have fixed positions and give the number of the others."""
     with path.open("rb") as file:
         head = file.read(BLOCK)
         if len(head) < BLOCK:

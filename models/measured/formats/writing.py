@@ -160,7 +160,7 @@ def _csv_header(group: ChannelGroup, start: datetime | None, comment: str) -> st
 def write_mdf(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Append the blocks to a temporary file beside ``temporary``, then save it as a whole."""
+    """Append the blocks to a second temporary file, then save it as the complete file ``temporary``."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -199,7 +199,7 @@ def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values
 def write_tdms(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Write the groups one after the other, each block as one segment."""
+    """Write the groups one after the other, with one segment per block."""
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:

@@ -22,8 +22,9 @@ LARGEST_EXPONENT = 50.0
 
 
 class Net(NamedTuple):
-    """Strips: place y / b, half length by a, share of the load per cell and height; cells: places of their centres and
-    of the middles of the steps to them, bounds there; ``peak``: pressure in the patch's middle times a b / N."""
+    """Grid of the contact patch. Strips: position y / b, ratio of half length to a, share of the load per cell and
+    height; cells: positions of their centres and of the middles of the steps to them, bounds at both; ``peak``:
+    pressure in the patch's middle times a b / N."""
 
     y: np.ndarray
     half: np.ndarray
@@ -127,7 +128,8 @@ def _advance(
     turn: np.ndarray,
     bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions in the next cell, and which bristles slide there; bounds: there, before, and between."""
+    """Tractions in the next cell, and which bristles slide there; bounds: in that cell, in the one before, and between
+    them."""
     bound, last, between = bounds
     stuck = tractions_before - w
     after, beyond = _cut(stuck, bound)

@@ -49,7 +49,8 @@ class PlainMotion:
     matrices: np.ndarray
 
     def at(self, points: Points) -> np.ndarray:
-        """(p, 3 + n, 3): place (m), velocity, acceleration without q'', and derivatives by q of points, in space."""
+        """For each point in space: position (m), velocity, acceleration without the q'' terms, then derivatives by q;
+        (p, 3 + n, 3)."""
         rows = self.matrices[points.rows]
         count = rows.shape[1]
         return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)

@@ -207,7 +207,8 @@ class PlainRolling:
     def _slide(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside what carries them, rad/s.
+        """Sliding velocities (w, 4) as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
+        bodies that carry them, rad/s.
 
         steering (w,) : rates of steering, rad/s.
         """
@@ -221,8 +222,8 @@ class PlainRolling:
         return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
     def _axles(self, motion: PlainMotion, steer: np.ndarray) -> np.ndarray:
-        """Axles (w, 3), to the left of their wheels: steered and leaning beside where the carrier heads, or a towed
-        body by its x axis in the road's plane."""
+        """Unit vectors (w, 3) along the axles, to the left: steered and inclined relative to the heading of the
+        carrier, or of a towed body's x axis in the road's plane."""
         ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
         ahead /= _length(ahead)[:, None]
         left, level = _cross(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
