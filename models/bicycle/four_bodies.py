@@ -21,8 +21,8 @@ FALLEN = 1.4
 
 @dataclass(frozen=True, eq=False)
 class Ride:
-    """Times (n,), positions and rates (n, 9), energy (n,) and work (n,) of tyres and control since the start (J), how
-    many steps the method took; reports (n, 2, REPORTED) of the tyres, none where wheels roll ideally."""
+    """Result of a run: times (n,), positions and rates (n, 9), energy (n,) and work (n,) of tyres and control since the
+    start (J), and the number of steps; reports (n, 2, REPORTED) of the tyres, empty for ideally rolling wheels."""
 
     times: np.ndarray
     positions: np.ndarray

@@ -33,7 +33,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class IdealBicycle:
-    """The bicycle as four bodies; raises nothing beyond what ``Whipple`` does."""
+    """The bicycle as four bodies whose wheels roll ideally; raises the same errors as ``Whipple``."""
 
     def __init__(self, bicycle: Whipple, control: Control = UNCONTROLLED) -> None:
         vehicle = four_bodies(bicycle)
@@ -44,8 +44,8 @@ class IdealBicycle:
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
 
     def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Heights (2,) m of both contacts, the Jacobian (6, 9) of the velocities of the material points there, and
-        the rates (6,) of these velocities without dv/dt."""
+        """Kinematics of both contacts: their heights (2,) m, the Jacobian (6, 9) of the velocities of the material
+        points there, and the part (6,) of these points' accelerations without dv/dt."""
         each = [_contact(motion.matrices[row], radius) for row, radius in self._wheels]
         heights, jacobians, rates = zip(*each, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
@@ -59,7 +59,7 @@ class IdealBicycle:
         return N, N @ u
 
     def rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Rates (12,) of positions and free rates."""
+        """Time derivatives (12,) of the state, which holds positions and free rates."""
         q, (N, v) = state[:COUNT], self.rolling(state[:COUNT], state[COUNT:])
         motion, bias = self.bodies.move(q, v), np.zeros(COUNT)
         _, contact, without = self.contacts(motion)
@@ -91,7 +91,8 @@ class IdealBicycle:
         return np.concatenate([q, [lean_rate, 0.0, speed / radius]])
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> float:
-        """Kinetic and potential energy (J); the latter 0 with all centres on the ground."""
+        """Sum of kinetic and potential energy (J); the potential energy is 0 when all centres of mass are on the
+        ground."""
         motion = self.bodies.move(q, v)
         mass, _ = self.bodies.inertia(motion, self.gravity)
         levels = motion.matrices[1:, PLACE, 2, 3]
@@ -119,7 +120,8 @@ class IdealBicycle:
 
 
 def _contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """Height (m), Jacobian (3, 9) and rate (3,) without dv/dt of a wheel's material point at the ground.
+    """Height (m) of a wheel's material point at the ground, Jacobian (3, 9) of its velocity, and its acceleration (3,)
+    without dv/dt.
 
     wheel (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it rolls, and
     the rate of its velocity R' s + c' is R'' s + c'' + R' s'.

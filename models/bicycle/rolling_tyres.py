@@ -99,7 +99,7 @@ class RollingBicycle:
         return tyres, ledgers
 
     def loads(self) -> tuple[float, float]:
-        """Loads (N) at rest of the rear and the front wheel."""
+        """Static loads (N) of the rear and the front wheel."""
         b, g = self.bicycle, self.bicycle.gravity
         mass = b.rear_wheel.mass + b.body.mass + b.front_frame.mass + b.front_wheel.mass
         moment = b.body.mass * b.body.x + b.front_frame.mass * b.front_frame.x + b.front_wheel.mass * b.wheelbase
@@ -108,7 +108,7 @@ class RollingBicycle:
 
 
 def _table(bicycle: RollingBicycle) -> np.ndarray:
-    """All numbers that the compiled forces read."""
+    """Table of all numbers that the compiled forces of the bicycle read."""
     c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
@@ -222,7 +222,7 @@ def all_bicycle_forces(numbers, q, v, f, report, ledger):
 
 @lean
 def bicycle_forces(numbers, t, q, v, f):
-    """Add the forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the bicycle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     report, ledger = array(doubles(WHEELS * REPORTED), (WHEELS, REPORTED)), array(doubles(LEDGER), (LEDGER,))
     table = array(numbers, (int(array(numbers, (forces.HEADER,))[forces.COUNT]),))
     all_bicycle_forces(table, array(q, (COUNT,)), array(v, (COUNT,)), array(f, (COUNT,)), report, ledger)
@@ -230,7 +230,8 @@ def bicycle_forces(numbers, t, q, v, f):
 
 @lean
 def set_bicycle_forces(block, t, n):
-    """``bicycle_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``bicycle_forces``. All data are in one block of doubles at an address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     bicycle_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -238,7 +239,7 @@ def set_bicycle_forces(block, t, n):
 
 @lean
 def read_bicycle(numbers, q, v, reports, ledgers):
-    """Fill reports (m, 2, REPORTED) and ledgers (m, LEDGER) of states (m, 9)."""
+    """Fill reports (m, 2, REPORTED) of the tyres and ledgers (m, LEDGER) of energy for states (m, 9)."""
     f = array(doubles(COUNT), (COUNT,))
     for i in range(len(q)):
         f[:] = 0.0

@@ -25,7 +25,7 @@ HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Windows (n,) at one speed (m/s) of the treadmill.
+    """Measurements in n windows at one speed (m/s) of the treadmill.
 
     weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); slowness : mean of |steer rate| by mean
     of its square (s/rad), by which dry friction is worth a viscous one.
@@ -38,7 +38,7 @@ class Observation:
 
     @property
     def parts(self) -> np.ndarray:
-        """(n, 3): real and imaginary part of the weave (1/s), measured speed (m/s)."""
+        """Measured values (n, 3) per window: real and imaginary part of the weave (1/s), measured speed (m/s)."""
         return np.column_stack([self.weave.real, self.weave.imag, self.measured_speed])
 
     @property
@@ -48,12 +48,13 @@ class Observation:
 
     @property
     def deviation(self) -> np.ndarray:
-        """(3,) standard deviation of ``parts`` among the windows."""
+        """Standard deviations (3,) of ``parts`` between the windows."""
         return self.parts.std(axis=0, ddof=1)
 
 
 def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
-    """Eigenvalue (1/s) of e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least squares; w is above 0."""
+    """Eigenvalue s + i w (1/s) of the function e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least
+    squares; w is above 0."""
     times = np.arange(len(values)) / rate
 
     def left(shape: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ class Frame(Strict):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Tensor (3, 3) about the centre of mass, kg m^2."""
+        """Inertia tensor (3, 3) about the centre of mass, kg m^2."""
         across = self.Ixx + self.Izz if self.Iyy is None else self.Iyy
         return np.array([[self.Ixx, 0.0, self.Ixz], [0.0, across, 0.0], [self.Ixz, 0.0, self.Izz]])
 
@@ -135,7 +135,8 @@ class Whipple(Strict):
 
     @cached_property
     def linear(self) -> LinearBicycle:
-        """The matrices, by appendix A of the paper; InputError where the mass matrix is singular."""
+        """Matrices of the linear equations, from appendix A of the paper; InputError where the mass matrix is
+        singular."""
         R, B, H, F, w = self.rear_wheel, self.body, self.front_frame, self.front_wheel, self.wheelbase
         sine, cosine = np.sin(self.tilt), np.cos(self.tilt)
         mass, front = R.mass + B.mass + H.mass + F.mass, H.mass + F.mass
@@ -243,7 +244,8 @@ def _positive_roots(condition: Polynomial) -> list[float]:
 
 
 def load_bicycle(name: str, folder: str | Path = ".", file: str = "", place: str = "bicycle") -> Whipple:
-    """The parameter set of that name, or of a TOML file with all parameters; ``file`` and ``place`` tell who asks."""
+    """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``place`` name the asking
+    scene in messages."""
     sets = {path.stem: path for path in sorted(SETS.glob("*.toml"))}
     if name not in sets and not name.endswith(".toml"):
         raise InputError(file, place, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets))

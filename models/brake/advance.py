@@ -83,7 +83,7 @@ def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
 
 @lean
 def advance(motion, torques, step, steer, vehicle):
-    """Move a ``PlaneMotion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
+    """Advance a ``PlaneMotion`` by n steps (s); torques (n + 1, W) at the steps' ends come from ``pressure``.
 
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
@@ -140,7 +140,7 @@ def _lifted(loads: np.ndarray) -> bool:
 
 
 def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
-    """Acceleration of the body on four wheels, along and across it (m/s^2)."""
+    """Longitudinal and lateral acceleration (m/s^2) of a two-axle unit, in its own axes."""
     accelerations = motion.accelerations
     k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
@@ -149,8 +149,8 @@ def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float,
 
 
 def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
-    """Sentence on how a vehicle tips over, by moments about the wheels that stay on the road: statics of a body
-    whose loads follow its accelerations."""
+    """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road; the statics are those
+    of a body whose wheel loads follow its accelerations."""
     body, (ahead, aside) = BODIES[four.start // 4], rates
     static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
     if status == PITCHED:

@@ -22,7 +22,8 @@ UTILISED = 0.75
 
 @dataclass(frozen=True)
 class Axles:
-    """Static loads (N) of front and rear, wheelbase and height of the centre of mass (m)."""
+    """Data of a two-axle vehicle: static loads (N) of front and rear axle, wheelbase (m), height of the centre of mass
+    (m)."""
 
     front: float
     rear: float

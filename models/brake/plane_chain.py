@@ -31,7 +31,7 @@ ALONG_X = Direction(1.0, 0.0)
 
 @lean
 def velocity(point, positions, rates, reach):
-    """Velocity (2) in the ground's axes of a ``ChainPoint``."""
+    """Velocity (2) of a ``ChainPoint`` in the ground's axes."""
     k, x, y = point
     vx, vy = rates[0], rates[1]
     for j in range(reach.shape[1]):
@@ -45,7 +45,7 @@ def velocity(point, positions, rates, reach):
 
 @lean
 def chain_point_place(point, positions, reach):
-    """Place (2) on the ground of a ``ChainPoint``."""
+    """Position (2) of a ``ChainPoint`` on the ground."""
     k, x, y = point
     px, py = positions[0], positions[1]
     for j in range(reach.shape[1]):

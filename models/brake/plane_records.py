@@ -13,7 +13,7 @@ from models.machine.compiled import inlined
 
 
 class Report(NamedTuple):
-    """Forces, loads and slips of the wheels in a step, each (W,), in a whole run (samples, W).
+    """Forces, loads and slips of the wheels, (W,) each for a step, or (samples, W) for a run.
 
     force_x, force_y : mean forces on the wheel in its own axes (N); load : N; slip : the mean one; slip_angle : rad;
     locked : time (s) for which the wheel was locked; turning : speed of turning at the end (rad/s).
@@ -41,7 +41,7 @@ def report_of(rows):
 
 
 class PlaneMotion(NamedTuple):
-    """State of a vehicle in the plane, stepped in place.
+    """State of a vehicle in the plane, updated in place by every step.
 
     state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
     which the next one searches on; report (7, W) : the rows of the last step's ``Report``.
@@ -91,7 +91,7 @@ def wheels_of(rows):
 
 
 class Frame(NamedTuple):
-    """Arrays that all iterations within a time step share.
+    """Arrays shared by all iterations within a time step.
 
     along, across, press (W, n) : see ``plane_chain.rows``, and load by accelerations; units (U, 2) : see ``headings``;
     mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' ones; out, out_before, off

@@ -40,7 +40,7 @@ some loads without an answer."""
 
 @inlined
 def times(row, vector):
-    """Scalar product."""
+    """Scalar product of a row and a vector."""
     total = 0.0
     for a in range(row.size):
         total += row[a] * vector[a]
@@ -210,7 +210,8 @@ def stage(motion, before, after, step, most, vehicle, frame):
 
 @lean
 def by_means(motion, before, after, step, vehicle, frame):
-    """Accelerations as from ``stage``, where wheel loads jump between two answers and have one only as a mean of them.
+    """Accelerations as from ``stage``, for steps in which wheel loads jump between two solutions, so that only a mean
+    of both is in equilibrium.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of

@@ -36,7 +36,7 @@ class Truck(Strict):
 
     @property
     def wheelbase(self) -> float:
-        """Distance of the axles (m)."""
+        """Distance between the axles (m)."""
         return self.front.x - self.rear.x
 
 
@@ -103,7 +103,8 @@ def check_wheels(vehicle: Truck, mass: float) -> None:
 
 
 def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
-    """place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the wheels of two axles under a body."""
+    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
+    body."""
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share

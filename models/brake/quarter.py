@@ -81,7 +81,7 @@ class QuarterStop:
 
     @property
     def distance(self) -> float:
-        """Way (m) from the start to the end of the path."""
+        """Distance (m) from the start to the end of the path."""
         return float(self.path.position[-1] - self.path.position[0])
 
     @property
@@ -124,7 +124,7 @@ def braked(
     speed: float,
     turning: float | None = None,
 ) -> QuarterStop:
-    """Motion along x from a speed (m/s) under torques (n + 1,) in N m at the ends of steps (s), linear in between.
+    """Straight braking from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s), linear between.
 
     turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """

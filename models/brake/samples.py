@@ -44,7 +44,7 @@ class Row(NamedTuple):
 
 
 def row(coordinates: int, wheels: int) -> Row:
-    """A row of zeros of so many coordinates and wheels."""
+    """A ``Row`` of zeros for so many coordinates and wheels."""
     shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORTED, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     whole = np.zeros(ends[-1])
@@ -68,8 +68,8 @@ def parts(rows: list[np.ndarray], like: Row) -> Row:
 
 
 class Commands(NamedTuple):
-    """Commands that hold for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,)
-    in bar, of which the first is not a number where valves hold, and steer angles (W,) in rad."""
+    """Commands that stay constant over the next ``samples`` (1,) samples: states of the valves (W,), pressures (W,) in
+    bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad."""
 
     samples: np.ndarray
     valves: np.ndarray
@@ -79,8 +79,8 @@ class Commands(NamedTuple):
 
 class Record(NamedTuple):
     """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
-    such moments, of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or
-    after."""
+    states at earlier samples, of which the first ``left`` (1,) are filled and not yet collected; until (s): the run
+    ends with the first sample that ends then or later."""
 
     now: np.ndarray
     rows: np.ndarray
@@ -98,7 +98,8 @@ class Braking(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """All that samples work on; sample (s); others: what ``advance`` takes after the steer angles."""
+    """All data of a run that samples need; sample (s); others: further arguments of ``advance``, after the steer
+    angles."""
 
     commands: Commands
     record: Record
@@ -114,7 +115,7 @@ class ReferenceType(types.StructRef):
 
 
 class Reference(structref.StructRefProxy):
-    """A ``Subject`` that compiled code holds by its address."""
+    """A ``Subject`` that compiled code refers to by its address."""
 
 
 structref.define_proxy(Reference, ReferenceType, Subject._fields)
@@ -199,12 +200,12 @@ def moved(step_function: Callable[..., Any]) -> Moving:
 
 @dataclass(frozen=True)
 class CompiledSamples:
-    """``samples`` as compiled code: march takes a ``Reference``."""
+    """Compiled version of ``samples``; march takes a ``Reference``."""
 
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
     def __call__(self, commands, record, sample, braking, motion, *others):
-        """``samples`` of the fields of a ``Subject``."""
+        """Generator of ``samples``, from the fields of a ``Subject``."""
         return self.march(by_reference(commands, record, sample, braking, motion, others))
 
 

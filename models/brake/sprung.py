@@ -128,7 +128,7 @@ def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
 
 
 def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
-    """Inertia (kg m^2) of bodies about the vertical through a place (m)."""
+    """Inertia (kg m^2) of bodies about the vertical through a point x, y (m)."""
     return sum(
         body.inertia[2][2] + body.mass * ((body.position[0] - x) ** 2 + (body.position[1] - y) ** 2) for body in bodies
     )
@@ -177,7 +177,8 @@ def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
 
 
 def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
-    """Inertias (kg m^2) of the wheels of these tyres, axle by axle; InputError unless both of an axle are alike."""
+    """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
+    equal."""
     inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:

@@ -211,7 +211,7 @@ def ended(q, units, fold):
 
 
 class OnEngine(NamedTuple):
-    """Data that a step of a vehicle with suspension needs in addition to those of a step in the plane.
+    """Data that a step of a vehicle on its suspension needs in addition to those of a plane step.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -242,14 +242,14 @@ def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> No
 
 
 def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """Advance positions and rates (n,) by the engine's step; other engines replace this function."""
+    """Advance positions and rates (n,) by one step of the engine; other engines replace this function."""
     q[:], v[:] = np.split(engine.march(q, v, 1, engine.step)[-1], 2)
     return True
 
 
 def advance(motion, torques, step, steer, vehicle, course):
-    """Advance the vehicle on its suspension as ``models.brake.advance.advance`` does in the plane, the state (2, n)
-    having all coordinates and their rates.
+    """Advance a vehicle on its suspension, as ``models.brake.advance.advance`` does in the plane; the state (2, n)
+    holds all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.

@@ -52,7 +52,7 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(wheels: int) -> Surfaces:
-    """``Surfaces`` of so many wheels: the first table under all of them, without lag of the tyres."""
+    """``Surfaces`` for so many wheels, with the first table under each and without lag of the tyres."""
     return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
@@ -73,7 +73,7 @@ class Stretch:
 
 
 def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
-    """Road of stretches in the order of their x; the first also holds before it begins.
+    """Road of stretches in ascending order of x; the first one also extends to minus infinity.
 
     Another level of friction on a stretch is a surface of its own, ``TyreTable.scaled``.
     """

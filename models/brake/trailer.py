@@ -24,7 +24,7 @@ from models.tyre.tyre_table import Tables
 
 
 class Trailer(Truck):
-    """The body, with its axles ahead of and behind its centre of mass, and the drawbar."""
+    """A trailer: body with axles ahead of and behind its centre of mass, and drawbar."""
 
     drawbar: float = quantity("m", "from the hook to the front axle")
     drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")

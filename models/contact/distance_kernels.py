@@ -13,7 +13,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def weights(t):
-    """Weights of the four nodes about a point at the share ``t`` of its segment, and of their slope per spacing."""
+    """Weights of four neighbouring nodes at the position ``t`` (0 to 1) in a segment, and of the interpolated slope per
+    spacing."""
     value = (
         0.5 * t * (-1.0 + t * (2.0 - t)),
         1.0 + 0.5 * t * t * (-5.0 + 3.0 * t),

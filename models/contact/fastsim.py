@@ -134,7 +134,7 @@ def fastsim(
 
 
 class Ellipse:
-    """FASTSIM on ellipses of one shape, as a wheel on a rail has them: all that does not change is computed once.
+    """FASTSIM for ellipses of one shape, as of a wheel on a rail; all that depends on the shape alone is computed once.
 
     ``Ellipse(ratio, pair)(a, load, mu, xi_x, xi_y, spin)`` is (fx, fy, mz) in N, N, N m, from plain numbers and for
     plain numbers, in microseconds; ratio = a/b. Options are those of ``fastsim``. Raises InputError.

@@ -34,7 +34,7 @@ from models.machine.compiled import compiled
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Forces with their derivatives.
+    """Creep forces with their derivatives.
 
     forces : (..., 3) of fx, fy (N), mz (N m). slopes : (..., 3, 4), of each to xi_x, xi_y, spin (1/m) and load (N).
     """
@@ -80,7 +80,7 @@ def derivatives(
 
 @compiled
 def _slopes(contacts, strips, cells, kind, forces, slopes):
-    """Fill FORCES (n,), but for the sticking share, and their derivatives (n, 3, 3) to the creepages."""
+    """Fill FORCES (n,), without the sticking share, and their derivatives (n, 3, 3) with respect to the creepages."""
     sums, moved, total, scale = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for c in range(len(contacts)):
         contact = contacts[c]

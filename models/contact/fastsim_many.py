@@ -27,7 +27,7 @@ SLIDING, MOST = 8.0, 100.0
 
 @compiled
 def forces(contacts, strips, cells, kind, march, answers):
-    """Fill ``answers``, FORCES (n,).
+    """Fill ``answers`` with the creep forces of many contacts, FORCES (n,).
 
     contacts : CONTACT (n,); strips, cells : a net from ``fastsim_grid``; kind : of flexibility; march : PLAIN or
     SECOND_ORDER. A contact without load or friction has zeros all over.
@@ -68,7 +68,7 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """Rigid slip of every cell by the creepages (x, y, spin), for the march.
+    """Rigid slip of every cell from the creepages (x, y, spin), in the form that the march needs.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
@@ -131,7 +131,7 @@ def blend(contact, bound, kind):
 
 @lean
 def mean_flexibility(contact, turn, kind):
-    """One flexibility for all creepages, ``turn`` = spin sqrt(a b) the third.
+    """Common flexibility for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
 
     That of 1982 weights by their sizes and divides by their root mean square, which makes up to sqrt(3) times too much
     of mixed ones; the blend's is the mean weighted by their squares.
@@ -202,7 +202,8 @@ def add_strip(contact, strips, s, sums, answer):
 
 @compiled
 def strip_tractions(slip, cells, march, left, answers):
-    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells).
+    """Fill ``answers`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1 where
+    it slips.
 
     slip : of the strip, see ``strip_slip``; left : (2, cells), share of the friction that is left in the cells' centres
     and in the middles of the steps there.
@@ -224,7 +225,7 @@ def strip_tractions(slip, cells, march, left, answers):
 
 @compiled
 def point(motion, unit, strips, cells, choices):
-    """fx, fy, mz of one ellipse of the shape of ``unit``, NaN for bad input.
+    """Forces fx, fy and moment mz of one ellipse with the shape of ``unit``; NaN for invalid input.
 
     motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
     choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of

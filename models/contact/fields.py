@@ -42,7 +42,7 @@ def fastsim_fields(
     march: March = "second-order",
     falling: Falling | None = None,
 ) -> Fields:
-    """Pressure, traction and slip of one ellipse, plain numbers, as ``fastsim`` marches them.
+    """Pressure, traction and slip in the cells of one ellipse (inputs are plain numbers), as ``fastsim`` computes them.
 
     Arrays of the shape (strips, cells in a strip), each strip from its leading edge back. The pressure is that of the
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.

@@ -50,7 +50,7 @@ class Hertz:
 
 
 def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact under a given load.
+    """Hertzian contact under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
@@ -81,7 +81,8 @@ def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> H
 def by_axes(
     a: float, b: float, material_pair: MaterialPair, *, load: float | None = None, approach: float | None = None
 ) -> Hertz:
-    """Contact of known semi-axes a, b (m), plain numbers, under a load (N) or at an approach (m), above 0.
+    """Hertzian contact with known semi-axes a, b (m) under a load (N) or at an approach (m), which must be above 0; all
+    plain numbers.
 
     The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
     Raises InputError as ``by_load`` does.

@@ -21,7 +21,8 @@ NEGLIGIBLE_BOUND = 1e-60
 
 
 def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> Array:
-    """``value`` as a floating-point array of any shape, every element finite and from ``minimum`` to ``maximum``.
+    """``value`` as a floating-point array of any shape; every element must be finite and between ``minimum`` and
+    ``maximum``.
 
     Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
     numbers and masked elements are none, and nothing is guessed in their place.

@@ -157,7 +157,8 @@ def settle(numbers, approach, modulus):
 
 @compiled
 def simplified(inputs, numbers, outputs):
-    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``, of ``inputs`` that ``kernel`` has found fine.
+    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``. The caller, ``kernel``, must have checked
+    ``inputs``.
 
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.

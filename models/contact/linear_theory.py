@@ -59,7 +59,7 @@ class Coefficients:
 
 
 def coefficients(ratio: Any, nu: Any) -> Coefficients:
-    """Kalker's coefficients.
+    """Kalker's creepage and spin coefficients.
 
     ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
 

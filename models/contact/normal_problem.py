@@ -105,9 +105,8 @@ AVERAGING_POINTS = 8
 
 
 def hertzian(a: float, b: float, load: float, cells: int) -> PressureGrid:
-    """Pressure of an ellipse with semi-axes a, b (m), the mean of each of ``cells`` x ``cells`` cells, scaled to the
-    load (N).
-    """
+    """Hertzian pressure on an ellipse with semi-axes a, b (m): means over ``cells`` x ``cells`` cells, scaled to the
+    load (N)."""
     inner = (np.arange(cells * AVERAGING_POINTS) + 0.5) / (cells * AVERAGING_POINTS) * 2 - 1
     height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(
         cells, AVERAGING_POINTS, cells, AVERAGING_POINTS

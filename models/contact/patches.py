@@ -52,7 +52,7 @@ class Patch:
 
     @property
     def low(self) -> float:
-        """Least distance (m): nothing touches at a smaller depth."""
+        """Smallest distance (m) between the undeformed surfaces; at a smaller depth there is no contact."""
         return self.bottom[2]
 
     @cached_property
@@ -64,10 +64,8 @@ class Patch:
 
     @cached_property
     def lines(self) -> tuple[Table, Table]:
-        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola.
-
-        The bottom itself is one more line.
-        """
+        """Lines along x and along y, with the square root of the least height above the bottom on each, which is linear
+        for a paraboloid."""
         tables = []
         for (lines, least, _), bottom in zip(
             (self.distance.valley_x, self.distance.valley_y), self.bottom, strict=False

@@ -37,7 +37,7 @@ OFF_TAPING = 5e-3
 
 
 def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> ContactProfile:
-    """The profile in a file, as the package has it (m, z down, flange or gauge corner at negative y).
+    """Profile read from a file, in the package's axes (m, z down, flange or gauge corner at negative y).
 
     kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
     Raises InputError for a file that cannot be read or understood, naming the line and its text.
@@ -120,7 +120,7 @@ def _columns(lines: list[str], path: Path) -> Points:
 
 
 def _miniprof(lines: list[str], path: Path) -> Points:
-    """MiniProf: header to the first empty line, then points with y upwards."""
+    """Points of a MiniProf file: a header that ends with the first empty line, then points with y upwards."""
     rows, columns, heading = [], ["X", "Y"], True
     for k, line in enumerate(lines, 1):
         if heading:
@@ -144,7 +144,7 @@ def _miniprof(lines: list[str], path: Path) -> Points:
 
 
 def _simpack(lines: list[str], path: Path) -> Points:
-    """Simpack: the points as the header transforms them."""
+    """Points of a Simpack file, transformed as its header says."""
     keys: dict[str, tuple[str, int]] = {}
     rows: list[list[float]] = []
     inside = ended = False
@@ -190,7 +190,8 @@ def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
 
 
 def _transformed(points: Points, key: dict[str, float]) -> Points:
-    """Shift, rotation, bounds, mirrors, order and unit of a Simpack header, in this order."""
+    """Points after the operations of a Simpack header: shift, rotation, bounds, mirrors, order and unit, in this
+    order."""
     y, z = points[0] + key["shift.y"], points[1] + key["shift.z"]
     angle = key["rotate"] / key["units.ang.f"]
     y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)

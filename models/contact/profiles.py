@@ -28,7 +28,7 @@ TURNING = 0.3
 
 @dataclass(frozen=True, eq=False)
 class ContactProfile:
-    """A profile as points.
+    """A wheel or rail profile, given by points.
 
     y, z : (n,) in m, y ascending. smoothing : wavelength (m) along the contour of which smoothing left half, 0 for
     none; longer waves pass, shorter ones are damped by 1 / (1 + (smoothing / wavelength)^4).
@@ -40,7 +40,7 @@ class ContactProfile:
 
     @cached_property
     def curve(self) -> CubicSpline:
-        """z(y), twice continuously differentiable."""
+        """Curve z(y) through the points, twice continuously differentiable."""
         return CubicSpline(self.y, self.z)
 
     def turned(self, angle: float) -> "ContactProfile":

@@ -35,7 +35,8 @@ def sweep(traction, rigid, kernel, bound, relaxation):
 
 @njit(cache=True, nogil=True)
 def answer(slip_x, slip_y, own_x, own_y, bound):
-    """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): sticking, or opposite to its slip.
+    """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): it sticks, or slides with the
+    traction opposite to the slip.
 
     In slip p = -slip / (own + l) with l > 0 such that |p| = bound: Newton's iteration on 1/|p|, monotone from l = 0.
     """
@@ -114,7 +115,8 @@ def turned(column, turns, components):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def orthogonalise(basis, count, vector):
-    """Write the part of ``vector`` orthogonal to the first rows of ``basis``, of length 1, as its next row.
+    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the rest, scaled to
+    length 1, as the next row.
 
     Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
     """

@@ -52,7 +52,7 @@ class SlipOperator:
 
     @cached_property
     def reversed(self) -> Array:
-        """Kernel as ``rolling_kernels.sweep`` reads it, (3, 2 ny - 1, 2 nx - 1)."""
+        """Kernel (3, 2 ny - 1, 2 nx - 1) in the reversed order that ``rolling_kernels.sweep`` needs."""
         kernel = self.kernel[::-1, ::-1]
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
 
@@ -72,7 +72,7 @@ Map = Callable[[Array], Array]
 
 
 def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: float, maximum_iterations: int) -> Array:
-    """x with |apply(x) - b| <= tolerance |b|, b the right-hand side (n,), by preconditioned GMRES.
+    """Solution x with |apply(x) - b| <= tolerance |b| by preconditioned GMRES; b is the right-hand side (n,).
 
     Raises RunFailed after ``maximum_iterations`` products.
 
@@ -101,7 +101,7 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
 
 
 class FreeSystem:
-    """The system free (C + stiff) d = free wanted for changes d of traction within the free directions.
+    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions.
 
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """

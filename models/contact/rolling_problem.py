@@ -99,7 +99,7 @@ def solve_rolling(
 def solve_shift(
     normal_solution: PressureGrid, mu: float, shift_x: float, shift_y: float, material_pair: MaterialPair
 ) -> RollingSolution:
-    """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
+    """Tractions after the wheel has been shifted over the rail without rolling, from a state of rest without tractions.
 
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
     shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
@@ -180,7 +180,8 @@ class _Cells:
     bound: Array
 
     def coarser(self) -> "_Cells":
-        """Cells twice as long and wide, whose bounds are the means over the old ones; a last one may reach beyond."""
+        """Grid of cells twice as long and wide; their bounds are means over the smaller cells. A last cell may extend
+        beyond the old grid."""
         rows, columns = (count + count % 2 for count in self.bound.shape)
         bound = np.zeros((rows, columns))
         bound[: self.y.size, : self.x.size] = self.bound
@@ -257,7 +258,7 @@ def _after_newton_step(state: _State) -> _State:
 
 
 def _newton(state: _State) -> Array:
-    """Tractions after Newton's step for the cells that stick and slip in ``state``.
+    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
     opposite to its slip: t.C d + (|s| / g) d = -t.s along the tangent t.

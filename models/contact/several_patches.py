@@ -60,7 +60,7 @@ class Net:
 
     @property
     def forces(self) -> Array:
-        """W times the load of every mesh, flat (m^3)."""
+        """W times the load of every grid cell, as a flat array (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
 
@@ -130,7 +130,7 @@ def solve_depths(
     material_pair: MaterialPair,
     options: tuple[int, int, int],
 ) -> tuple[Array, Array, Array]:
-    """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
+    """Depths (m) of patches followed by the common rigid approach (m), their stiffnesses (Pa/m) and loads (N).
 
     start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
     common direction. options : cells of a net, shape and kind of fit.

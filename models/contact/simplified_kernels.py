@@ -46,7 +46,8 @@ class FineNet(NamedTuple):
 
 @compiled
 def overlap_pressure(surface, height, shape):
-    """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
+    """W times the pressure at a height: depth - height (parabolic), or the elliptic root function with the same value
+    at the bottom."""
     over = surface.depth - height
     if over <= 0.0:
         return 0.0
@@ -61,7 +62,7 @@ def mesh_of(box, cells):
 
 @compiled
 def crude_net(surface, cells, shape):
-    """Height, W p and covered share of every mesh (cells, cells), rows along y.
+    """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
     """
@@ -103,7 +104,8 @@ def corner(x, y):
 
 @compiled
 def displacement(pressure, dx, dy, modulus):
-    """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
+    """Normal displacement (m) of both bodies together at the centres of the grid cells, by a pressure (Pa) on each
+    cell."""
     cells = pressure.shape[0]
     edges = np.empty((cells + 1, cells + 1))
     for j in range(cells + 1):
@@ -128,7 +130,8 @@ def displacement(pressure, dx, dy, modulus):
 
 @compiled
 def covariances(u, h, cover):
-    """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
+    """Mean of u, and the weighted sums for covariance of u and h and for variance of u (not divided by the sum of
+    weights); weights are the covered shares."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
     both = square = 0.0
     for k in range(u.size):
@@ -140,7 +143,8 @@ def covariances(u, h, cover):
 
 @compiled
 def weighted_mean(values, weights):
-    """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
+    """Weighted mean of values, weights of the same shape; written as loops, which compile ten times as fast as array
+    expressions."""
     total = weight = 0.0
     for k in range(values.size):
         total += weights.flat[k] * values.flat[k]
@@ -150,7 +154,7 @@ def weighted_mean(values, weights):
 
 @compiled
 def slope_products(u, h, cover, dx, dy, along_y):
-    """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
+    """Weighted sums over neighbouring cells: products of the slopes of u and h, and squares of the slopes of u."""
     product = square = 0.0
     for down in range(2 if along_y else 1):
         right, step = 1 - down, dy if down else dx
@@ -184,7 +188,7 @@ def crude_fit(surface, cells, shape, kind, modulus):
 
 @compiled
 def tangential(traction, dx, dy, nu):
-    """Displacement (2, cells, cells) at the meshes' centres by a traction (2, cells, cells), times pi G (Cerruti)."""
+    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction (2, cells, cells) (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
     for j in range(cells + 1):
@@ -234,7 +238,7 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
 
 @compiled
 def push(x, y, force, at_x, at_y):
-    """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
+    """Sum of force / r at points; times 1 / (pi E*) it is the normal displacement by loads (N) of another patch.
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
     """
@@ -248,8 +252,8 @@ def push(x, y, force, at_x, at_y):
 
 @compiled
 def drag(x, y, force, at_x, at_y, nu):
-    """Tangential displacements at points by tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson,
-    section 3.6)."""
+    """Tangential displacements (2, points) times pi G at points, by tangential loads (2, n) (Cerruti; Johnson, section
+    3.6)."""
     sums = np.zeros((2, at_x.size))
     for k in range(at_x.size):
         for m in range(x.size):
@@ -263,7 +267,7 @@ def drag(x, y, force, at_x, at_y, nu):
 
 @compiled
 def strips(surface, rows, cells, shape):
-    """``FineNet`` of a patch, with W p for the pressure.
+    """``FineNet`` of a patch, with W p in place of the pressure.
 
     Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
     depth.
@@ -301,7 +305,8 @@ def strips(surface, rows, cells, shape):
 
 @compiled
 def crossing(row, depth, inner, outer):
-    """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
+    """Position where the row's height equals the depth, between an inner point below and an outer point not below it
+    (false position, Illinois rule)."""
     at_inner, at_outer = value_along_row(row, inner) - depth, value_along_row(row, outer) - depth
     middle, kept = outer, 0
     for _ in range(30):
@@ -322,7 +327,7 @@ def crossing(row, depth, inner, outer):
 
 @compiled
 def march(net, mu, flexibility, motion, traction):
-    """FASTSIM along the strips of a ``FineNet`` at creepages and spin ``motion``; fills the tractions (s, n, 2).
+    """FASTSIM along the strips of a ``FineNet``, for creepages and spin ``motion``; fills the tractions (s, n, 2).
 
     Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
     second-order one: half a first step, and the exact turning of a slipping traction.

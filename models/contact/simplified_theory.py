@@ -92,7 +92,7 @@ class SimplifiedOptions:
 
     @property
     def numbers(self) -> tuple[int, int, int]:
-        """Meshes, shape and fit as compiled functions read them."""
+        """Number of grid cells, shape and fit, coded as compiled functions read them."""
         return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
@@ -190,7 +190,7 @@ def press(
 def load_at_depth(
     patch: Patch, depth: float, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN
 ) -> PatchPressure:
-    """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
+    """Load and approach of one patch at a depth d = -a_3 (m), the paper's N(a_3); W_3 is fitted on the coarse grid."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
@@ -203,7 +203,8 @@ def load_at_depth(
 def _by_load(
     patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
+    """Normal contact that carries a load: the depth of a single patch, or depths and common approach of several, are
+    searched."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
@@ -222,7 +223,8 @@ def _by_load(
 
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
-    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until it is, then Brent's method."""
+    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
+    refined by Brent's method."""
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()
     low, high = 0.0, min(1e-6, limit - lowest)

@@ -28,7 +28,8 @@ Motion = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Rolled:
-    """Forces on the wheel (N), moment (N m), share of the area that sticks, dissipation by rolling speed (N)."""
+    """Result of rolling: forces on the wheel (N), moment (N m), sticking share of the area, ratio of dissipated power
+    to rolling speed (N)."""
 
     fx: float
     fy: float
@@ -45,7 +46,8 @@ class Rolled:
 
 @dataclass(frozen=True)
 class Pressing:
-    """Normal contact: load (N) along the normals of all patches, area (m^2), largest pressure (Pa), approach (m)."""
+    """Result of normal contact: load (N) along the normals of all patches, area (m^2), largest pressure (Pa), approach
+    (m)."""
 
     load: float
     area: float
@@ -65,7 +67,7 @@ class RollingContact(ABC):
     @property
     @abstractmethod
     def lever(self) -> float:
-        """Largest distance along an axis from where moments count to the edge of the contact (m)."""
+        """Largest distance (m), along an axis, between the reference point of moments and the edge of the contact."""
 
     @abstractmethod
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
@@ -91,7 +93,7 @@ class LinearTheory(OnEllipse):
     """Linear theory: no slip, forces proportional to the creepages and not limited by friction."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces; there are no cells and no fields."""
+        """Forces of the linear theory, which has no cells and no fields."""
         fx, fy, mz = (float(f) for f in linear_theory.forces(self.a, self.b, *motion, self.pair))
         return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
 
@@ -117,7 +119,7 @@ class Fastsim(OnEllipse):
         self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] != "elliptic" else 1.0
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` cells in each strip."""
+        """Creep forces, computed with ``cells`` cells in each strip."""
         ellipse = RollingEllipse(self.a, self.b, self.pressing.load, self.friction, *motion)
         creep = fastsim(ellipse, self.pair, cells=cells, **self.choices)
         inside = (fastsim_fields(ellipse, self.pair, cells=cells, **self.choices),) if fields else ()
@@ -127,10 +129,10 @@ class Fastsim(OnEllipse):
 
 
 class ExactOnEllipse(OnEllipse):
-    """Half-spaces with Coulomb friction under Hertz' pressure."""
+    """Half-space theory with Coulomb friction under Hertzian pressure."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` x ``cells`` cells about the ellipse."""
+        """Creep forces, computed with ``cells`` x ``cells`` cells around the ellipse."""
         return _exact_sum([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
 
 
@@ -164,7 +166,8 @@ class Simplified(OnPatches):
         super().__init__(normal_contact, friction, normal_contact.area, normal_contact.peak, normal_contact.approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
+        """Creep forces, with ``cells`` strips and as many cells per strip in each patch; fields are placed along the
+        rail's contour."""
         forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
         inside = self.placed(forces.fields)
         return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
@@ -183,7 +186,7 @@ class Exact(OnPatches):
         super().__init__(normal_contact, friction, sum(grid.area for grid in grids), peak, approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` x ``cells`` cells about each patch."""
+        """Creep forces, computed with ``cells`` x ``cells`` cells around each patch."""
         grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
         forces = _exact_sum(grids, motion, self.friction, self.pair)
         return replace(forces, fields=self.placed(forces.fields))

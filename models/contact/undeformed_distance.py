@@ -25,7 +25,7 @@ LARGEST_CONTACT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Distance:
-    """Undeformed distance on even nodes.
+    """Undeformed distance of two surfaces on evenly spaced nodes.
 
     x : (nx,) and y : (ny,) nodes (m), ascending, the axes of the package. height : (ny, nx) distance (m), rows along y.
     The approach of the bodies counts from distance zero, whether or not the least height is zero.
@@ -71,12 +71,13 @@ class Distance:
 
     @cached_property
     def valley_y(self) -> tuple[Array, Array, Array]:
-        """Lines y (m), the least height on each (m), and the x where it is (m): how the valley runs across y."""
+        """Lines y (m), the least height on each (m), and the x of that height (m): the course of the valley across
+        y."""
         return self._valley(self.padded, self.y, self.x, self.dx)
 
     @cached_property
     def valley_x(self) -> tuple[Array, Array, Array]:
-        """Lines x (m), the least height on each (m), and the y where it is (m)."""
+        """Lines x (m), the least height on each (m), and the y of that height (m)."""
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod

@@ -40,7 +40,8 @@ ITERATIONS = 12
 
 @dataclass(frozen=True)
 class Track:
-    """gauge : between the rails (m), ``gauge_depth`` below their tops (m). inclination : of the rails (rad)."""
+    """Track geometry. gauge : between the rails (m), measured ``gauge_depth`` below their tops (m). inclination : of
+    the rails (rad)."""
 
     gauge: float = 1.435
     gauge_depth: float = 0.014
@@ -49,7 +50,8 @@ class Track:
 
 @dataclass(frozen=True)
 class Wheelset:
-    """radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping : line to back (m)."""
+    """Wheelset geometry. radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping :
+    distance of the taping line from the back (m)."""
 
     radius: float = 0.46
     back_to_back: float = 1.360
@@ -63,7 +65,7 @@ class Wheelset:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where the wheelset is, seen from one side.
+    """Position and attitude of the wheelset, seen from one side.
 
     shift : towards this side's rail (m). yaw, roll : rad. fall : of the axle (m) below the height at which the taping
     line is level with the top of the rail.
@@ -196,7 +198,8 @@ def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
 
 
 def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
-    """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
+    """Point (3,) of the wheel's outline nearest to the rail, refined between the points by a parabola, in the track's
+    coordinates (m)."""
     points, gap = side.gaps(pose)
     k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
     share = _parabola_minimum(gap, k)
@@ -261,7 +264,8 @@ def _touching_place(
 def distance_over(
     side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, contour_limits: tuple[float, float]
 ) -> Distance:
-    """Distance over the plane that touches the rail at a place, between two ends along the rail's contour.
+    """Undeformed distance over the tangent plane at a contact point of the rail, between two ends along the rail's
+    contour.
 
     contact_point : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
     """
@@ -286,7 +290,8 @@ def _rail_heights(rail: ContactProfile, contact_point: Array, angle: float) -> t
 
 
 def _wheel_heights(side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, x: Array, s: Array) -> Array:
-    """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
+    """Heights (s, x) of the wheel over the tangent plane, by Newton's method on the condition that the distance to the
+    axle is the radius."""
     ahead, along, into = np.array(
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
     )

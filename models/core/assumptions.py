@@ -56,7 +56,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class BrokenAssumption:
-    """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value.
+    """A violated assumption: ``where``, the share of time, the time of the first violation (s), and the worst value.
 
     law : by which the share is told where no values over time are known; the worst value then is three deviations off.
     """

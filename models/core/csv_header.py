@@ -45,7 +45,7 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class Head:
-    """The headings of a table: the lines above the numbers.
+    """Headings of a table, and the lines around them up to the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
     left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
@@ -105,7 +105,8 @@ def separator_line(text: str) -> str:
 
 
 def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequence[str]) -> str:
-    """Decimal sign of cells, the first of which are in ``line_number``; InputError where commas have two meanings."""
+    """Decimal sign used in the cells, which begin in line ``line_number``; InputError where a comma can be read in two
+    ways."""
     commas, why = [cell for cell in cells if "," in cell], ""
     if not commas:
         return "."
@@ -172,8 +173,8 @@ def _head(lines: Sequence[Line], i: int, is_known_heading: Callable[[str], bool]
 
 
 def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
-    """The text of a table with commas between columns, decimal points and units in the headings, each line in its
-    place.
+    """Text of a table in plain form: commas between columns, decimal points and units in the headings. Every line keeps
+    its number.
 
     ``wanted`` are names of columns, by which the headings are known. Titles become comments; a separator that ends the
     lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the

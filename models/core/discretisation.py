@@ -38,7 +38,8 @@ UNMOVED_DEVIATION, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Estimate:
-    """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
+    """Estimated error of a channel: ``error`` in its unit, ``share`` relative to its standard deviation, ``order`` of
+    convergence.
 
     step : longest step (s), or fewest cells, that would hold the share to GOAL; 0 where no step mends it. of : CELLS
     where it is of cells.
@@ -140,7 +141,7 @@ def estimated(
     growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
+    """The result with estimated errors of the channels in ``fine``, which are its own rows at steps of ``step`` (s).
 
     growth : by channel, least factor on
     what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
@@ -160,7 +161,7 @@ def by_steps(
     growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
-    """Errors of the channels of ``fine``, without units, and how they were told.
+    """Estimated errors of the channels in ``fine``, without units, and a text on how they were estimated.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
     be, half of it over a part tells. growth, sizes : as in ``estimated``.
@@ -278,8 +279,8 @@ def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
 
 
 def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
-    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: of steps or
-    cells.
+    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: unit of steps
+    or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """

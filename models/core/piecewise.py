@@ -7,7 +7,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def evaluate(coefficients, period, start, step, count, derivatives):
-    """Values at start + i step, then first derivatives, then second: shape (count, columns (derivatives + 1)).
+    """Values of a piecewise polynomial at start + i step, then its first and second derivatives: shape (count, columns
+    (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
     the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.

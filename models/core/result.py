@@ -81,7 +81,7 @@ class Result:
         return float(self.data.attrs["seconds"])
 
     def save(self, path: Path | str) -> None:
-        """Write netCDF without the seconds: the same run gives the same bytes.
+        """Write a netCDF file without the computing time, so that the same run gives identical bytes.
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
         """
@@ -115,7 +115,7 @@ def result(
     detail: Any = None,
     **attributes: Any,
 ) -> Result:
-    """The result of a scene's run.
+    """``Result`` of a scene's run.
 
     axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
     doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text.

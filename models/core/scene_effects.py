@@ -34,7 +34,7 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a system's table of effects: one that a key of the system's own tables names.
+    """An entry in a system's table of effects, for an effect that is named by a key of the system's own tables.
 
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
     adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
@@ -89,7 +89,7 @@ class Entry:
 
 
 class Effect:
-    """An effect as its file or its line of the table gives it; what it has not of these is as here.
+    """An effect as defined by its file or its table entry; attributes missing there have the defaults given here.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def _of_entry(entry: Entry) -> Effect:
 
 
 def names_of(system: str) -> tuple[str, ...]:
-    """All effects that scenes of a system may have; none is imported."""
+    """Names of all effects that scenes of a system may have, found without importing them."""
     return tuple(sorted({*_files(system), *_table(system)}))
 
 
@@ -223,7 +223,7 @@ def with_own(scene: Any) -> Any:
 
 
 def extended(system_object: Any, scene: Any) -> Any:
-    """The object that a system built of a scene, extended by the scene's tables [effects.NAME]."""
+    """The object that a system built from a scene, extended by the effects in the tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
         system_object = _extend(name, module_of(scene.system, name), system_object, table)
     return system_object
@@ -255,7 +255,7 @@ def _read(name: str, values: Any, system: str, file: str) -> Any:
 
 
 def check(scene: Any) -> None:
-    """Refuse effects that cannot be together, with the remedy."""
+    """Refuse effects that exclude each other or lack an effect that they need; the message gives the remedy."""
     legal(named_effects(scene), scene)
 
 
@@ -302,7 +302,7 @@ def _table_of_effect(scene: Any, name: str) -> str:
 
 
 def own_table(scene: Any) -> Table:
-    """The scene's file as nested tables that may be edited, without defaults."""
+    """The scene's file as nested, editable tables, without default values."""
     table: Table = deepcopy(scene.model_dump(exclude_unset=True))
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 

@@ -47,7 +47,8 @@ class SceneFile(Strict):
         return self.model_dump(exclude_none=True)
 
     def check_choice(self) -> None:
-        """Quantities and a tolerance belong to a choice of effects, and to nothing else."""
+        """Require quantities and a tolerance where the scene lets its effects be chosen automatically; refuse them
+        elsewhere."""
         given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
         for key, value in given.items():
             if self.study == self.CHOOSING and value is None:

@@ -127,7 +127,7 @@ def _is_plain(text: str, columns: Columns) -> bool:
 
 @lru_cache(CACHED_TEXTS)
 def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
-    """Numbered header line and numbered rows, without comments and empty lines."""
+    """Header line and rows, with line numbers, without comments and empty lines."""
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
@@ -230,7 +230,7 @@ def _row(
 
 
 def number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
-    """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
+    """One finite number; Python's extensions (1_000, non-Latin digits) do not count as numbers."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:

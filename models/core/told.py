@@ -50,7 +50,8 @@ def _list_of_few(names: list[str]) -> str:
 
 
 def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
-    """Broken assumptions, the worst of each name over all results, with the names of the results that broke it."""
+    """Broken assumptions: for each name the worst violation over all results, and the names of the results that broke
+    it."""
     where: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
     for name, run in results.items():

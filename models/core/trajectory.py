@@ -7,7 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in counts.
+    """Path of a run: times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in
+    counts.
 
     enforced (m, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
     (N m, nose up); None where nothing is.

@@ -165,7 +165,8 @@ def _lines_of_legends(figure: Figure) -> int:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write ``path`` (.svg or .png) without a date, and return the path; drawn once, where ``savefig`` draws twice."""
+    """Write ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while ``savefig``
+    draws it twice."""
     with whole_file(path) as part:
         if path.suffix == ".svg":
             from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -226,7 +227,7 @@ class _Between(LogLocator):
 
 
 class PlainLogScale(LogScale):
-    """The scale called "log" in every figure; with another base than ten it is matplotlib's."""
+    """Logarithmic scale named "log" in every figure; with a base other than ten it behaves as matplotlib's."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

@@ -56,7 +56,7 @@ class RigidPitch:
         return self.inertia + self.carried
 
     def moment(self, forces: np.ndarray) -> np.ndarray:
-        """Moment (n,) in N m of wheel forces (n, 2) in N."""
+        """Pitch moment (n,) in N m from wheel forces (n, 2) in N."""
         return self.front * forces[:, 0] - self.rear * forces[:, 1]
 
     def intensity(self, deviation: float, period: float) -> float:
@@ -93,7 +93,8 @@ def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np
 
 
 def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np.ndarray:
-    """Pitch rate (n,) in rad/s that wheel forces (n, 2) in N alone give, their moment integrated once: no run."""
+    """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
+    simulation."""
     rigid = rigid_pitch(p)
     moment = rigid.moment(forces)
     steps = 0.5 * (moment[1:] + moment[:-1]) * period
@@ -101,12 +102,13 @@ def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np
 
 
 def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> float:
-    """lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces vertical."""
+    """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
+    space."""
     return float(np.sqrt(rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff)).mean()))
 
 
 def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
-    """lambda (n,) in 1/s that stands in the sinh law at each time, for a motion that is not the same all along.
+    """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the
     variance q int g^2 ds depends on int lambda^2(u) w(u) du alone, with the weight w = u^2 (t - u) (3 t - u): what
@@ -155,14 +157,14 @@ def holding_stiffness(p: Parameters, rate: float) -> float:
 
 
 def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Spring to the ground of a natural frequency (Hz) of the pitch: k = (I + J) wc^2 in N m/rad, d = 2 zeta (I + J) wc
-    in N m s/rad."""
+    """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
+    d = 2 zeta (I + J) wc in N m s/rad."""
     corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
 def drift_off_time(rate: float, intensity: float, angle: float) -> float:
-    """Time (s) by which half of all runs are more than ``angle`` (rad) off, for a constant growth rate (1/s).
+    """Time (s) at which half of all runs deviate by more than ``angle`` (rad), for a constant growth rate (1/s).
 
     Raises InputError for an intensity or angle that is not above 0, and for a rate below it.
     """

@@ -43,7 +43,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Figures of a run, the mean square of all normalised innovations first."""
+    """Statistics of a run's innovations, the first one being the mean square of all normalised innovations."""
 
     figures: tuple[Figure, ...]
 

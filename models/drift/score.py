@@ -85,7 +85,7 @@ class RunFigures:
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a stabilised run against the true run.
+    """Errors of a stabilised run relative to the true run.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ def consistent(run: Result) -> bool | None:
 
 
 def uncertainty(run: Result) -> float:
-    """Uncertainty of a Kalman filter's pitch by its own statement: twice the largest standard deviation (rad); 0
+    """Uncertainty of the pitch that a Kalman filter states itself: twice its largest standard deviation (rad); 0
     without a filter."""
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
@@ -204,7 +204,7 @@ def blind_verdict(
     consistent: bool | None = None,
     uncertainty: float = 0.0,
 ) -> Verdict:
-    """The verdict of an engineer, who has no true run: by the run's own figures alone. Damage is not among them.
+    """Verdict of an engineer who has no true run, from figures of the run itself; damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
     filter, where there is one, is ``consistent`` with its measurement (NIS within its band) and its own ``uncertainty``

@@ -64,7 +64,7 @@ class PathJob(Protocol):
     """The computation that an ensemble repeats for each path; it must survive pickling to run in other processes."""
 
     def __call__(self, paths: range) -> Arrays:
-        """Named arrays of these paths, first axis len(paths)."""
+        """Named arrays with the results of these paths; their first axis runs over the paths."""
         ...
 
     def facts(self) -> dict[str, Any]:

@@ -51,7 +51,7 @@ class Moments:
 
 
 class StreamedCovariance:
-    """Mean (..., p) and covariance (..., p, p) of values (n, ..., p)."""
+    """Mean (..., p) and covariance (..., p, p) of values (n, ..., p) that arrive in batches."""
 
     def __init__(self) -> None:
         self.count, self.mean, self._sums = 0, np.zeros(()), np.zeros(())
@@ -72,7 +72,7 @@ class StreamedCovariance:
 
 
 class Tally:
-    """Counts of values on a grid, a count per grid point. No value is nan."""
+    """Counts of distinct values; they should lie on a grid, so that few of them differ. No value may be NaN."""
 
     def __init__(self) -> None:
         self._counts: Counter[float] = Counter()
@@ -101,7 +101,7 @@ class Tally:
 
 
 class Spread:
-    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the value of its rank; nan is left out."""
+    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the exact quantile; NaN is ignored."""
 
     def __init__(self) -> None:
         self._width = np.log1p(2.0 * ACCURACY / (1.0 - ACCURACY))
@@ -122,7 +122,7 @@ class Spread:
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
     def percentiles(self, levels: tuple[float, ...]) -> np.ndarray:
-        """Percentiles (levels, k); nan where no value was known."""
+        """Percentiles (levels, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
         wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
         place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)

@@ -19,7 +19,7 @@ LEVELS, RANGES = 64, 64
 
 @dataclass(frozen=True)
 class Counted:
-    """One load, counted.
+    """Results of counting one load.
 
     damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
     least that range; least, greatest : the load's extremes; mean.

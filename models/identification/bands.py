@@ -40,7 +40,7 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """predicted and half_width (channels, n) on the clock of ``problem``."""
+    """Predictions with error bands: predicted and half_width (channels, n), on the clock of ``problem``."""
 
     problem: Problem
     predicted: np.ndarray

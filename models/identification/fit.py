@@ -22,7 +22,8 @@ Told = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages; converged."""
+    """Result of a fit. values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages;
+    converged."""
 
     problem: Problem
     values: np.ndarray
@@ -46,7 +47,7 @@ def fit(
     first: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
-    """Estimates by scipy's least squares; InputError where the model fails at the start.
+    """Least-squares estimates by scipy; InputError where the model fails at the start values.
 
     stage_store : finished stages, the first of them block ``first``; tell : told after each stage; executor : computes
     the columns of Jacobians.

@@ -92,7 +92,7 @@ def _names(owner: Any) -> tuple[str, ...]:
 
 
 class SceneModel:
-    """Channels over time of a scene with other values of its keys, by an engine.
+    """Model of a scene: its channels over time as a function of the values of some keys, computed by an engine.
 
     table, file, folder : of the scene; ``channels_of`` gives name -> (unit, times, values) of a result.
     """
@@ -114,7 +114,7 @@ class SceneModel:
         return self.run_of(self.scene(values), self.engine)
 
     def __call__(self, values: np.ndarray) -> dict[str, Curve]:
-        """Channels over time by their names."""
+        """Channels over time, by name, for the given parameter values."""
         return {name: (times, row) for name, (_, times, row) in over_time(self.result(values)).items()}
 
 

@@ -146,7 +146,8 @@ class Problem:
         return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
-        """Output of the model (channels, n) at all times of the clock, low-passed like the measurement; read-only."""
+        """Output of the model (channels, n) at all times of the clock, filtered by the same low-pass as the
+        measurement; read-only."""
         key, kept = values.tobytes(), self._latest_predictions
         if key not in kept:
             prediction = self._march(values)

@@ -35,7 +35,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Subset:
-    """Parameters (k,) of a subset with their values and covariance (k, k), chi^2 and how many numbers were fitted.
+    """Fit of a subset of parameters (k,): their values and covariance (k, k), chi^2, and the number of fitted data.
 
     undetermined : of those that the data do not tell: names of parameters that no number depends on, or sums of them.
     """
@@ -49,7 +49,7 @@ class Subset:
 
     @property
     def named(self) -> dict[str, float]:
-        """Values by name."""
+        """Fitted values by parameter name."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @property

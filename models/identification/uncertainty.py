@@ -151,7 +151,8 @@ def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.nd
 
 
 def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
+    """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
+    residuals are large, but scatter more."""
     values, vectors = np.linalg.eigh(second)
     values = np.maximum(values, SINGULAR * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T

@@ -88,7 +88,8 @@ def named_closure(function: Any, *parts: Any) -> Any:
 
 @cache
 def checksum(folder: Path) -> int:
-    """Checksum of the sources that a kernel of this folder may be made of, and of the tables beside them."""
+    """Checksum of all sources in this folder, and in those that all kernels share, of which a kernel here may consist,
+    with the tables beside them."""
     sources = (
         path for place in sorted({folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
     )
@@ -103,8 +104,8 @@ def _files(function: Any) -> list[Path]:
 
 
 def stamp(file: Path, *others: Path) -> int:
-    """Checksum of the sources that a kernel of this file may be made of: its folder's, and kernels of
-    those others and of what all of them import."""
+    """Checksum of all sources that a kernel in this file may contain: those of its folder, and the kernels of
+    ``others`` and of all files that these import."""
     made_of = {*others, *(path for each in (file, *others) for path in _imported(each))}
     elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
     return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))

@@ -83,7 +83,7 @@ def start(typing_context, array):
 
 @_intrinsic
 def at(typing_context, address):
-    """Pointer to the double at an address, a whole number."""
+    """Pointer to doubles from an address given as a whole number."""
 
     def generate(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], context.get_value_type(DOUBLES))

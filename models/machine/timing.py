@@ -68,7 +68,7 @@ def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
 
 
 def describe(seconds: Sequence[float]) -> dict[str, float]:
-    """Median, median absolute deviation and minimum (s)."""
+    """Median, median absolute deviation and minimum of timed samples (s)."""
     values = np.asarray(seconds)
     middle = float(np.median(values))
     return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}

@@ -68,7 +68,7 @@ class AxleForces:
 
     @cached_property
     def loads(self) -> np.ndarray:
-        """Static loads (2,) in N; those of 9.81 m/s^2 where nothing weighs."""
+        """Static axle loads (2,) in N; computed with 9.81 m/s^2 if the vehicle has no gravity."""
         return _loads(self.parameters) * (self.parameters.g or GRAVITY)
 
     @cached_property
@@ -78,7 +78,8 @@ class AxleForces:
 
     @property
     def empty(self) -> np.ndarray:
-        """Which axles (2,) have a mean force that is negligible beside their load and their variation."""
+        """Which axles (2,) have a mean force that is negligible compared with their static load and with their
+        variation."""
         return (np.abs(self.means) < EMPTY * self.loads) & (np.abs(self.means) <= self.forces.std(axis=0))
 
     @property
@@ -228,7 +229,7 @@ def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = Non
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
-    """Means of equal parts of values (n, ...) along the first axis."""
+    """Means of values (n, ...) over blocks of equal length along the first axis."""
     parts = np.array_split(values, min(BLOCKS, max(len(values) // 2, 2)))
     return np.array([part.mean(axis=0) for part in parts])
 

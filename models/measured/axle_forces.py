@@ -256,8 +256,8 @@ def _delay(axles: AxleForces) -> tuple[float, float, float]:
 
 
 def unchecked(axles: AxleForces) -> str:
-    """Sentence on why these forces alone do not show the delay from axle to axle, and what would; "" for constant
-    forces."""
+    """Sentence on why these forces alone do not show the delay between the axles, and what would show it; "" for
+    constant forces."""
     if not np.ptp(axles.forces, axis=0).any():
         return ""
     late, alike, _ = _delay(axles)

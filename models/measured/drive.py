@@ -20,8 +20,8 @@ FEWEST_SAMPLES = 16
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDrive:
-    """times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : samples of each channel that were spikes or
-    not measured, and are bridged by a straight line."""
+    """A measured drive. times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : number of samples of each
+    channel that were spikes or not measured, and are replaced by straight lines."""
 
     times: np.ndarray
     steer: np.ndarray

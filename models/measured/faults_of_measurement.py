@@ -75,7 +75,8 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
 def measured(
     faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
 ) -> np.ndarray:
-    """Samples (m, signals) of every ``stride``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
+    """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), ``step`` (s) apart, with
+    all faults; NaN where a sample is lost.
 
     seed and path name the noise: the same ones give the same samples, whoever asks.
     """

@@ -43,8 +43,8 @@ MARK = 1e30
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples from ``first`` to before ``end``; ``doubt`` (in the channel's unit) is the largest deviation of what was
-    filled in, NaN where nothing was, for the gap is too long or has no neighbours."""
+    """A gap: samples from ``first`` to before ``end``. ``doubt`` (in the channel's unit) is the largest standard
+    deviation of the filled values, NaN if the gap is not filled because it is too long or has no neighbours."""
 
     first: int
     end: int

@@ -38,7 +38,7 @@ class Recording:
 
     @property
     def count(self) -> int:
-        """Samples of every signal."""
+        """Number of samples of every signal."""
         return self.columns.count
 
     @property

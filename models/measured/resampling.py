@@ -11,7 +11,7 @@ EQUAL_RATES = 1e-6
 
 
 def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
-    """Values (n,) at the times of an even grid (n,), s.
+    """Values (n,) resampled to the times of an even grid (n,), s.
 
     times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
     wherever two samples more than 1.5 periods apart lie around a point, and outside.

@@ -48,7 +48,7 @@ class Timing:
 
     @property
     def rate(self) -> float:
-        """Hz."""
+        """Sampling rate, Hz."""
         return 1.0 / self.period
 
     @property

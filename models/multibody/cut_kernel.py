@@ -133,8 +133,8 @@ def _element(e, numbers, motion, chassis, row):
 
 @lean
 def _read_inputs(head, inputs, t, row):
-    """Fill ``row`` with the inputs at a time (s): those of the nearest half step, or of the parabola through the three
-    rows of a step, for methods that pick their own steps."""
+    """Fill ``row`` with the inputs at a time (s): those of the nearest half step; for methods with variable steps, of a
+    parabola through the three rows of a step."""
     last, place = len(inputs) - 1, t * head[PER_TIME]
     if head[ANY_TIME] == 0.0:
         nearest = min(max(int(np.rint(place)), 0), last)
@@ -239,7 +239,8 @@ def parts(numbers):
 
 @njit(cache=True, error_model="numpy")
 def forces(numbers, t, q, v, m, out, told):
-    """Add all joint forces to ``out`` (n,) at a time (s), coordinates and rates (n,).
+    """Add the forces of all elements and hubs to the joint forces ``out`` (n,) at a time (s), coordinates and rates
+    (n,).
 
     Also fills ``m`` and the ``ForceReport``.
     """
@@ -323,7 +324,7 @@ def march(numbers, states, step):
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the joints' forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
     m = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
@@ -333,7 +334,8 @@ def joint_forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
+    then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

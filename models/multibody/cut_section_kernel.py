@@ -57,7 +57,8 @@ JOINT, POINT_ARM, WEIGHT, PER_POINT = 0, 1, 4, 5
 
 
 class FeltPlaces(NamedTuple):
-    """Where something is felt inside a vehicle of b bodies, h hubs and e elements.
+    """Places inside a vehicle of b bodies, h hubs and e elements at which section forces or accelerations are
+    evaluated.
 
     guides (g,) : last joint of each guided body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both
     ends and the frame of elements acts behind it; points (p, PER_POINT).

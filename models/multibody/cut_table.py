@@ -40,7 +40,7 @@ class HubInputs:
 
     @property
     def rows(self) -> np.ndarray:
-        """(m, 6 h or 2 h, and 6 with a guide): inputs as the kernel reads them."""
+        """Inputs in the form that the kernel reads: (m, 6 h or 2 h), with 6 more columns if there is a guide."""
         return self.hubs if self.guide is None else np.hstack([self.hubs, self.guide])
 
     def spans(self) -> list[tuple[int, int]]:
@@ -76,7 +76,7 @@ def joints(vehicle: CutVehicle) -> Joints:
 
 
 def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
-    """All numbers for a run at a step (s)."""
+    """Table of all numbers for a run with a step (s)."""
     joined = joints(vehicle)
     bodies = []
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):

@@ -186,7 +186,8 @@ def _load(tyre, deflection, rising, ledger):
 
 @lean
 def touch(tyre, waves, count, steer, steering, vehicle, wheel):
-    """Load, place and sliding velocity of a tyre on a road of ``count`` waves: fills the ``WheelContact``.
+    """Contact of a tyre with a road of ``count`` waves: fills load, position and sliding velocity of the
+    ``WheelContact``.
 
     steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
     """
@@ -231,7 +232,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
 
 @lean
 def creep(tyre, creeping, vehicle, wheel):
-    """A tyre's creep forces and moment (3,) and its load onto its wheel; the moment about the axle onto the spin."""
+    """Add a tyre's load, creep forces and moment (3,) to its wheel; the moment about the axle accelerates the spin."""
     way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
     knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
     force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
@@ -381,7 +382,7 @@ def all_forces(numbers, t, q, v, f, report, ledger):
 
 @lean
 def forces(numbers, t, q, v, f):
-    """Add the forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the vehicle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
@@ -390,7 +391,8 @@ def forces(numbers, t, q, v, f):
 
 @lean
 def set_forces(block, t, n):
-    """``forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``forces``. All data are in one block of doubles at an address: f, q and v (n,), then
+    the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

@@ -99,7 +99,7 @@ class Handling:
 
     @property
     def gravity(self) -> np.ndarray:
-        """(3,) m/s^2 in the axes of the road."""
+        """Vector of gravity (3,) in m/s^2, in the axes of the road."""
         return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
 
     def tyre_numbers(self, i: int) -> np.ndarray:
@@ -182,8 +182,8 @@ class _Points:
 
 
 def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
-    """Table rows of all coordinates, with their number within the body; a rotation of a body that carries nothing else
-    is marked loose.
+    """Table rows of all coordinates, each with the number of coordinates of its body. The rotation of a body that
+    carries nothing is marked as loose.
 
     held : coordinates that are the last to move a point where something acts.
     """
@@ -310,7 +310,7 @@ def _pushes(handling: Handling) -> np.ndarray:
 
 
 def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
-    """(3 + pushes, 2, k): times and values of steer, brake, drive and pushes, filled up with the last knot."""
+    """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded with the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))
     filled = [

@@ -52,7 +52,8 @@ the last coordinate of the body in which its axis is fixed (0: the carrier)."""
 
 @lean
 def press(numbers, first, count, links, spots, q, v, f):
-    """Forces of all parts into spots, and into ``f`` of their own coordinates; their energy (J) and power (W).
+    """Add the forces of all springs, bars and other parts to the spots, or to ``f`` for their own coordinates; returns
+    their energy (J) and power (W).
 
     numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
     its two forces: a towed body by its link.

@@ -35,13 +35,13 @@ def three(numbers, first):
 
 @lean
 def dot(a, b):
-    """a . b of tuples."""
+    """Scalar product a . b of tuples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @lean
 def cross(a, b):
-    """a x b of tuples."""
+    """Vector product a x b of tuples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -164,7 +164,8 @@ def twist(link, ground, moment):
 
 @lean
 def inwards(joints, n, points, count, tree, f):
-    """Forces at spots and on links, from the leaves to the carrier: each coordinate adds its share to ``f``.
+    """Transfer forces at spots and on links from the leaves to the carrier; each coordinate adds its generalised force
+    to ``f``.
 
     What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
     """

@@ -53,8 +53,8 @@ def equations(twin: TwinModel, build: str) -> Equations:
 
 
 def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
-    """How far states are at the most from satisfying a build's own constraints, m or rad: rigid bodies that lie wrong
-    to each other have the same accelerations."""
+    """Largest violation, m or rad, of a build's own constraints at the states. Comparing accelerations would not show
+    it: bodies in wrong relative positions can have the same accelerations."""
     if not twin.driven.tied:
         return 0.0
     if build == PLAIN:

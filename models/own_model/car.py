@@ -46,7 +46,7 @@ DIFFERS = 0.01
 
 
 def car(path: Path) -> SpatialVehicle:
-    """The vehicle of an MJCF file, unloaded; InputError for what no vehicle of a scene can have."""
+    """The vehicle of an MJCF file, unloaded; InputError for features that vehicles of a scene cannot have."""
     document = guarded(path)
     if document.kind != "MJCF":
         raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")

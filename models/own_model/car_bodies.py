@@ -25,7 +25,8 @@ ROUNDING = 1e-12
 
 
 class Mass(NamedTuple):
-    """mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in the vehicle's axes (kg m^2)."""
+    """Mass properties of a rigid body: mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in
+    the vehicle's axes (kg m^2)."""
 
     mass: float
     centre: np.ndarray
@@ -71,7 +72,7 @@ class _Segment:
 def car_bodies(
     model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
 ) -> CarBodies:
-    """The bodies; InputError for joints that are oblique, and for wheels that are out of balance.
+    """Bodies of the car; InputError for joints with oblique axes, and for wheels with imbalance.
 
     design : data of the model in the design position, with kinematics computed; reserved : names for other bodies.
     """

@@ -61,7 +61,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
+    """Agreement of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
     rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more;
@@ -119,8 +119,8 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
 
 
 def softness(twin: TwinModel, count: int) -> float:
-    """Largest relative difference of accelerations of the file's own model with MuJoCo's soft constraints from those
-    with rigid ones, at states that satisfy them."""
+    """Largest relative difference of the file's accelerations with MuJoCo's soft constraints from those with rigid
+    constraints, at states that satisfy the constraints."""
     states = states_of(twin, count)
     return agreement("", reference(twin, states, PLAIN), moved_at(expected(twin, SOFT), states)).acceleration
 
@@ -133,8 +133,8 @@ def reference(twin: TwinModel, states: Sequence[State], build: str) -> Reference
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
-    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any, or an
-    acceleration is not finite."""
+    """Mass matrix, forces and accelerations at all states; RunFailed where a mass matrix is singular or an acceleration
+    is not finite."""
     try:
         moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:

@@ -41,7 +41,7 @@ def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray
 
 
 def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """J (c, n), and J' q' (c,) by its differences along the motion, at coordinates and rates (n,)."""
+    """Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates (n,)."""
     stride = STRIDE / max(float(np.abs(v).sum()), 1e-9)
     steps = [k * stride * v for k in range(1, len(SLOPES) + 1)]
     rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])

@@ -16,7 +16,8 @@ SLIDE, BALL, FREE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in 
 
 
 class MujocoState(NamedTuple):
-    """qpos (nq,), qvel (n,), J (n, n) and J' v (n,) at one state."""
+    """MuJoCo's state qpos (nq,), qvel (n,), the Jacobian J (n, n) from the coordinates' rates to qvel, and J' v
+    (n,)."""
 
     qpos: np.ndarray
     qvel: np.ndarray
@@ -57,7 +58,7 @@ class Coordinates:
                 self._plain.append((first, place))
 
     def positions(self, states: np.ndarray) -> np.ndarray:
-        """Coordinates (m, n) of MuJoCo's states (m, nq + n); what turns without limit is not a number."""
+        """Coordinates (m, n) of MuJoCo's states (m, nq + n); NaN for rotations without limits."""
         out = np.full((len(states), self.size), np.nan)
         for coordinate, place in self._plain:
             out[:, coordinate] = states[:, place] - self._zero[place]
@@ -89,7 +90,8 @@ def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
 
 
 def turned(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """R = Rx Ry Rz (3, 3), G (3, 3) of the angular velocity G rates in turned axes, and G' rates (3,)."""
+    """Rotation matrix R = Rx Ry Rz (3, 3), G (3, 3) with the angular velocity G rates in the rotated axes, and G' rates
+    (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)
     first = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     second = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))

@@ -229,7 +229,7 @@ def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
 
 
 def tensor_of(entries: np.ndarray) -> np.ndarray:
-    """(3, 3) of the six entries of an inertia."""
+    """Inertia tensor (3, 3) from its six entries."""
     xx, yy, zz, xy, xz, yz = entries
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
@@ -350,7 +350,7 @@ def _write_softness(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 
 def _read_site(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """Place and orientation of the site that an actuator pushes, in the axes of its body."""
+    """Position and orientation of the site on which an actuator acts, in the axes of its body."""
     site = int(model.actuator_trnid[i, 0])
     return np.concatenate((model.site_pos[site], model.site_quat[site])) if pushes_site(model, i) else np.zeros(0)
 

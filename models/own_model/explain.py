@@ -47,11 +47,11 @@ class Difference:
 
     @property
     def key(self) -> Key:
-        """What differs."""
+        """Identification of the element that differs: its kind and owner."""
         return self.kind, self.owner
 
     def sentence(self, files: Sequence[str]) -> str:
-        """ "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
+        """Text such as "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
         values = [np.zeros(0) if value is None else value for value in (self.first, self.second)]
         first, second = told_apart(values[0], values[1], self.unit)
         return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
@@ -247,7 +247,7 @@ def _says_nothing(there: Element, element: Element | None, other: Element | None
 
 
 def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
-    """Elements without which a build moves as the file's own model does, when both are built without each of them.
+    """Elements whose removal makes a build agree with the file's own model; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """

@@ -79,7 +79,7 @@ def _without_shapes(path: Path) -> tuple[str, int]:
 
 
 def check_sane(model: mujoco.MjModel, name: str) -> None:
-    """InputError where nothing moves, or a number that moves something is not finite."""
+    """InputError if nothing can move, or if a number that affects motion is not finite."""
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
     for numbers in FINITE:

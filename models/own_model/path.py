@@ -59,13 +59,13 @@ class PathReport:
 
     @property
     def alike(self) -> bool:
-        """Whether the builds have the same path; the file's own model counts where it has the same coordinates."""
+        """Whether all builds have the same path; the file's own path counts only if it has the same coordinates."""
         others = {FILE: self.quaternions, SOFT: self.soft}
         held = [size for name, size in self.distances.items() if not others.get(name)]
         return bool(held) and max(held) <= ALIKE
 
     def lines(self) -> list[str]:
-        """For the terminal."""
+        """Lines of text for the terminal."""
         under = f", under {self.controls}" if self.controls else ""
         rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state{under}:"]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
@@ -91,7 +91,7 @@ class PathReport:
 
 
 def steps_of_path(twin: TwinModel) -> int:
-    """How many steps a path at the file's own step takes; InputError where they are too many."""
+    """Number of steps of a path at the file's own step; InputError if there are too many."""
     step = float(twin.model.opt.timestep)
     if DURATION / step > MOST_STEPS:
         allowed = (
@@ -201,7 +201,8 @@ def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
 
 
 def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
-    """How many states of a path lie before dry friction sticks in MuJoCo, less one whose step may have met that."""
+    """Number of states of a path before dry friction sticks in MuJoCo; one less, since the step before may already be
+    affected."""
     acting = (leg.twin for leg in legs for _ in range(leg.steps))
     for i, (twin, row) in enumerate(zip(acting, path, strict=False)):
         q, v = np.split(row, 2)

@@ -104,7 +104,7 @@ def _joint(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | N
 
 
 def _along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """Right-handed axes, as rows, the first of which lies along a unit vector."""
+    """Right-handed axes, as rows, of which the first is the given unit vector."""
     if axis[0] == 1.0:
         return PARALLEL
     second = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
@@ -231,7 +231,7 @@ def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def controls(model: mujoco.MjModel) -> np.ndarray:
-    """Constant controls (nu,): 0, or the nearest number in the range of a limited one."""
+    """Constant controls (nu,): 0, or for a limited control the nearest number in its range."""
     limited = model.actuator_ctrllimited[:, None].astype(bool)
     low, high = np.where(limited, model.actuator_ctrlrange, (-np.inf, np.inf)).T
     return np.clip(np.zeros(len(low)), low, high)
@@ -293,7 +293,8 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def compensation(model: mujoco.MjModel, body: int) -> float:
-    """Share of the joints that move a body through which its weight is compensated: 0 where nothing of it is.
+    """Share of a body's weight that is compensated, as the share of the joints above it that transmit the compensation;
+    0 for none.
 
     MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
     actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.

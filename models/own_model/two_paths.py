@@ -36,7 +36,8 @@ class PathGap:
 
 
 def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
-    """How far paths over 1 s are apart, at the step of the first file; both have the same names of coordinates."""
+    """Difference between two files' paths over 1 s, at the step of the first file; both must have the same names of
+    coordinates."""
     steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
     step, order = DURATION / steps, [first.names.index(name) for name in second.names]
     legs = [constant_leg(twin, steps) for twin in (first, second)]

@@ -23,7 +23,7 @@ MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 @dataclass(frozen=True)
 class Misread:
-    """What MuJoCo's parser made something else of: kind, owner, unit, the file's value, and the parser's."""
+    """A number that MuJoCo's parser changed: kind, owner, unit, the file's value, and the parser's value."""
 
     kind: str
     owner: str
@@ -66,7 +66,7 @@ class _Mass:
 
 
 def misread(file: ModelFile) -> list[Misread]:
-    """Numbers of a URDF that MuJoCo's compiled model has otherwise, each with both values."""
+    """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
     root = ElementTree.fromstring(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
@@ -164,7 +164,7 @@ def _end(joint: ElementTree.Element, which: str) -> str:
 
 
 def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Shift (3,) and rotation (3, 3) of an <origin>."""
+    """Translation (3,) and rotation (3, 3) of an <origin>."""
     origin = element.find("origin")
     roll, pitch, yaw = _numbers(origin, "rpy", (0.0, 0.0, 0.0), file)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
@@ -175,7 +175,7 @@ def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.nda
 
 
 def _numbers(element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str) -> np.ndarray:
-    """Numbers of an attribute; InputError where they are none, or not as many as wanted."""
+    """Numbers in an attribute; InputError where they are not numbers, or not as many as wanted."""
     text = None if element is None else element.get(name)
     if text is None:
         return np.array(default)

@@ -88,7 +88,7 @@ def _check_site(
 def _axles(
     design: mujoco.MjData, document: Document, model: mujoco.MjModel, ordered: list[int]
 ) -> list[tuple[int, ...]]:
-    """Sites of every axle, from the front; InputError where they are no axles."""
+    """Sites of every axle, from the front; InputError where they do not form axles."""
     axles, x = [ordered[:1]], design.site_xpos[:, 0]
     for before, site in pairwise(ordered):
         apart = round(float(x[before] - x[site]), 9)

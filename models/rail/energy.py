@@ -47,7 +47,7 @@ class Ledger:
 
     @cached_property
     def residual(self) -> Array:
-        """The energy that the sums leave unaccounted for at each time (n,), 0 at the start (J)."""
+        """Residual of the energy balance (n,) in J at each time; 0 at the start."""
         stored = self.kinetic + self.springs + self.gravity + self.contacts
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 

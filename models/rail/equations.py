@@ -84,7 +84,7 @@ class Body(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Arrays of the march: sum of the rates, rates and state of a stage (10,); a report of no rows."""
+    """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
     total: Array
     rate: Array
@@ -158,7 +158,7 @@ def _hold(state, body, turning, axle, force, moment):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def march(state, parameters, steps, path, reports):
-    """RK4 from ``state``, which is moved; how many steps were made.
+    """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
     parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
     reports.
@@ -199,14 +199,16 @@ def _march(state, parameters, steps, path, reports, room, stages):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelsetPath(Trajectory):
-    """A run, states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, right first."""
+    """Path of a run: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the right wheel's
+    first."""
 
     contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells : of FASTSIM's strips.
+    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells :
+    of FASTSIM's strips.
 
     lean : of the track to the right, the weight across the track as a share of that square to it.
     """
@@ -266,13 +268,14 @@ class Equations:
         return np.full((*shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
-        """Rates (10,) of a state (10,)."""
+        """Time derivative (10,) of a state (10,)."""
         out = np.empty(STATES)
         rates(np.asarray(state, float), *self.parameters, out, UNREPORTED)
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:
-        """Rates (n, 10) by the written equations and contacts, REPORT (n, patches), at states (n, 10)."""
+        """Time derivatives (n, 10) of states (n, 10) by the hand-written equations, and their contacts, REPORT (n,
+        patches)."""
         every, contacts = np.empty_like(states), self.blank(len(states))
         for state, rate, contact in zip(states, every, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
@@ -318,7 +321,7 @@ class Equations:
 
     @cached_property
     def _fastest(self) -> float:
-        """Largest rate (1/s) of the motions about rest."""
+        """Largest eigenvalue magnitude (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
     def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:

@@ -42,7 +42,7 @@ NODES = 720
 
 @dataclass(frozen=True)
 class KlingelWave:
-    """Klingel's wave of an amplitude, in the table's unit of length.
+    """Periodic motion of a free wheelset (Klingel) with one amplitude, in the table's unit of length.
 
     centre : middle between both turning points ``lowest`` and ``highest``. period : T of y'' = -dr(y); infinite where
     dr is zero over the whole of the amplitude: then the wheelset does not steer, the conicity is 0 and there is no

@@ -30,7 +30,7 @@ PRECISION, ITERATIONS = 1e-6, 30
 
 @dataclass(frozen=True)
 class Share:
-    """The load that one patch carries, and where.
+    """Load that one patch carries, and the position of that load.
 
     load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2. box : sides x0, x1, y0, y1 of
     the rectangle about the area, along the rail and along its contour (m). peak : Pa. piece : number of the piece of

@@ -30,7 +30,7 @@ _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_R
 
 
 def table(speed: float, rails: Rails) -> Array:
-    """The table of numbers that the compiled joint forces read."""
+    """Table of the numbers that the compiled joint forces read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)

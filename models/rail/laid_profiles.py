@@ -87,7 +87,7 @@ def _profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
 
 @cache
 def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
-    """The arrays that ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
+    """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
     side = profiles.side(radius)

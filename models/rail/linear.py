@@ -54,7 +54,7 @@ class NoCriticalSpeed(InputError):
 
 @dataclass(frozen=True)
 class LinearWheelset:
-    """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
+    """Linear equations M q'' + D q' + K q = 0 for q = (y, psi); matrices (2, 2), SI units."""
 
     mass: Array
     damping: Array
@@ -82,7 +82,7 @@ def kalker(wheelset: Wheelset) -> Array:
 
 
 def matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
-    """Equations of motion at a speed (m/s) above 0; raises InputError for another one."""
+    """``LinearWheelset`` at a speed (m/s), which must be above 0; raises InputError otherwise."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker(wheelset)

@@ -84,7 +84,7 @@ class RollingRadiusTable:
         return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
 
     def difference(self, displacement: float, side: Any = "right") -> float:
-        """The difference at a displacement; at a jump the value to its left or right."""
+        """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
         i, share = self._row_before(displacement, side)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
@@ -110,7 +110,7 @@ class RollingRadiusTable:
 
 
 def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
-    """The table in a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; here in m.
+    """Table from a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; converted to m.
 
     InputError names the line that is wrong.
     """

@@ -121,8 +121,8 @@ class PatchPlace(NamedTuple):
 
 
 class PatchMotion(NamedTuple):
-    """Motion of a contact patch: slip along, velocity across the track, slip across (m/s), turning about the normal
-    (1/s), speed of approach (m/s)."""
+    """Motion of a contact patch: sliding velocity along, velocity across the track, sliding velocity across (m/s),
+    rotation about the normal (1/s), velocity of approach (m/s)."""
 
     vx: float
     vy: float
@@ -269,7 +269,7 @@ def _both_ways(forwards, contacts, slip, speed, rails, room):
 
 @inlined
 def creep(contacts, slip, speed, rails, room):
-    """Fill the forces fx, fy, mz in the room of contacts (CONTACT) from their slip (MOTION).
+    """Fill the forces fx, fy, mz in ``room`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
     """
@@ -286,10 +286,11 @@ def creep(contacts, slip, speed, rails, room):
 
 @inlined
 def wheel_forces(pose, rails, report, room):
-    """Add what both rails do to the wheelset to its force and moment.
+    """Add the forces and moments of both rails on the wheelset to its resultants.
 
     pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Workspace``, its
-    wheelset given in, all else written over."""
+    wheelset given in, all else written over.
+    """
     if rails.law == LINEAR and rails.profile.nodes.size == 0 and room.wheelset[0].velocity[0] >= REGULAR:
         _linear_cones(pose, rails.wheels[0], room.wheelset[0], report)
     else:

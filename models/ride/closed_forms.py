@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 @dataclass(frozen=True)
 class QuarterCar:
-    """Masses in kg, stiffnesses in N/m, damping in N s/m."""
+    """A quarter car: body and wheel. Masses in kg, stiffnesses in N/m, damping in N s/m."""
 
     m_s: float
     m_u: float

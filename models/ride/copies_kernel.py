@@ -16,8 +16,8 @@ TOGETHER = 64
 
 
 class Curves(NamedTuple):
-    """Forces (N) of s springs over travel (m) or over rate (m/s): offset and first slope (s,), and what their slopes
-    change by, bends (s, k), at k corners (s, k); a bend is 0 where a spring has fewer."""
+    """Curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope (s,), and changes of
+    slope, bends (s, k), at k corners (s, k); unused bends are 0."""
 
     offset: np.ndarray
     slope: np.ndarray
@@ -37,7 +37,8 @@ class PushingTyres(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Small motion of n coordinates over w wheels with s bent springs, u tyres that only push, and p outputs.
+    """Force laws and linear motion of n coordinates over w wheels, with s nonlinear springs, u tyres that only push,
+    and p outputs.
 
     rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
     forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,

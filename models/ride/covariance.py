@@ -26,7 +26,7 @@ FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 
 @dataclass(frozen=True)
 class StationaryCovariance:
-    """State and outputs in the stationary state.
+    """Stationary covariance of the state and variances of the outputs.
 
     P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
     there is none; ``status`` and a sentence on its ``reason``; ``rate`` and ``power`` of a variance that grows as
@@ -52,7 +52,7 @@ class StationaryCovariance:
 
 
 def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryCovariance:
-    """Covariance of a system that meets unit white noise, axle after axle.
+    """Stationary covariance of a system whose axles meet unit white noise one after the other.
 
     ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
@@ -145,7 +145,8 @@ def noise_of(system: DelayedSystem, moved: Moved | None = None) -> np.ndarray:
 
 
 def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarray:
-    """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact.
+    """Matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise of all hits, with exact
+    delays.
 
     ``moved`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
@@ -155,7 +156,8 @@ def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarra
 
 
 def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """P of A P + P A' + Q = 0 in extended precision, the last correction, and the residual by its largest term.
+    """Solution P of A P + P A' + Q = 0 in extended precision, the last correction, and the ratio of the residual to its
+    largest term.
 
     python-control with its method named (left alone it takes another where slycot is installed), then refined: the
     residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
@@ -263,7 +265,7 @@ def verdicts(
     accuracy: float,
     split: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Status and reason of every output.
+    """Status of every output's variance, and the reason for it.
 
     White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
     rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 
 def matrices(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
-    """A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and standard deviations."""
+    """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and
+    standard deviations."""
     named: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
         named |= {f"B{i}": B, f"D{i}": D}

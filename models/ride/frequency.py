@@ -48,7 +48,8 @@ Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 
 @dataclass(frozen=True)
 class Quadrature:
-    """variance (p,) with its own estimate of the relative error (p,); frequencies that it took."""
+    """Result of the integration: variance (p,), its estimated relative error (p,), and the number of frequencies
+    used."""
 
     variance: np.ndarray
     error: np.ndarray
@@ -226,7 +227,8 @@ def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: flo
 
 
 def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    """Wavenumbers (k,) in rad/m from ``low`` to ``high`` and their weights in an integral over both sides of 0."""
+    """Positive and negative wavenumbers (k,) in rad/m between ``low`` and ``high``, and their weights for
+    integration."""
     behind = vehicle.axles[0] - vehicle.axles[-1]
     longest = np.pi / behind if behind else np.inf
     edges = [low]

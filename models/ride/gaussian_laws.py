@@ -40,7 +40,8 @@ def _slope(curve: Curve, x: float) -> float:
 
 
 def of_friction(friction: float, friction_rate: float, deviation: float) -> float:
-    """E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), v normal with mean 0 and this deviation (m/s).
+    """Expected slope E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), for v normal with mean 0 and a
+    standard deviation (m/s).
 
     With t = v / friction_rate the integrand sech^2(t) times the density of t is smooth at any ratio of the two.
     """

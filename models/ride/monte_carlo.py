@@ -72,7 +72,7 @@ def variances_along_drive(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Variances along a drive, over the copies, where a cell ends next to each of the instants (s).
+    """Variances over the copies along a drive, at ends of cells next to each of the instants (s).
 
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
     ``weighting.weighted``. Raises InputError for a standstill: a cell would take for ever.
@@ -104,7 +104,8 @@ def at_constant_speed(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Stationary variances (1, p) over the copies and, in each of them, over ``duration`` (s)."""
+    """Stationary variances (1, p) at a constant speed, averaged over the copies and, in each of them, over ``duration``
+    (s)."""
     cells = _Cells(vehicle, excitation, weightings, speed)
     skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
@@ -190,7 +191,8 @@ class _Cells:
         return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
 
     def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> VarianceEstimate:
-        """The estimate from variances and their errors (N, 2, p), inf where an output has none."""
+        """``VarianceEstimate`` from variances and their errors (N, 2, p), inf where an output has no finite
+        variance."""
         moments = np.where(self.finite, rows, np.inf)
         return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
 

@@ -48,7 +48,7 @@ class Copies:
 
     @property
     def mean(self) -> np.ndarray:
-        """Means (p,)."""
+        """Means (p,) of the outputs."""
         return self.moments[0].mean(axis=0)
 
     @property
@@ -157,7 +157,8 @@ class CopiesMarch:
         self.states: np.ndarray | None = None
 
     def over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
-        """Go on over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step ``first``."""
+        """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
+        ``first``."""
         if self.states is None:
             self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
@@ -254,7 +255,7 @@ def _part_of_output(output: SpatialOutput) -> str:
 
 
 def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
-    """Tyres that only push, whose rises by the coordinates are ``heights`` (u, n)."""
+    """``PushingTyres`` of tyres that only push; ``heights`` (u, n) : rise of each tyre's wheel per coordinate."""
     loads = preloads(vehicle).tyres if tyres else {}
     load, stiffness, damping = (
         np.array([(loads[tyre.name], tyre.stiffness, tyre.damping) for tyre in tyres], dtype=float)
@@ -266,7 +267,7 @@ def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray
 
 
 def _curves(curves: Sequence[Curve | None]) -> Curves:
-    """The curves of springs, filled up with bends of 0; a spring without one has a curve of 0."""
+    """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets one that is 0 everywhere."""
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
     most = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()

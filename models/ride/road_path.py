@@ -30,7 +30,7 @@ class RoadPath:
 
     @property
     def step(self) -> float:
-        """Step (s) of a run that reads the road path."""
+        """Time step (s) of a run on this road path."""
         return 2.0 * self.half
 
     @property

@@ -84,7 +84,7 @@ SHRINKING = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
 
 @dataclass(frozen=True)
 class Nodes:
-    """Points (K,) of the integral over the path: time (s), weight (m), step in which they lie."""
+    """Integration points (K,) for the integral over the path: time (s), weight (m), and the step in which each lies."""
 
     time: np.ndarray
     weight: np.ndarray

@@ -100,7 +100,7 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 def statistically_linear(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, scale: float = 1.0
 ) -> StatisticallyLinear:
-    """Replace the bent springs of a vehicle on a road at a constant speed (m/s).
+    """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
 
     scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
         points, the vehicle has several ways to move, and no one covariance.
@@ -145,7 +145,7 @@ class _Search:
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
     def solved(self, scale: float) -> StatisticallyLinear:
-        """Iterate to the fixed point."""
+        """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
         first = _Moments(np.zeros(count), np.full(count, scale * TRAVEL), np.full(count, scale * RATE))
         gains, position = self._gains(first), np.zeros(len(self.plain.mass))

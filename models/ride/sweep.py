@@ -120,7 +120,7 @@ def _fast_variances(
 
 @dataclass(frozen=True)
 class Modes:
-    """A = V diag(values) V^-1, and the condition of V as it was balanced."""
+    """Eigen-decomposition A = V diag(values) V^-1, and the condition number of V after balancing."""
 
     A: np.ndarray
     values: np.ndarray
@@ -228,7 +228,7 @@ def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -
 def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> Modal | str:
-    """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""
+    """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
     before = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
     for j, b in enumerate(inputs):

@@ -37,7 +37,7 @@ BLOCK = 128
 
 @dataclass(frozen=True)
 class VaryingSpeed:
-    """Standard deviations at every instant.
+    """Standard deviations at every instant of a drive.
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
     and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
@@ -122,7 +122,8 @@ def quasi_stationary(
     weightings: Mapping[str, str] | None = None,
     accuracy: float = ACCURACY,
 ) -> np.ndarray:
-    """Standard deviations (N, p) as if each of the speeds (N,) had always been driven; at 0 those at rest.
+    """Standard deviations (N, p) as if each of the speeds (N,) had been constant for ever; for speed 0, those of a
+    vehicle at rest.
 
     Errors are those of ``varying_speed``.
     """

@@ -70,7 +70,8 @@ def level_of_class(road_class: str, level: str = "one-sided") -> float:
 
 
 def class_at_level(level: float) -> str:
-    """The class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), in words with the convention."""
+    """Text with the ISO class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), and the convention
+    used."""
     if level <= 0.0:
         return "smooth"
     place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes

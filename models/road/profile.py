@@ -36,7 +36,7 @@ class RoadProfile(Protocol):
 
     @property
     def finest(self) -> float:
-        """Length (m) of its finest detail: an adaptive solver must not step farther."""
+        """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 
     def height_and_slope(self, s: ArrayLike) -> Samples:
@@ -183,7 +183,7 @@ class SplineProfile:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length (m); a road with a window is flat for ever before its start."""
+        """First and last arc length (m); a road with a window is also defined before its start, where it is flat."""
         return (-math.inf if self.window_length > 0.0 else self.start), self.end
 
     @property

@@ -42,7 +42,7 @@ CASES = {
 
 @dataclass(frozen=True)
 class TwoTrackRoad:
-    """Mean process (m, intensity q1 in m) and roll process (rad, intensity q2 in 1/m)."""
+    """A road of two random processes: mean height (m, intensity q1 in m) and roll (rad, intensity q2 in 1/m)."""
 
     mean: ShapeFilter
     roll: ShapeFilter
@@ -67,7 +67,7 @@ class TwoTrackRoad:
         return self.mean.covariance(distance) + roll
 
     def level(self, y: float) -> float:
-        """S0 (m): without cutoffs the spectrum at y tends to S0 / Omega^2, two-sided."""
+        """Level S0 (m) at y: without cutoffs the two-sided spectrum there tends to S0 / Omega^2."""
         return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
 
     def label(self, y: float) -> str:

@@ -60,7 +60,7 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
 
 
 def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
-    """Pitch (n,) in rad, which is defined at every attitude."""
+    """Pitch angle (n,) in rad of a recovered motion; it is defined at every attitude."""
     w, x, y, z = recovered.orientation.T
     return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))
 

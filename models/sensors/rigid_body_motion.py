@@ -25,7 +25,8 @@ NOISE_FACTOR = 1.5
 
 @dataclass(frozen=True)
 class Spin:
-    """Products of the angular rate by relative accelerations at each instant, in the array's axes e1, e2, n.
+    """Differences of the readings at each instant, in the array's axes e1, e2, n: the matrix M of angular rates, and
+    relative accelerations.
 
     gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
     relative : (n, 3, sensors) in m/s^2, readings less their mean
@@ -79,7 +80,7 @@ class Start:
 
 @dataclass(frozen=True)
 class CutOffs:
-    """High-pass filters (Hz) against drift; None is no filter.
+    """Cut-off frequencies (Hz) of high-pass filters against drift; None means no filter.
 
     turning : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
     position.
@@ -161,7 +162,7 @@ def rates_up_to_sign(spins: Spin) -> np.ndarray:
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
-    """Rates (n, 3) up to one sign: the largest eigenvalue of w w^T and its direction."""
+    """Rates (n, 3), except for a common sign, from the largest eigenvalue of w w^T and its eigenvector."""
     symmetric = 0.5 * (m + np.swapaxes(m, 1, 2))
     half = 0.5 * np.trace(symmetric, axis1=1, axis2=2)[:, None, None]
     sizes, directions = np.linalg.eigh(symmetric - half * np.eye(3))
@@ -239,7 +240,8 @@ def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise:
 
 
 def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
-    """start + the integral of values (n, ...), by the cubic through four neighbours: order 4 in the period."""
+    """Sum of ``start`` and the time integral of values (n, ...), by cubics through four neighbouring samples: order 4
+    in the period."""
     return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(integrals(values, period), axis=0)])
 
 

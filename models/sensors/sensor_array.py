@@ -20,7 +20,7 @@ PLANE = 1e-6
 
 @dataclass(frozen=True)
 class SensorArray:
-    """Sensors on a body, fixed and known.
+    """Sensors that are fixed at known positions on a body.
 
     Attributes
     ----------

@@ -86,7 +86,7 @@ class Burckhardt:
     c3: float
 
     def __call__(self, slip: np.ndarray) -> np.ndarray:
-        """mu at slips from 0 on."""
+        """Friction coefficients mu at slips from 0 on."""
         least = np.minimum(slip, 1.0)
         return -self.c1 * np.expm1(-self.c2 * least) - self.c3 * least
 
@@ -114,7 +114,7 @@ class MagicFormulaCurve:
     E: float
 
     def __call__(self, slip: np.ndarray) -> np.ndarray:
-        """mu at slips from 0 on."""
+        """Friction coefficients mu at slips from 0 on."""
         bent = self.B * slip
         return self.D * np.sin(self.C * np.arctan(bent - self.E * (bent - np.arctan(bent))))
 

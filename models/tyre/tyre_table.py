@@ -110,7 +110,7 @@ class TyreTable:
         return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
-        """mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
+        """Friction coefficients mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
         mu_x, g, h = self._at_nodes(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
@@ -163,7 +163,8 @@ class Tables(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where a slip angle and a load lie in the tables: the cells of both, and the share of each cell below it."""
+    """Location of a slip angle and a load in the tables: the cells of both, and their relative positions in these
+    cells."""
 
     angle: int
     angle_share: float

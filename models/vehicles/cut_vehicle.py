@@ -59,7 +59,7 @@ class Element:
 
     @property
     def unit(self) -> str:
-        """Unit of the force."""
+        """Unit of the element's force: N or N m."""
         return "N" if np.isclose(np.linalg.norm(self.axis), 1.0) else "N m"
 
 
@@ -86,7 +86,7 @@ class CutVehicle:
 
     @property
     def size(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return len(self.tree.coordinates())
 
 
@@ -168,7 +168,7 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
 
 @dataclass(frozen=True)
 class Rigid:
-    """The cut vehicle as one rigid body: what its drift follows when its springs have settled.
+    """The cut vehicle as one rigid body, which describes its drift when the springs have settled.
 
     mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it (kg m^2), arms (h, 3) of the hubs.
 

@@ -89,7 +89,7 @@ class Vehicle:
         return tuple(strut for strut in self.struts if strut.lower.body is None)
 
     def coordinates(self) -> tuple[tuple[str, str], ...]:
-        """Degrees of freedom in the order of the state, as (body, "z" or "pitch")."""
+        """Coordinates in the order of the state, as (body, "z" or "pitch")."""
         heave = [(body.name, "z") for body in self.bodies]
         return (*heave, *((body.name, "pitch") for body in self.bodies if body.pitch_inertia is not None))
 

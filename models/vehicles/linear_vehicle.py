@@ -20,7 +20,7 @@ class WheelPosition:
 
 @dataclass(frozen=True)
 class Output:
-    """One thing that an engineer reads: a linear function of motion and road.
+    """One output quantity: a linear function of the vehicle's motion and of the road.
 
     acceleration_factors, rate_factors, displacement_factors (n,): of q'', q', q. road_factors, road_rate_factors (w,):
     of the heights under the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel",
@@ -49,7 +49,7 @@ class OutputRows(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearVehicle:
-    """M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
+    """Linear vehicle M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
 
     mass, damping, stiffness (n, n); road_stiffness R (n, w) in N/m, road_damping S (n, w) in N s/m. ``coordinates``
     names the n freedoms as (body, freedom). ``source`` says who linearised ("analytic", "exudyn", "mujoco") and where.

@@ -149,7 +149,7 @@ def pitch_linear(y, u, p, dy):
 
 @register_jitable
 def heave_pitch_exact(y, u, p, dy):
-    """Two wheels under a chassis whose heave and pitch are prescribed, read from u."""
+    """Rates of two wheels under a chassis whose heave and pitch are prescribed in u."""
     sine, cosine = math.sin(u[3]), math.cos(u[3])
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
     newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
@@ -182,7 +182,7 @@ RIGHT_HAND_SIDES = {
 
 @register_jitable
 def pitch_springs(y, u, p, dy):
-    """Rotational springs and dampers to the ground: from p[15] on, N m/rad, N m s/rad and dead band (rad) of each."""
+    """Add rotational springs and dampers to the ground; their N m/rad, N m s/rad and dead band (rad) begin at p[15]."""
     for i in range(15, len(p), 3):
         beyond = abs(y[3]) - p[i + 2]
         if beyond >= 0.0:
@@ -191,7 +191,7 @@ def pitch_springs(y, u, p, dy):
 
 @register_jitable
 def pitch_moment(y, u, p, dy):
-    """A moment on the chassis (N m, nose up), the last channel of the input."""
+    """Add a moment on the chassis (N m, nose up), which is the last channel of the input."""
     dy[7] += u[-1] / p[5]
 
 

@@ -78,7 +78,7 @@ class JointElement:
 
 @dataclass(frozen=True)
 class Curve:
-    """Force (N) over travel (m) or over its rate (m/s): straight between points, the outer pieces go on beyond.
+    """Force (N) over travel (m) or over its rate (m/s), piecewise linear; the outer pieces extend to infinity.
 
     ``arguments`` rise strictly, at least two; the curve passes through (0, 0), so that it changes no equilibrium.
     """

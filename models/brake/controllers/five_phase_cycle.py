@@ -80,7 +80,7 @@ class Frozen:
 
     @cached_property
     def driven(self) -> Driven:
-        """The frozen vehicle as compiled functions take it."""
+        """The wheel as a ``Driven``, the form that compiled functions take."""
         tables, (j, q) = stacked([self.tyre]), cell_and_share(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
@@ -102,7 +102,8 @@ def rim(state, driven):
 
 @njit(cache=True, error_model="numpy")
 def go_on(state, rate, time, driven):
-    """The state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
+    """State after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
+    hysteresis loop."""
     pressure = max(state.pressure + rate * time, 0.0)
     after = torque(0, pressure, state.torque, driven.brakes)
     drive = StepInput(driven.vehicle_speed, driven.vehicle_speed, state.torque, after, time)
@@ -207,7 +208,7 @@ def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
 def _state_at_end(
     state: WheelState, number: int, controller: FivePhase, step: float, frozen: Frozen
 ) -> tuple[WheelState, int]:
-    """The state at the end of a phase, and whether that is MET or BACK; raises RunFailed."""
+    """State at the end of a phase, and whether it ended as MET or as BACK; raises RunFailed."""
     sign, level = end_of_phase(number, controller)
     back = controller.e4 if number == CLIMB else -math.inf
     state, end = phase(state, rate(number, controller), sign, level, back, step, frozen.driven)

@@ -26,8 +26,8 @@ class Logic(Protocol):
     """Decides for one wheel, or for one axle on the basis of its slower wheel."""
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        """State of a valve, or a pressure (bar), from the wheel's slip, its acceleration less that of the vehicle
-        (m/s^2), the vehicle's speed (m/s) and the supply (bar)."""
+        """Valve state or pressure (bar), from the wheel's slip, its acceleration relative to the vehicle's (m/s^2), the
+        vehicle's speed (m/s) and the supply pressure (bar)."""
         ...
 
 
@@ -157,7 +157,7 @@ class SpeedEstimate:
         return self._speed
 
     def _learn(self, fastest: float) -> None:
-        """Take the slope from the last two moments at which the fastest wheel turned fastest."""
+        """Determine the slope of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
         if self._rising and fastest < self._fastest and self._since >= self.apart:
             slope = self.margin * (self._peak - self._fastest) / self._since

@@ -51,7 +51,7 @@ class Pressures:
         return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
     def _reached(self, time: float) -> np.ndarray:
-        """The command that holds at a time (s) in the latest sample."""
+        """The command that is effective in the chambers at a time (s) in the latest sample."""
         known = [arrived for arrived, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 

@@ -16,7 +16,7 @@ FADING_SPEED, DAMPING, SLOWEST_SPEED = 1.0, 0.7, 1e-9
 def lag_on(
     angle: np.ndarray, speeds: np.ndarray, time: float, length: np.ndarray, slope: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lagging tan of the slip angles (W,) after a time (s), and with the damper's part (W,).
+    """Lagging tan of the slip angles (W,) after a time (s), without and with the damper's part.
 
     angle (W,) : before, NaN where it is to begin as in steady motion; speeds (2, W) : along and across (m/s); length
     (W,) : m; slope : largest cornering coefficient (1/rad).
@@ -29,7 +29,7 @@ def lag_on(
 
 
 def _lagging_slip(angle: float, speed: float, across: float, length: float, time: float) -> float:
-    """sigma a' = v - |u| a over a time (s)."""
+    """Solution of sigma a' = v - |u| a after a time (s), for the lagging slip a and the relaxation length sigma."""
     rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
     return float((expm(rates) @ (angle, 1.0))[0])
 

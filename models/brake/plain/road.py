@@ -28,12 +28,13 @@ def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
 
 
 def _stretch(road: Road, x: float) -> int:
-    """Number of the stretch at x (m): the last that begins at or before it."""
+    """Number of the stretch of road at x (m): the last one that begins at or before x."""
     return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
 
 
 def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) -> np.ndarray:
-    """(W, 2, 2) m: where points of a vehicle are on the ground at both ends of a step (s), if each goes straight on.
+    """Positions (W, 2, 2) in m of a vehicle's points on the ground at both ends of a step (s); each point moves on a
+    straight line.
 
     place, rates (3,) : x, y and heading, and their rates; points (W, 2) : along and across the vehicle (m).
     """

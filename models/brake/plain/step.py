@@ -50,7 +50,7 @@ class Moving:
 
 
 class Steps:
-    """Steps (s) of a vehicle on its suspension along a course."""
+    """Time steps (s) of a vehicle on its suspension along a course."""
 
     def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
         self.vehicle, self.course, self.step = vehicle, course, step
@@ -80,7 +80,7 @@ class Steps:
         return self._status(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))

@@ -48,7 +48,7 @@ class Friction:
     load: float
 
     def mixed(self, values: np.ndarray) -> np.ndarray:
-        """Values on the surface, mixed from values (t, ...) of all tables."""
+        """Values on the surface, a mixture of the two tables' values among those of all tables (t, ...)."""
         share = self.under.share
         mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
         return mixed
@@ -60,7 +60,7 @@ class Friction:
         return Force(t.slips, self.load * self.mixed(mu))
 
     def aside(self, slip: float) -> float:
-        """Size (N) of the force across the wheel at a slip."""
+        """Magnitude (N) of the force across the wheel at a slip."""
         t, by_angle = self.tables, weights(self.tables.angles, self.angle)
         g = np.einsum("a,s,tas->t", by_angle, weights(t.slips, abs(slip)), t.g)
         h = np.einsum("a,f,taf->t", by_angle, weights(t.loads, self.load), t.h)
@@ -81,17 +81,17 @@ class WheelMotion:
 
     @property
     def sense(self) -> float:
-        """1 forwards, -1 backwards."""
+        """Direction of motion at the step's start: 1 forwards, -1 backwards."""
         return 1.0 if self.start >= 0.0 else -1.0
 
     @property
     def forwards(self) -> float:
-        """Speed (m/s) in the sense in which it started, at least 0."""
+        """Speed (m/s) in the direction in which the wheel started, at least 0."""
         return max(self.sense * self.along, 0.0)
 
     @property
     def angle(self) -> float:
-        """Size (rad) of the slip angle."""
+        """Magnitude (rad) of the slip angle."""
         return math.atan2(abs(self.across), max(self.forwards, self.regular))
 
 
@@ -108,8 +108,8 @@ class Braked:
 
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
-    """(7,) mean forces along and across (N), load (N), mean slip, slip angle (rad), time locked (s), turning (rad/s)
-    at the end: the columns of ``plane_step``."""
+    """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
+    mean slip, slip angle (rad), time locked (s), rotation (rad/s) at the end."""
     friction, sense = Friction(tables, surface, motion.angle, load), motion.sense
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)

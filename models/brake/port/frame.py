@@ -40,7 +40,7 @@ SWITCH, REQUEST_GIVEN = 1, 2
 
 
 class WrongFrame(ValueError):
-    """Bytes that are no frame of this port; name : as in ``ask.NAMES``."""
+    """Bytes that do not form a frame of this port; name : as in ``ask.NAMES``."""
 
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
@@ -48,7 +48,7 @@ class WrongFrame(ValueError):
 
 
 def question(sample: Sample) -> bytes:
-    """Frame of one sample."""
+    """Frame that carries one sample to the controller."""
     flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
     return QUESTION.pack(
         b"TRQ1",

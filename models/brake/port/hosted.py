@@ -74,8 +74,7 @@ class Hosted:
             raise ControllerFailed(sample, "crash", lost) from None
 
     def _got(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
-        """The bytes that the process sends back within so many seconds; raises Failed, TimeoutError, OSError,
-        EOFError."""
+        """The bytes that the process sends back within ``seconds``; raises Failed, TimeoutError, OSError, EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
@@ -117,7 +116,7 @@ def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
 
 @contextmanager
 def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
-    """The controller of a guest for as long as the block lasts; start : seconds for making it.
+    """The controller of a guest in a separate process, as a context manager; start : seconds allowed for making it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """

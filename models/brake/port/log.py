@@ -26,7 +26,7 @@ def name_of(scene: str) -> str:
 
 @dataclass
 class Logged:
-    """A controller whose exchanges are written as they happen."""
+    """A controller whose exchanges are written to a log as they happen."""
 
     inner: Controller
     file: BinaryIO

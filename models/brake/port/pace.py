@@ -36,5 +36,5 @@ class WallClock:
         return command
 
     def report(self) -> str:
-        """One line on overruns."""
+        """One line of text on overruns."""
         return f"{self.overruns} overruns, the worst by {1e3 * self.worst:.3f} ms"

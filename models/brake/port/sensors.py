@@ -65,7 +65,8 @@ class Channels:
 
 @dataclass
 class Sensed:
-    """A controller that sees wheels through sensors, and whose pressures are measured; fresh for every run.
+    """A controller that receives wheel speeds through sensors, and whose pressures are measured; a new one is made for
+    every run.
 
     teeth : counts the wheels' teeth first; None: their speed is known.
     """

@@ -89,7 +89,7 @@ class ControllerRun:
     slow: bool = False
 
     def path(self, name: str) -> Path:
-        """A file that the table names."""
+        """Path of a file that the table names."""
         return self.folder / name.replace("{procedure}", self.procedure).replace("{engine}", self.engine)
 
 
@@ -145,7 +145,8 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
 
 @contextmanager
 def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
-    """Turn errors of a named controller into errors of the scene's key; errors within a file name that file."""
+    """Context that converts errors about a named controller into errors about the scene's key; errors inside a file
+    name that file."""
     try:
         yield
     except InputError as error:
@@ -155,7 +156,7 @@ def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
 
 
 def check_port(table: PortTable, run: ControllerRun) -> None:
-    """Refuse files that are not there or must stay as they are, and faults of wheels or teeth that are not."""
+    """Refuse files that do not exist or would be overwritten, and faults of wheels or teeth that do not exist."""
     for key in ("fmu", "replay"):
         name = getattr(table, key)
         if name is not None and not run.path(name).is_file():

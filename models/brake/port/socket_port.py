@@ -113,7 +113,7 @@ def listening(address: int = 0) -> Iterator[socket.socket]:
 def connected(
     words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
 ) -> Iterator[SocketPort]:
-    """The controller that a command starts, or that connects by itself, for as long as the block lasts.
+    """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
 
     words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
     else starts; start : seconds until it must have connected; folder : in which the command runs. However the block

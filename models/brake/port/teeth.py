@@ -36,7 +36,7 @@ class Counted:
         self._before = 0.0
 
     def __call__(self, sample: Sample) -> np.ndarray:
-        """Signals (W,) in m/s."""
+        """Speed signals (W,) in m/s at a sample."""
         speeds, now = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
         if not self._wheels:
             self._wheels = [_Wheel(speed) for speed in speeds]
@@ -67,7 +67,7 @@ class Counted:
 
 
 class _Wheel:
-    """State of a toothed wheel's sensor: in teeth since the start, s, m/s."""
+    """State of a toothed wheel's sensor, in units of teeth since the start, s, and m/s."""
 
     def __init__(self, speed: float) -> None:
         self.turned, self.speed, self.shown = 0.5, speed, speed

@@ -73,7 +73,7 @@ class MeasurementFault:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Cross spectra and the vehicle between them, at frequencies (f,) in Hz.
+    """Measured cross spectra of forces and readings, compared with the vehicle's response, at frequencies (f,) in Hz.
 
     between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
     (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean. noise
@@ -92,7 +92,7 @@ class Agreement:
 
     @cached_property
     def hubs(self) -> tuple[str, ...]:
-        """Where the forces act."""
+        """Names of the hubs at which the forces act."""
         return tuple(dict.fromkeys(s.at for s in self.inputs))
 
     @cached_property

@@ -29,7 +29,7 @@ def number(signal: Signal, hub: int) -> int:
 
 
 class SensorResponse:
-    """The linear vehicle: q'' = stiff q + damped q' + pushed u, u (6 h,) in N and N m, in a frame."""
+    """Linear vehicle q'' = stiff q + damped q' + pushed u with hub forces u (6 h,) in N and N m, given in a frame."""
 
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
@@ -42,7 +42,8 @@ class SensorResponse:
         self.pushed = np.column_stack([(at((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in hubs])
 
     def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
-        """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
+        """Transfer functions (f, signals, 6 h) from hub forces to the signals, each at its place, at frequencies (f,)
+        in Hz."""
         laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(
             laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)

@@ -31,7 +31,7 @@ SIDE_LINES = range(2, 5)
 
 @dataclass(frozen=True)
 class Spectra:
-    """Means over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
+    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
 
     averages : how many independent ones; segments with a sample that is missing are left out. white : power in every
     line of white noise of variance 1.
@@ -70,7 +70,7 @@ def spectra(
 
 
 def noise(recording: Recording, signal: Signal) -> float:
-    """Standard deviation (SI) of white noise on every sample; NaN where no segment is unbroken.
+    """Standard deviation (SI) of white noise on every sample; NaN if no segment is complete.
 
     By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
     channels it is too small: what was there is gone.

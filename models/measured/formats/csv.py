@@ -38,7 +38,7 @@ from models.measured.formats.opened import Opened, Span, distinct_names, notice,
 
 @dataclass(frozen=True)
 class CsvFile(Opened):
-    """Rows of numbers; ``rows[k]`` is the byte where row 1000 k begins, the last one the end of the rows used.
+    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, its last element the end of the used rows.
 
     clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
     of the channels, among those of numbers.

@@ -84,7 +84,7 @@ NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, a
 
 @dataclass
 class Top:
-    """Format facts from the first lines of a file.
+    """Facts about the format of a file from its first lines.
 
     lines : those that are neither empty nor comments. hashed : comments that begin with ``#``. separator : as a line
     ``sep=`` says. foreign : numbers of lines that are no UTF-8. unit : of characters. stopped : number of the line

@@ -108,8 +108,8 @@ def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
 
 
 def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Table (rows, columns of numbers) of some rows, the first of which is row ``first``; seconds (rows,) since the
-    first stamp where times are those of the clock."""
+    """Table (rows, columns of numbers) of some rows, from row ``first`` on; also the seconds (rows,) since the first
+    stamp, if times are clock times."""
     line = layout.line + 1 + first
     text = _unquoted(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
@@ -144,7 +144,8 @@ def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndar
 
 
 def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
-    """Some columns of rows without quotes, as numbers or as text; ValueError for what is no number and no mark."""
+    """Some columns of rows without quotes, as numbers or text; ValueError for cells that are neither numbers nor marks
+    of missing data."""
     import pandas
 
     return pandas.read_csv(
@@ -226,7 +227,7 @@ def _remedy(layout: Layout, cell: str) -> str:
 
 
 def _error_at_byte(path: Path, line_number: int, text: bytes, offset: int, allowed: str) -> InputError:
-    """Error at one byte of some rows."""
+    """Error at one byte within some rows."""
     begin, end = text.rfind(b"\n", 0, offset) + 1, text.find(b"\n", offset)
     row = text[begin : len(text) if end < 0 else end].decode("utf-8", errors="backslashreplace")
     return InputError(path, f"line {line_number + text[:offset].count(10)}", row, allowed)

@@ -98,7 +98,8 @@ def unheard() -> Iterator[None]:
 
 
 def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of some records, loaded once: the public calls load them, or the file, anew for each channel."""
+    """Times and values of some records, loaded only once; the library's public functions would load them again for each
+    channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
     unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
@@ -108,7 +109,7 @@ def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> 
 
 
 def _values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
-    """Physical values (n,) of one channel in some records, NaN where they are marked as invalid.
+    """Physical values (n,) of one channel in some records; NaN where they are marked as invalid.
 
     What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
     """
@@ -228,7 +229,8 @@ def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
 
 
 def _resolution(channel: Any, version: int) -> float:
-    """Step between values of a channel of whole numbers, in its unit; 0 for floating point and curved conversions."""
+    """Step between values of a channel stored as whole numbers, in its unit; 0 for floating-point values and nonlinear
+    conversions."""
     if channel.data_type not in WHOLE[version]:
         return 0.0
     conversion = channel.conversion

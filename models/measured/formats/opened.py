@@ -47,7 +47,7 @@ class Opened(ABC):
         ends."""
 
     def _chosen(self, names: Sequence[str]) -> list[int]:
-        """Indices of channels, which must be of one group."""
+        """Indices of the named channels, which must belong to one group."""
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         for name in names:
             if name not in place:
@@ -99,7 +99,7 @@ def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
 
 @dataclass
 class LeftOut:
-    """Names of channels that a reader skips, by reason; each reason is a single finding for all its channels."""
+    """Names of channels that a reader skips, grouped by reason; each reason gives a single finding."""
 
     names: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 

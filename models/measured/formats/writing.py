@@ -100,7 +100,8 @@ def missing(path: Path, format_name: str, package: str) -> InputError:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Path to write to, beside ``path`` and with its extension; ``path`` itself appears when all is written.
+    """Context with a temporary path beside ``path`` and with its extension; it is renamed to ``path`` when all is
+    written.
 
     Raises InputError where ``path`` exists, before or after, or nothing can be written; then nothing is left behind.
     """
@@ -182,7 +183,7 @@ def write_mdf(
 
 
 def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values: np.ndarray) -> None:
-    """Add a block to a group that the first one begins."""
+    """Append a block to a group; the first block creates the group."""
     from asammdf import Signal
 
     columns = np.ascontiguousarray(values.T)

@@ -38,7 +38,7 @@ class Net(NamedTuple):
 
 @cache
 def net(cells: int) -> Net:
-    """Strips of one width, an even number of at least ``cells``, with ``cells`` cells each."""
+    """Grid with an even number of strips, at least ``cells``, of equal width, and ``cells`` cells in each."""
     count = cells + cells % 2
     y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells

@@ -32,7 +32,8 @@ class HubState(NamedTuple):
 
 
 class PlainHubs:
-    """A driven cut vehicle; ``step`` (s) is that of the rows of its hub inputs, two to a step.
+    """A cut vehicle driven by its hub inputs, in plain numpy. ``step`` (s) covers two intervals between rows of the
+    inputs.
 
     any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
@@ -111,7 +112,7 @@ class PlainHubs:
     def _tyre(
         self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) in space at a hub by its tyre on a road of a height (m) and rate (m/s)."""
+        """Force (N) and moment (N m) in space on a hub from its tyre, on a road with height (m) and rate (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
         height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]

@@ -24,7 +24,7 @@ PLACE, RATE, REST, FIRST = range(4)
 
 
 def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
-    """G (4, 4) of a freedom: a shift along, or a turn about, one of the axes (rows)."""
+    """Generator matrix G (4, 4) of a freedom: translation along, or rotation about, one of the axes (rows)."""
     kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
     x, y, z = axes[kind % 3]
     if kind < 3:
@@ -36,7 +36,8 @@ def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of bodies: their rows among the bodies (p,), and where they are from the bodies' centres (p, 4), m, 1."""
+    """Points on bodies: indices of their bodies (p,), and homogeneous coordinates from the bodies' centres (p, 4), in
+    m, the last one 1."""
 
     rows: np.ndarray
     arms: np.ndarray
@@ -44,7 +45,8 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class PlainMotion:
-    """All bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the space first."""
+    """Motion of all bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the first body being the
+    space."""
 
     matrices: np.ndarray
 
@@ -56,18 +58,20 @@ class PlainMotion:
         return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)
 
     def axes(self, row: int) -> np.ndarray:
-        """(3 + n, 3, 3): a body's axes as columns, their rates, second rates without q'', derivatives by q."""
+        """A body's axes as columns, their rates, second derivatives without the q'' terms, and derivatives by q: (3 +
+        n, 3, 3), in this order."""
         axes: np.ndarray = self.matrices[row, :, :, :3]
         return axes
 
     def turning(self, row: int) -> np.ndarray:
-        """(3,) rad/s: angular velocity of a body in space, half the sum of axis x its rate."""
+        """Angular velocity (3,) in rad/s of a body in space: half the sum of the products axis x rate of axis."""
         axes = self.axes(row)
         spin = axes[RATE] @ axes[PLACE].T
         return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
 
     def by_moment(self, row: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of a moment (N m, in space) on a body: couples of forces M x axis / 2 at its axes."""
+        """Generalised forces (n,) of a moment M (N m, in space) on a body, applied as couples of forces M x axis / 2 at
+        its axes."""
         axes = self.axes(row)
         x, y, z = moment.tolist()
         couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
@@ -110,7 +114,7 @@ class Bodies:
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
-        """All bodies at coordinates and rates (n,): m, rad, per s."""
+        """Motion of all bodies at coordinates and rates (n,): m, rad, per s."""
         matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
         first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)

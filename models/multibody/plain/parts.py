@@ -20,7 +20,8 @@ def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | 
 
 @dataclass(frozen=True, eq=False)
 class Travels:
-    """Travel (p,), its rate (p,) and its derivatives by the coordinates (p, n): m, or rad of a bar."""
+    """Travels (p,) of springs and bars, their rates (p,) and their derivatives with respect to the coordinates (p, n):
+    m, or rad for a bar."""
 
     travel: np.ndarray
     rate: np.ndarray
@@ -28,7 +29,7 @@ class Travels:
 
 
 class PlainParts:
-    """The springs, then the bars, of a vehicle on its bodies; ``default`` is the frame of those that name none."""
+    """The springs, then the bars, of a vehicle; ``default`` is the frame of those that name none."""
 
     def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
         springs, bars = vehicle.springs, vehicle.bars
@@ -66,8 +67,8 @@ class PlainParts:
         return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST:] + self._rolls)
 
     def forces(self, travels: Travels, preloads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (p,) that draw both ends together, N or N m: of springs with preloads ``preloads`` (p,), and of all
-        else: dampers, friction and curves."""
+        """Forces (p,) that pull both ends together, N or N m: from springs with preloads ``preloads`` (p,), dampers,
+        friction and curves."""
         other = self.damping * travels.rate + self.friction * np.tanh(travels.rate / self.friction_rate)
         for i, on_travel, on_rate in self._curves:
             other[i] += on_travel(float(travels.travel[i])) if on_travel else 0.0

@@ -186,7 +186,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
-        """Loads of the tyres on the road and their contact points; steer (w,), rad."""
+        """``TyreContact`` with the tyres' loads and contact points on the road; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
@@ -241,7 +241,8 @@ class PlainRolling:
     def _tyre_forces(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
+        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of creep about the wheels'
+        centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
         moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
         total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
