@@ -25,7 +25,7 @@ HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Measurements in n windows at one speed (m/s) of the treadmill.
+    """Measurements in windows (n,) at one speed (m/s) of the treadmill.
 
     weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); slowness : mean of |steer rate| by mean
     of its square (s/rad), by which dry friction is worth a viscous one.

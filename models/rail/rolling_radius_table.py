@@ -126,8 +126,8 @@ def rolling_radii_of(
 ) -> RollingRadiusTable:
     """Rolling radius table of two wheels on their rails; the left wheel is described as a mirrored right one.
 
-    displacements : (n,) m, rising. Those at the ends at which not both wheels touch are left out. told : called with
-    the share that is done. Raises InputError where fewer than three are left.
+    displacements : (n,) m, ascending. Displacements at the ends at which not both wheels touch are left out.
+    report_progress : called with the completed share. Raises InputError where fewer than three are left.
     """
     shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
     rows = []
