@@ -130,8 +130,8 @@ def displacement(pressure, dx, dy, modulus):
 
 @compiled
 def covariances(u, h, cover):
-    """Mean of u, and the weighted sums for covariance of u and h and for variance of u (not divided by the sum of
-    weights); weights are the covered shares."""
+    """Weighted mean of u; weighted sums (not divided) for the covariance of u and h and the variance of u. The covered
+    shares are the weights."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
     both = square = 0.0
     for k in range(u.size):
@@ -143,8 +143,7 @@ def covariances(u, h, cover):
 
 @compiled
 def weighted_mean(values, weights):
-    """Weighted mean of values, weights of the same shape; written as loops, which compile ten times as fast as array
-    expressions."""
+    """Weighted mean of values; weights of the same shape. Loops compile ten times as fast as array expressions."""
     total = weight = 0.0
     for k in range(values.size):
         total += weights.flat[k] * values.flat[k]
@@ -305,8 +304,8 @@ def strips(surface, rows, cells, shape):
 
 @compiled
 def crossing(row, depth, inner, outer):
-    """Position where the row's height equals the depth, between an inner point below and an outer point not below it
-    (false position, Illinois rule)."""
+    """Position where the row's height equals the depth, between points below and not below it (false position, Illinois
+    rule)."""
     at_inner, at_outer = value_along_row(row, inner) - depth, value_along_row(row, outer) - depth
     middle, kept = outer, 0
     for _ in range(30):

@@ -185,8 +185,8 @@ class Agreement:
         yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
-        """Candidate groups with a common fault: each signal alone, all of one hub or sensor, all of one file, all
-        readings. Smaller groups come first."""
+        """Groups that may share a fault, small ones first: each signal, all of one hub or sensor, of one file, all
+        readings."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
             keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals]]
             if not forces:
@@ -211,8 +211,8 @@ class Agreement:
         return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
 
     def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
-        """Cross power (f, k) of the group's predicted part with the measured readings less all other groups'
-        predictions; then the power (f, k) of the predicted part."""
+        """Cross power (f, k) of the readings less all other predictions with the group's prediction; power (f, k) of
+        the latter."""
         pick = list(group.members)
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
@@ -255,8 +255,7 @@ class Agreement:
             )
 
     def _moment_point_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Faults in which hub moments refer to a point above or below the hub: at one hub, at two, or at all by the
-        same height."""
+        """Faults of hub moments that refer to a point above or below the hub: at one hub, at two, or equally at all."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
             levers = self._levers(some)
@@ -313,7 +312,7 @@ class Agreement:
         ]
 
     def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
-        """Pairs of channels of one quantity that share a place or an axis, each with the agreement after their
+        """Pairs of channels of one quantity with a common place or axis, each with the agreement after their
         exchange."""
         for side in (self.inputs, self.outputs):
             for pair in combinations(side, 2):
@@ -360,8 +359,7 @@ class Agreement:
         return smallest
 
     def factor(self, signal: Signal) -> tuple[float, float]:
-        """Ratio of a force's recorded to its true value as the motion shows it, before further corrections, and its
-        standard error."""
+        """Ratio of a force's recorded to its true value as the motion shows it, and its standard error."""
         group = SignalGroup(signal.name, True, (self.inputs.index(signal),))
         cross, power = ((self.weights * part).sum() for part in self.share(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
@@ -385,8 +383,8 @@ class Agreement:
 
 
 def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) -> float:
-    """Smallest size of a fault that is significant and large enough to be named, if the residual of each reading (k,)
-    falls by ``power`` times the size squared."""
+    """Smallest significant and noteworthy size of a fault, if each reading's residual (k,) falls by ``power`` times
+    size^2."""
     if not power.sum() > 0:
         return float("inf")
     return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
