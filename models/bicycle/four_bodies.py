@@ -21,8 +21,8 @@ FALLEN = 1.4
 
 @dataclass(frozen=True, eq=False)
 class Ride:
-    """Times (n,), positions and rates (n, 9), energy (n,) and work (n,) of tyres and control since the start (J), how
-    many steps the method took; reports (n, 2, REPORTED) of the tyres, none where wheels roll ideally."""
+    """Result of a run: times (n,), positions and rates (n, 9), energy (n,) and work (n,) of tyres and control since the
+    start (J), and the number of steps; reports (n, 2, REPORTED) of the tyres, empty for ideally rolling wheels."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -33,12 +33,12 @@ class Ride:
     tyres: np.ndarray | None = None
 
     def unaccounted(self) -> float:
-        """Largest energy that neither tyres nor control account for, by the energy at the start."""
+        """Largest energy change that neither tyres nor control explain, relative to the energy at the start."""
         return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
 
 
 def four_bodies(b: Whipple) -> SpatialVehicle:
-    """Bodies in the order of a walk through their tree, in the design position with the steering axis upright."""
+    """The bicycle's bodies in tree order, in the design position with the steering axis upright."""
     sine, cosine = math.sin(b.tilt), math.cos(b.tilt)
     turned = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     origin = np.array([0.0, 0.0, b.rear_wheel.radius])

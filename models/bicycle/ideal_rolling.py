@@ -33,7 +33,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class IdealBicycle:
-    """The bicycle as four bodies; raises nothing beyond what ``Whipple`` does."""
+    """The bicycle as four bodies whose wheels roll ideally; raises the same errors as ``Whipple``."""
 
     def __init__(self, bicycle: Whipple, control: Control = UNCONTROLLED) -> None:
         vehicle = four_bodies(bicycle)
@@ -44,14 +44,14 @@ class IdealBicycle:
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
 
     def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Heights (2,) m of both contacts, the Jacobian (6, 9) of the velocities of the material points there, and
-        the rates (6,) of these velocities without dv/dt."""
+        """Kinematics of both contacts: their heights (2,) m, the Jacobian (6, 9) of the velocities of the material
+        points there, and the part (6,) of these points' accelerations without dv/dt."""
         each = [_contact(motion.matrices[row], radius) for row, radius in self._wheels]
         heights, jacobians, rates = zip(*each, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
     def rolling(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """N (9, 3) with v = N u for the rates u of FREE_RATES, and v (9,)."""
+        """Matrix N (9, 3) in v = N u, with the rates u of FREE_RATES, and v (9,)."""
         contact = self.contacts(self.bodies.move(q, np.zeros(COUNT)))[1]
         N = np.zeros((COUNT, 3))
         N[FREE_RATES] = np.eye(3)
@@ -59,7 +59,7 @@ class IdealBicycle:
         return N, N @ u
 
     def rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Rates (12,) of positions and free rates."""
+        """Time derivatives (12,) of the state, which holds positions and free rates."""
         q, (N, v) = state[:COUNT], self.rolling(state[:COUNT], state[COUNT:])
         motion, bias = self.bodies.move(q, v), np.zeros(COUNT)
         _, contact, without = self.contacts(motion)
@@ -68,7 +68,8 @@ class IdealBicycle:
         return np.concatenate([v, np.linalg.solve(N.T @ mass @ N, N.T @ (force + self.applied(v) - mass @ bias))])
 
     def applied(self, v: np.ndarray) -> np.ndarray:
-        """Forces (9,) of control and friction of the steering, at the speed of the rear wheel."""
+        """Generalised forces (9,) of control and steering friction; the control depends on the speed of the rear
+        wheel."""
         force, control = np.zeros(COUNT), self.control
         speed = v[REAR] * self.bicycle.rear_wheel.radius
         force[STEER] = -control.lean_rate_gain(speed) * v[LEAN] - control.friction * v[STEER]
@@ -90,14 +91,15 @@ class IdealBicycle:
         return np.concatenate([q, [lean_rate, 0.0, speed / radius]])
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> float:
-        """Kinetic and potential energy (J); the latter 0 with all centres on the ground."""
+        """Sum of kinetic and potential energy (J); the potential energy is 0 when all centres of mass are on the
+        ground."""
         motion = self.bodies.move(q, v)
         mass, _ = self.bodies.inertia(motion, self.gravity)
         levels = motion.matrices[1:, PLACE, 2, 3]
         return float(0.5 * v @ mass @ v + self.bicycle.gravity * self._masses @ levels)
 
     def run(self, state: np.ndarray, duration: float, rows: int = 501, tolerance: float = 1e-9) -> Ride:
-        """From a state (12,) for a duration (s), by DOP853; RunFailed where the bicycle lies on the ground."""
+        """Integrate from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the ground."""
 
         def lies(time: float, state: np.ndarray) -> float:
             return FALLEN - abs(state[LEAN])
@@ -118,7 +120,8 @@ class IdealBicycle:
 
 
 def _contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """Height (m), Jacobian (3, 9) and rate (3,) without dv/dt of a wheel's material point at the ground.
+    """Height (m) of a wheel's material point at the ground, Jacobian (3, 9) of its velocity, and its acceleration (3,)
+    without dv/dt.
 
     wheel (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it rolls, and
     the rate of its velocity R' s + c' is R'' s + c'' + R' s'.

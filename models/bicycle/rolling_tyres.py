@@ -65,7 +65,8 @@ UNCHANGED_TYRE = BicycleTyre()
 
 @dataclass(frozen=True, eq=False)
 class RollingBicycle:
-    """The bicycle on its tyres, as engines build it: ``driven``. InputError for what only the linear equations take."""
+    """The bicycle on its tyres; ``driven`` is what engines build. InputError for features that only the linear
+    equations have."""
 
     bicycle: Whipple
     tyre: BicycleTyre = UNCHANGED_TYRE
@@ -86,7 +87,7 @@ class RollingBicycle:
 
     @property
     def driven(self) -> Driven:
-        """What an engine builds."""
+        """Description from which an engine builds the bicycle."""
         gravity = np.array([0.0, 0.0, -self.bicycle.gravity])
         return Driven(self.vehicle, gravity, self.numbers, bicycle_forces, set_bicycle_forces)
 
@@ -98,7 +99,7 @@ class RollingBicycle:
         return tyres, ledgers
 
     def loads(self) -> tuple[float, float]:
-        """Loads (N) at rest of the rear and the front wheel."""
+        """Static loads (N) of the rear and the front wheel."""
         b, g = self.bicycle, self.bicycle.gravity
         mass = b.rear_wheel.mass + b.body.mass + b.front_frame.mass + b.front_wheel.mass
         moment = b.body.mass * b.body.x + b.front_frame.mass * b.front_frame.x + b.front_wheel.mass * b.wheelbase
@@ -107,7 +108,7 @@ class RollingBicycle:
 
 
 def _table(bicycle: RollingBicycle) -> np.ndarray:
-    """All numbers that the compiled forces read."""
+    """Table of all numbers that the compiled forces of the bicycle read."""
     c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
@@ -128,7 +129,7 @@ def _table(bicycle: RollingBicycle) -> np.ndarray:
 
 
 def _tyres(bicycle: RollingBicycle) -> np.ndarray:
-    """(2, PER_TYRE): numbers of both tyres, columns as of a car's, which names more of them."""
+    """Numbers (2, PER_TYRE) of both tyres, in the columns of a car's tyres, of which the bicycle needs only some."""
     t, table = bicycle.tyre, np.zeros((WHEELS, forces.PER_TYRE))
     vertical, width = t.stiffness**2 * t.vertical, t.half_width / t.stiffness
     wheels = (
@@ -150,7 +151,7 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
 
 @lean
 def _touch(tyre, vehicle, wheel):
-    """Load of a tyre, which acts where the wheel's lowest point is; fills the ``WheelContact``."""
+    """Load of a tyre, which acts at the wheel's lowest point; fills the ``WheelContact``."""
     patch, slip, way, report, ledger = wheel.patch, wheel.slip, wheel.way, wheel.report, vehicle.ledger
     spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre[forces.POINT]))
     link, spin = (
@@ -187,7 +188,8 @@ def _touch(tyre, vehicle, wheel):
 
 @lean
 def _steer(numbers, vehicle):
-    """Torque of control and friction on the steering, to the left, by the speed of the rear wheel's centre."""
+    """Add the steering torque (to the left) of control and friction, which depends on the speed of the rear wheel's
+    centre."""
     v = vehicle.rates
     missing = max(numbers[UNTIL] - numbers[SPEED_GAIN] * abs(vehicle.frame.ahead) - numbers[SPEED_BIAS], 0.0)
     torque = -numbers[GAIN] * missing * v[LEAN] - numbers[FRICTION] * v[STEER]
@@ -220,7 +222,7 @@ def all_bicycle_forces(numbers, q, v, f, report, ledger):
 
 @lean
 def bicycle_forces(numbers, t, q, v, f):
-    """Add the forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the bicycle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     report, ledger = array(doubles(WHEELS * REPORTED), (WHEELS, REPORTED)), array(doubles(LEDGER), (LEDGER,))
     table = array(numbers, (int(array(numbers, (forces.HEADER,))[forces.COUNT]),))
     all_bicycle_forces(table, array(q, (COUNT,)), array(v, (COUNT,)), array(f, (COUNT,)), report, ledger)
@@ -228,7 +230,8 @@ def bicycle_forces(numbers, t, q, v, f):
 
 @lean
 def set_bicycle_forces(block, t, n):
-    """``bicycle_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``bicycle_forces``. All data are in one block of doubles at an address: f, q and v
+    (n,), then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     bicycle_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -236,7 +239,7 @@ def set_bicycle_forces(block, t, n):
 
 @lean
 def read_bicycle(numbers, q, v, reports, ledgers):
-    """Fill reports (m, 2, REPORTED) and ledgers (m, LEDGER) of states (m, 9)."""
+    """Fill reports (m, 2, REPORTED) of the tyres and ledgers (m, LEDGER) of energy for states (m, 9)."""
     f = array(doubles(COUNT), (COUNT,))
     for i in range(len(q)):
         f[:] = 0.0

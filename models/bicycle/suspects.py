@@ -31,7 +31,7 @@ NO_WEAVE = -20.0 + 0.0j
 
 
 def predicted(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
-    """(3,): real and imaginary part of the weave (1/s) and measured speed (m/s) of a model at a speed."""
+    """Prediction (3,) of a model at a speed: real and imaginary part of the weave (1/s), and measured speed (m/s)."""
     weave = bicycle.weave(observation.speed, control.viscous(float(observation.slowness.mean())))
     weave = weave if np.isfinite(weave) else NO_WEAVE
     return np.array([weave.real, weave.imag, control.speed_gain * observation.speed + control.speed_bias])
@@ -40,7 +40,8 @@ def predicted(bicycle: Whipple, control: Control, observation: Observation) -> n
 def chosen(
     bicycle: Whipple, base: Control, observations: Sequence[Observation], suspects: Sequence[str] = tuple(SUSPECTS)
 ) -> Choice:
-    """Every subset of the suspects fitted and judged; InputError for fewer than two speeds, or a name that is none."""
+    """Fits of every subset of the suspected parameters, ranked; InputError for fewer than two speeds, or an unknown
+    name."""
     for name in suspects:
         if name not in SUSPECTS:
             raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTS))
@@ -61,18 +62,21 @@ def chosen(
 def forecast(
     bicycle: Whipple, base: Control, choice: Choice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Damping and frequency (2,) that all subsets predict by their weights, and their standard deviations (2,)."""
+    """Damping and frequency (2,) of the weave, averaged over all subsets with their weights, and their standard
+    deviations (2,)."""
     return choice.forecast(lambda values: predicted(bicycle, base.model_copy(update=values), observation)[:2])
 
 
 def deviations(bicycle: Whipple, base: Control, choice: Choice, observation: Observation) -> np.ndarray:
-    """(2,): forecast less measured damping and frequency in standard deviations, of windows and of the forecast."""
+    """Forecast less measured damping and frequency (2,), divided by the standard deviation of measurement and forecast
+    together."""
     mean, deviation = forecast(bicycle, base, choice, observation)
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
 def _sensor_error(observations: Sequence[Observation]) -> float:
-    """Standard deviation (m/s) of the speed sensor's means about their line; 0 for two speeds, which tell none."""
+    """Standard deviation (m/s) of the speed sensor's means about a fitted line; 0 for two speeds, which any line
+    fits."""
     if len(observations) < 3:
         return 0.0
     speeds, means = np.array([(o.speed, o.mean[2]) for o in observations]).T
@@ -81,7 +85,7 @@ def _sensor_error(observations: Sequence[Observation]) -> float:
 
 
 def _whitener(observation: Observation, sensor: float) -> np.ndarray:
-    """Matrix (3, 3) that turns deviations into independent standard normal ones; the error of the speed sensor is
+    """Matrix (3, 3) that maps deviations to independent standard normal ones; the error of the speed sensor counts as
     independent."""
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = np.cov(observation.parts[:, :2].T)

@@ -25,7 +25,7 @@ HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Windows (n,) at one speed (m/s) of the treadmill.
+    """Measurements in windows (n,) at one speed (m/s) of the treadmill.
 
     weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); slowness : mean of |steer rate| by mean
     of its square (s/rad), by which dry friction is worth a viscous one.
@@ -38,22 +38,23 @@ class Observation:
 
     @property
     def parts(self) -> np.ndarray:
-        """(n, 3): real and imaginary part of the weave (1/s), measured speed (m/s)."""
+        """Measured values (n, 3) per window: real and imaginary part of the weave (1/s), measured speed (m/s)."""
         return np.column_stack([self.weave.real, self.weave.imag, self.measured_speed])
 
     @property
     def mean(self) -> np.ndarray:
-        """(3,) of ``parts``."""
+        """Means (3,) of ``parts`` over the windows."""
         return self.parts.mean(axis=0)
 
     @property
     def deviation(self) -> np.ndarray:
-        """(3,) standard deviation of ``parts`` among the windows."""
+        """Standard deviations (3,) of ``parts`` between the windows."""
         return self.parts.std(axis=0, ddof=1)
 
 
 def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
-    """Eigenvalue (1/s) of e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least squares; w is above 0."""
+    """Eigenvalue s + i w (1/s) of the function e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least
+    squares; w is above 0."""
     times = np.arange(len(values)) / rate
 
     def left(shape: np.ndarray) -> np.ndarray:
@@ -68,7 +69,7 @@ def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
 
 
 def observations(folder: str | Path) -> list[Observation]:
-    """All speeds of a folder, rising; InputError that names file, place and value where it cannot be read."""
+    """Observations of a folder by ascending speed; InputError with file, position and value where it cannot be read."""
     folder, rows = Path(folder), _windows(Path(folder) / "windows.csv")
     recordings = {label: _recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
@@ -90,7 +91,7 @@ def observations(folder: str | Path) -> list[Observation]:
 
 
 def _windows(path: Path) -> list[tuple[str, float, int, int]]:
-    """Rows of windows.csv."""
+    """Rows of the file windows.csv."""
     if not path.is_file():
         raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
     rows = []
@@ -110,7 +111,7 @@ def _windows(path: Path) -> list[tuple[str, float, int, int]]:
 
 
 def _recording(folder: Path, label: str) -> dict[str, np.ndarray]:
-    """Columns of the recording of a label."""
+    """Columns of the recording with a given label."""
     paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
     if len(paths) != 1:
         allowed = f"{len(paths)} recordings end in _{label}kph.csv or .csv.gz, one is needed"

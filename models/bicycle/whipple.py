@@ -66,7 +66,7 @@ class Frame(Strict):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Tensor (3, 3) about the centre of mass, kg m^2."""
+        """Inertia tensor (3, 3) about the centre of mass, kg m^2."""
         across = self.Ixx + self.Izz if self.Iyy is None else self.Iyy
         return np.array([[self.Ixx, 0.0, self.Ixz], [0.0, across, 0.0], [self.Ixz, 0.0, self.Izz]])
 
@@ -90,14 +90,15 @@ class Control(Strict):
     speed_bias: float = quantity("m/s", "measured speed at standstill", default=0.0, signed=True)
 
     def lean_rate_gain(self, speed: float) -> float:
-        """Steer torque by lean rate (N m s/rad) at a speed (m/s)."""
+        """Ratio of steer torque to lean rate (N m s/rad) at a speed (m/s)."""
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing
 
     def viscous(self, slowness: float) -> "Control":
-        """The same with viscous friction in place of the dry one, of the same work at a motion of the steering.
+        """The same control with viscous instead of dry friction, which does the same work in a given motion of the
+        steering.
 
-        slowness : mean of |steer rate| by mean of its square, s/rad.
+        slowness : ratio (s/rad) of the mean of |steer rate| to the mean of its square.
         """
         added = self.friction + slowness * self.dry_friction
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
@@ -129,12 +130,13 @@ class Whipple(Strict):
     front_wheel: Wheel
 
     def changed(self, **values: Any) -> "Whipple":
-        """The same bicycle but for some values, read as strictly."""
+        """The bicycle with some values changed, checked as in a file."""
         return read(Whipple, {name: getattr(self, name) for name in type(self).model_fields} | values, "", "bicycle")
 
     @cached_property
     def linear(self) -> LinearBicycle:
-        """The matrices, by appendix A of the paper; InputError where the mass matrix is singular."""
+        """Matrices of the linear equations, from appendix A of the paper; InputError where the mass matrix is
+        singular."""
         R, B, H, F, w = self.rear_wheel, self.body, self.front_frame, self.front_wheel, self.wheelbase
         sine, cosine = np.sin(self.tilt), np.cos(self.tilt)
         mass, front = R.mass + B.mass + H.mass + F.mass, H.mass + F.mass
@@ -169,7 +171,7 @@ class Whipple(Strict):
         return LinearBicycle(M, C1, K0, K2)
 
     def state_matrix(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
-        """(4, 4): rates of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
+        """State matrix (4, 4) of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
         stiffness = self.gravity * K0 + speed**2 * K2
@@ -177,13 +179,14 @@ class Whipple(Strict):
         return np.vstack([np.eye(2, 4, 2), below])
 
     def eigenvalues(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
-        """(4,) 1/s, sorted by real and imaginary part, at a speed (m/s)."""
+        """Eigenvalues (4,) in 1/s at a speed (m/s), sorted by real, then imaginary part."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
     def weave(self, speed: float, control: Control = UNCONTROLLED) -> complex:
-        """The oscillation with positive imaginary part (1/s), the faster of two; nan where there is none."""
+        """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster of two; NaN if
+        there is none."""
         values = self.eigenvalues(speed, control)
         fastest = complex(values[np.argmax(values.imag)])
         return fastest if fastest.imag > 1e-9 * np.abs(values).max() else complex(np.nan, np.nan)
@@ -205,7 +208,8 @@ class Whipple(Strict):
 
     @property
     def weave_speed(self) -> float | None:
-        """Speed (m/s) from which on the free bicycle's weave decays: the last root of Hurwitz' condition; None."""
+        """Lowest speed (m/s) above which the uncontrolled bicycle's weave decays: the last root of Hurwitz' condition;
+        None if there is none."""
         E, D, C, B, A = self.characteristic
         roots = _positive_roots(B * C * D - A * D * D - B * B * E)
         oscillating = [v for v in roots if D(v) * B(v) > 0.0]  # a pair +-i w has w^2 = D / B
@@ -213,13 +217,14 @@ class Whipple(Strict):
 
     @property
     def capsize_speed(self) -> float | None:
-        """Speed (m/s) from which on the free bicycle falls over slowly: where the stiffness is singular; None."""
+        """Speed (m/s) above which the uncontrolled bicycle slowly falls over, where the stiffness becomes singular;
+        None if there is none."""
         roots = _positive_roots(self.characteristic[0])
         return roots[-1] if roots else None
 
 
 def _product(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
-    """Coefficients of a product of quadratics in s."""
+    """Coefficients of the product of two quadratics in s."""
     total = [Polynomial([0.0]) for _ in range(5)]
     for i, a in enumerate(one):
         for j, b in enumerate(two):
@@ -228,7 +233,8 @@ def _product(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
 
 
 def _positive_roots(condition: Polynomial) -> list[float]:
-    """Roots v > 0 of a polynomial of even or odd powers of v alone, in v^2: it is of degree two at most there."""
+    """Positive roots v of a polynomial with only even or only odd powers of v, solved as one of at most second degree
+    in v^2."""
     scale = np.abs(condition.coef).max()
     lowest = int(np.argmax(np.abs(condition.coef) > 1e-12 * scale))
     in_square = Polynomial(condition.coef[lowest::2])
@@ -238,7 +244,8 @@ def _positive_roots(condition: Polynomial) -> list[float]:
 
 
 def load_bicycle(name: str, folder: str | Path = ".", file: str = "", place: str = "bicycle") -> Whipple:
-    """The parameter set of that name, or of a TOML file with all parameters; ``file`` and ``place`` tell who asks."""
+    """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``place`` name the asking
+    scene in messages."""
     sets = {path.stem: path for path in sorted(SETS.glob("*.toml"))}
     if name not in sets and not name.endswith(".toml"):
         raise InputError(file, place, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets))

@@ -22,9 +22,10 @@ MOST_PARTS = 64
 
 @inlined
 def ended(motion, plane):
-    """Whether a step leaves the vehicle FINE, or how it has ended: of units of two axles, loads and angles of hinges.
+    """FINE, or the way in which a step ends the run. It is read from wheel loads and hinge angles of units with two
+    axles.
 
-    One wheel may lift; what balance takes is that the two of a side, or of an axle, do.
+    One lifted wheel does not end the run. It ends when both wheels of a side, or of an axle, lift.
     """
     status, load, headings = FINE, report_of(motion.report).load, motion.state[0, 2:]
     for first in range(0, load.size - 3, 4):
@@ -42,16 +43,19 @@ def ended(motion, plane):
 
 @inlined
 def parts_of(state, regular):
-    """Number of parts into which a step is cut to keep the speed ``regular`` (m/s), below which slip angles are too
-    small, below that of the vehicle: otherwise it would yield sideways, and yaw on split friction, by as much too
-    far."""
+    """Number of equal parts into which to cut a step, so that the speed ``regular`` (m/s) falls below the vehicle's
+    speed.
+
+    Slip angles are too small below ``regular``: the vehicle would slip sideways, and yaw on split friction, too far.
+    """
     speed = math.hypot(state[1, 0], state[1, 1])
     return 1 if speed == 0.0 else int(min(math.ceil(regular / speed), MOST_PARTS))
 
 
 @lean
 def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
-    """``step_on`` in equal parts of a step; the report is their mean, and of times locked the sum."""
+    """Apply ``step_on`` to equal parts of a step. The report holds means over the parts, but the sum of the times
+    locked."""
     rows, piece, time, regular = motion.report, step / parts, 0.0, vehicle.slope * 9.81 * step / parts
     ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
     sums[:] = 0.0
@@ -79,7 +83,7 @@ def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
 
 @lean
 def advance(motion, torques, step, steer, vehicle):
-    """Move a ``PlaneMotion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
+    """Advance a ``PlaneMotion`` by n steps (s); torques (n + 1, W) at the steps' ends come from ``pressure``.
 
     steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
@@ -112,7 +116,7 @@ HINGES = ("the drawbar against the truck", "the trailer's body against the drawb
 
 
 def ending(status: int, plane: Plane, motion: PlaneMotion) -> str:
-    """Why a sample ended a run that moved so in its last step."""
+    """Sentence on why a run ended, from the status and the motion of its last step."""
     if status == FOLDED:
         return _folded(plane, motion.state[0, 2:])
     if status == NOT_FOUND:
@@ -130,13 +134,13 @@ def _folded(plane: Plane, headings: np.ndarray) -> str:
 
 
 def _lifted(loads: np.ndarray) -> bool:
-    """Whether two wheels of a side or of an axle bear nothing."""
+    """Whether both wheels of a side, or both wheels of an axle, carry no load."""
     up = loads <= 0.0
     return bool((up[0] or up[3]) and (up[1] or up[2]))
 
 
 def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float, float]:
-    """Acceleration of the body on four wheels, along and across it (m/s^2)."""
+    """Longitudinal and lateral acceleration (m/s^2) of a two-axle unit, in its own axes."""
     accelerations = motion.accelerations
     k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
@@ -145,8 +149,8 @@ def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float,
 
 
 def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
-    """Sentence on how a vehicle tips over, by moments about the wheels that stay on the road: statics of a body
-    whose loads follow its accelerations."""
+    """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road; the statics are those
+    of a body whose wheel loads follow its accelerations."""
     body, (ahead, aside) = BODIES[four.start // 4], rates
     static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
     if status == PITCHED:

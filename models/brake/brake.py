@@ -17,7 +17,8 @@ from models.machine.compiled import lean
 
 
 class Brake(Strict):
-    """The brake of one wheel; raises InputError if torque were to fall below the line on which it rises."""
+    """The brake of one wheel. Raises InputError where the hysteresis would put torque below the line of rising
+    pressure."""
 
     push_out: float = quantity("bar", "pressure above which torque rises from none", zero=True)
     release: float = quantity("bar", "pressure below which there is no torque; at most push_out", zero=True)
@@ -34,7 +35,7 @@ class Brake(Strict):
 
 
 class Brakes(NamedTuple):
-    """Brakes of W wheels for compiled functions, each (W,): see ``Brake``."""
+    """Parameters of the brakes of W wheels, one array (W,) each, for compiled functions; see ``Brake``."""
 
     push_out: np.ndarray
     release: np.ndarray
@@ -43,20 +44,21 @@ class Brakes(NamedTuple):
 
 
 def of_wheels(*brakes: Brake) -> Brakes:
-    """Numbers of the brakes of all wheels, in their order."""
+    """Parameters of the brakes of all wheels, in the order of the wheels."""
     return Brakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in Brakes._fields))
 
 
 @lean
 def torque(i, pressure, before, brakes):
-    """Torque (N m) of brake i at a pressure (bar) that was reached without turning back since the torque ``before``."""
+    """Torque (N m) of brake i at a pressure (bar), where ``before`` is its last torque and the pressure has not turned
+    back since."""
     up = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
     down = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
     return max(up, min(down, before))
 
 
 def torques(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
-    """Torques (n,) in N m of the first brake along pressures (n,) in bar, from none on."""
+    """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar; it starts without torque."""
     before, along = 0.0, np.empty(len(pressures))
     for n, pressure in enumerate(pressures):
         before = along[n] = torque(0, pressure, before, brakes)

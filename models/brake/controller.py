@@ -16,7 +16,7 @@ LARGEST_PRESSURE = 300.0
 
 
 class Sample(NamedTuple):
-    """The signals that a controller is given at a sample.
+    """The signals that a controller receives at a sample.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
     radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the
@@ -33,7 +33,7 @@ class Sample(NamedTuple):
 
 
 class Command(NamedTuple):
-    """The controller's answer to a sample: states (W,) of the valves, or pressures (W,) in bar instead."""
+    """A controller's answer to a sample: states (W,) of the valves, or instead pressures (W,) in bar."""
 
     valves: np.ndarray | None = None
     pressures: np.ndarray | None = None
@@ -52,7 +52,8 @@ class Controller(Protocol):
 
 
 def is_steady(controller: Controller) -> bool:
-    """Whether it need be asked only once: what a steady class says does not hold for a ``sample`` derived from it."""
+    """Whether the controller needs to be asked only once. A derived class with its own ``sample`` is not steady merely
+    because its base class is."""
     declared: Mapping[str, object] = next(
         (vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {}
     )

@@ -22,7 +22,8 @@ UTILISED = 0.75
 
 @dataclass(frozen=True)
 class Axles:
-    """Static loads (N) of front and rear, wheelbase and height of the centre of mass (m)."""
+    """Data of a two-axle vehicle: static loads (N) of front and rear axle, wheelbase (m), height of the centre of mass
+    (m)."""
 
     front: float
     rear: float
@@ -35,13 +36,14 @@ class Axles:
         return self.front + self.rear
 
     def dynamic(self, z: float) -> tuple[float, float]:
-        """Loads (N) of front and rear at a deceleration z g."""
+        """Loads (N) of the front and the rear axle when the vehicle decelerates at z g."""
         moved = self.height / self.wheelbase * z * self.weight
         return self.front + moved, self.rear - moved
 
 
 def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
-    """Time (s) at which a speed is first fallen below, linear between samples; not a number if it never is."""
+    """Time (s) at which the speed first falls below ``speed``, interpolated linearly between samples; NaN if it never
+    does."""
     below = np.flatnonzero(speeds < speed)
     if below.size == 0 or below[0] == 0:
         return float("nan")
@@ -51,7 +53,7 @@ def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
 
 
 def way_at(times: np.ndarray, distance: np.ndarray, speeds: np.ndarray, time: float) -> float:
-    """Way (m) at a time between two samples, at constant deceleration within that sample."""
+    """Distance (m) covered at a time between two samples, with constant deceleration between them."""
     i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     passed, long = time - times[i], times[i + 1] - times[i]
     rate = (speeds[i + 1] - speeds[i]) / long
@@ -80,7 +82,7 @@ def equivalent_deceleration(speed: float, distance: float) -> float:
 
 
 def braking_rate(high: float, low: float, time: float) -> float:
-    """z of a vehicle that takes ``time`` (s) from one speed to a lower one (m/s).
+    """Braking rate z of a vehicle that takes ``time`` (s) to slow down from one speed to a lower one (m/s).
 
     From 40 to 20 km/h it is 0.566 / t, from 45 to 15 km/h 0.849 / t (UN R13, Annex 13; not checked against the text).
     """
@@ -88,7 +90,7 @@ def braking_rate(high: float, low: float, time: float) -> float:
 
 
 def mean_of_fastest(times: np.ndarray) -> float:
-    """Mean of the (at most three) least times within 1.05 of the least one.
+    """Mean of the shortest times: at most three, and only those within 1.05 times the shortest one.
 
     Source: UN R13, Annex 13, appendix 2; not checked against the text of the regulation.
     """
@@ -115,7 +117,11 @@ def adhesion_rear(z: float, axles: Axles) -> float:
 
 
 def adhesion_trailer(z: float, weight: float, load: float) -> float:
-    """k of one axle of a trailer from the braking rate of the train (weight in N) with it alone braked: z P g / F_dyn.
+    """Adhesion k of one trailer axle, z P g / F_dyn, from the braking rate of the train (weight in N) when only that
+    axle brakes.
+
+    load: F_dyn, N. The formula is ours. Rolling resistance is not subtracted, because wheels have none here; that of a
+    whole train would be a third of the force of one axle on ice.
 
     load: F_dyn, N. Ours; nothing is taken off for wheels that roll, as none has rolling resistance here, and a whole
     train's would be a third of what one axle does on ice.
@@ -141,7 +147,8 @@ def split_rate(k_low: float, k_high: float) -> float:
 
 
 def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
-    """Yaw rate divided by that of the circle at the momentary speed, r R / v: 1 of a vehicle that stays on its circle.
+    """Ratio r R / v of the yaw rate to that of the circle at the present speed: 1 for a vehicle that stays on its
+    circle.
 
     Source: ISO 7975 and ISO 14794, one second after the brake is applied; not checked against the text of the standard.
     """
@@ -150,7 +157,8 @@ def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
 
 @dataclass(frozen=True)
 class Locks:
-    """Locks of each wheel (W,): time locked (s), share of the time, longest lock (s), above a speed of the vehicle."""
+    """How long each wheel (W,) was locked while the vehicle was above a speed: total time (s), ratio of that to the
+    time above the speed, and longest single lock (s)."""
 
     time: np.ndarray
     share: np.ndarray
@@ -158,7 +166,8 @@ class Locks:
 
 
 def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, least_speed: float = 15.0 * KMH) -> Locks:
-    """Locks above a speed (m/s): lengths (n,) of the samples in s, locked (n, W) whether a wheel stands, speeds (n,).
+    """Locked times of the wheels while the vehicle is above a speed (m/s). lengths (n,): durations of the samples (s);
+    locked (n, W): whether a wheel is locked; speeds (n,): of the vehicle (m/s).
 
     UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
     """

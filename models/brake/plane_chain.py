@@ -12,7 +12,7 @@ from models.machine.compiled import inlined, lean
 
 
 class ChainPoint(NamedTuple):
-    """A point that is fixed to a unit: its number, and the place (m) in its axes."""
+    """A point fixed to a unit: the unit's number, and the point's coordinates (m) in the unit's axes."""
 
     unit: int
     x: float
@@ -20,7 +20,7 @@ class ChainPoint(NamedTuple):
 
 
 class Direction(NamedTuple):
-    """A heading on the ground by its cosine and sine."""
+    """A direction on the ground, given by the cosine and the sine of its heading angle."""
 
     cosine: float
     sine: float
@@ -31,7 +31,7 @@ ALONG_X = Direction(1.0, 0.0)
 
 @lean
 def velocity(point, positions, rates, reach):
-    """Velocity (2) in the ground's axes of a ``ChainPoint``."""
+    """Velocity (2) of a ``ChainPoint`` in the ground's axes."""
     k, x, y = point
     vx, vy = rates[0], rates[1]
     for j in range(reach.shape[1]):
@@ -45,7 +45,7 @@ def velocity(point, positions, rates, reach):
 
 @lean
 def chain_point_place(point, positions, reach):
-    """Place (2) on the ground of a ``ChainPoint``."""
+    """Position (2) of a ``ChainPoint`` on the ground."""
     k, x, y = point
     px, py = positions[0], positions[1]
     for j in range(reach.shape[1]):
@@ -59,13 +59,13 @@ def chain_point_place(point, positions, reach):
 
 @inlined
 def coordinates(plane):
-    """How many coordinates a ``Plane`` has: a constant of compiled functions for one unit that has no other."""
+    """Number of coordinates of a ``Plane``; for a single unit a constant that compiled functions know beforehand."""
     return 2 + len(plane.units)
 
 
 @inlined
 def prescribed(plane):
-    """How many of the first coordinates follow a motion that is prescribed."""
+    """Number of coordinates with a prescribed motion; they are the first ones: two at a hook, else none."""
     return 0 if len(plane.units) == 1 else 2 * plane.hooked
 
 
@@ -78,11 +78,11 @@ def headings(positions, units):
 
 @inlined
 def rows(point, direction, units, rates, plane, along, across):
-    """Fill the two rows (n,) that give the velocity of a ``ChainPoint`` along a ``Direction`` and to the left of it;
-    ``units`` : see ``headings``.
+    """Fill the two rows (n,) that map the coordinates' rates to the velocity of a ``ChainPoint`` along a ``Direction``
+    and to the left of it; ``units`` : see ``headings``.
 
-    Its acceleration is the rows times those of the coordinates, plus the two terms returned (m/s^2); a force in these
-    axes acts on the coordinates by the rows' transposes.
+    The point's acceleration is the rows times the coordinates' accelerations, plus the two terms returned (m/s^2). A
+    force in these axes gives generalised forces by the transposed rows.
     """
     c, s = direction.cosine, direction.sine
     along[0], along[1], across[0], across[1] = c, s, -s, c
@@ -100,7 +100,8 @@ def rows(point, direction, units, rates, plane, along, across):
 
 @inlined
 def inertia(units, rates, plane, mass, right, along, across):
-    """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,).
+    """Fill the mass matrix (n, n), and ``right`` (n,) with the centrifugal terms, which stand beside the forces in the
+    equations.
 
     units : see ``headings``; along, across (n,) : room to work in.
     """
@@ -117,8 +118,8 @@ def inertia(units, rates, plane, mass, right, along, across):
 
 @inlined
 def factor(mass, plane):
-    """Cholesky's factor of the mass matrix of the coordinates that are free, in place of its lower triangle; of a unit
-    alone the matrix itself, which is diagonal."""
+    """Replace the lower triangle of the mass matrix of the free coordinates by its Cholesky factor. A single unit's
+    matrix is diagonal and stays as it is."""
     if len(plane.units) == 1:
         return
     first = prescribed(plane)
@@ -132,7 +133,8 @@ def factor(mass, plane):
 
 @inlined
 def solve(mass, plane, right):
-    """Forces (n,) to accelerations of the coordinates that are free, in place, by ``factor``'s."""
+    """Turn forces (n,) in ``right`` into accelerations of the free coordinates, in place, with the matrix from
+    ``factor``."""
     size, first = coordinates(plane), prescribed(plane)
     if len(plane.units) == 1:
         for a in range(size):

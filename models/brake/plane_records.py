@@ -13,7 +13,7 @@ from models.machine.compiled import inlined
 
 
 class Report(NamedTuple):
-    """Forces, loads and slips of the wheels in a step, each (W,), in a whole run (samples, W).
+    """Forces, loads and slips of the wheels, (W,) each for a step, or (samples, W) for a run.
 
     force_x, force_y : mean forces on the wheel in its own axes (N); load : N; slip : the mean one; slip_angle : rad;
     locked : time (s) for which the wheel was locked; turning : speed of turning at the end (rad/s).
@@ -36,12 +36,12 @@ TURNING = Report._fields.index("turning")
 
 @inlined
 def report_of(rows):
-    """The ``Report`` whose numbers are these rows (7, W), in compiled functions; in Python ``Report(*rows)``."""
+    """``Report`` of views of the rows (7, W), for compiled functions; in Python, use ``Report(*rows)``."""
     return Report(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
 class PlaneMotion(NamedTuple):
-    """State of a vehicle in the plane, stepped in place.
+    """State of a vehicle in the plane, updated in place by every step.
 
     state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
     which the next one searches on; report (7, W) : the rows of the last step's ``Report``.
@@ -54,7 +54,7 @@ class PlaneMotion(NamedTuple):
 
 
 def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
-    """The motion of a vehicle in the plane that has neither accelerations nor a report yet."""
+    """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
     return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
 
 
@@ -86,12 +86,12 @@ KNOWN = len(Wheels._fields)
 
 @inlined
 def wheels_of(rows):
-    """The ``Wheels`` whose numbers are these rows (11, W), in compiled functions; in Python ``Wheels(*rows)``."""
+    """``Wheels`` of views of the rows (11, W), for compiled functions; in Python, use ``Wheels(*rows)``."""
     return Wheels(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10])
 
 
 class Frame(NamedTuple):
-    """Arrays that all iterations within a time step share.
+    """Arrays shared by all iterations within a time step.
 
     along, across, press (W, n) : see ``plane_chain.rows``, and load by accelerations; units (U, 2) : see ``headings``;
     mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' ones; out, out_before, off

@@ -40,7 +40,7 @@ some loads without an answer."""
 
 @inlined
 def times(row, vector):
-    """Scalar product."""
+    """Scalar product of a row and a vector."""
     total = 0.0
     for a in range(row.size):
         total += row[a] * vector[a]
@@ -49,15 +49,15 @@ def times(row, vector):
 
 @inlined
 def moved_to(row, place):
-    """Copy a row: an assignment of arrays would make one."""
+    """Copy the row's numbers into ``place``; array assignment would allocate a temporary array."""
     for a in range(row.size):
         place[a] = row[a]
 
 
 @inlined
 def settle(motion, steer, regular, starts, vehicle, frame):
-    """Fill what is known of the wheels and the equations at the state; ``starts`` at the start of the step, whose
-    speeds along the wheels are kept."""
+    """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
+    the start of the step, and the wheels' steer angles and speeds along them are stored."""
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
     positions, rates, still = motion.state[0], motion.state[1], frame.wheels.still
     headings(positions, units)
@@ -92,8 +92,8 @@ def settle(motion, steer, regular, starts, vehicle, frame):
 
 @inlined
 def slide(i, u, v, regular, lag, angles, wheels):
-    """Take the slip angle of wheel i by the speeds (m/s) u of its centre along it and v of its tyre across it, or in
-    place of v by what lags behind it: lag (W,) of ``Surfaces``."""
+    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
+    Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v."""
     forwards = u if wheels.start[i] >= 0.0 else -u
     if not math.isnan(lag[i]):
         v = lag[i] * max(forwards, regular)
@@ -104,7 +104,8 @@ def slide(i, u, v, regular, lag, angles, wheels):
 
 @inlined
 def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
-    """Fill the report of wheel i, of known slip angle and load, by a ``StepInput`` of speeds along it."""
+    """Fill the report of wheel i, whose slip angle and load are known, from a ``StepInput`` with the speeds along the
+    wheel."""
     v, along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
@@ -134,8 +135,8 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
 
 @lean
 def share_out(loads, places):
-    """Loads (W,) of vehicles of two axles of which a wheel would lift: it bears none, and the statics of the others
-    hold; places (W, 2) : of the wheels in their units' axes, m.
+    """Correct loads (W,) of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and the
+    other wheels keep the static equilibrium. places (W, 2) : positions of the wheels in their units' axes, m.
 
     The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
     An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
@@ -154,8 +155,8 @@ def share_out(loads, places):
 
 @inlined
 def respond(motion, before, after, step, vehicle, frame):
-    """Fill ``frame.out`` with the accelerations by the tyres' forces if they were those of the ``motion``: the map
-    whose fixed point is wanted. before, after (W,) : torques at the ends of the step."""
+    """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
+    ``motion``. A step's solution is a fixed point of this map. before, after (W,) : torques at the ends of the step."""
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
     load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start
@@ -179,11 +180,11 @@ def respond(motion, before, after, step, vehicle, frame):
 
 @inlined
 def stage(motion, before, after, step, most, vehicle, frame):
-    """Mean accelerations over a step, into those of the ``motion``: what stands there is where the search begins.
+    """Search the mean accelerations over a step, and write them into ``motion``; its last ones are the first guess.
 
-    Anderson's method of depth one for at most so many rounds, of which ``PATIENCE`` that do not settle give way to
-    means. Returns what is left of the error: the last change, which the round has made smaller as it did the change
-    before.
+    Anderson's method of depth one runs for at most ``most`` rounds. If they have not converged and were ``PATIENCE`` or
+    more, ``by_means`` takes over. Returns the estimated remaining error, from the last change and the ratio of the last
+    two.
     """
     accelerations, out, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
     size, left, last = coordinates(vehicle.plane), math.inf, 0.0
@@ -209,7 +210,8 @@ def stage(motion, before, after, step, most, vehicle, frame):
 
 @lean
 def by_means(motion, before, after, step, vehicle, frame):
-    """Accelerations as from ``stage``, where wheel loads jump between two answers and have one only as a mean of them.
+    """Accelerations as from ``stage``, for steps in which wheel loads jump between two solutions, so that only a mean
+    of both is in equilibrium.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of
@@ -258,7 +260,7 @@ def by_means(motion, before, after, step, vehicle, frame):
 
 @inlined
 def comes_to_rest(rates, turning, accelerations, step, plane):
-    """Time (s) within the step at which the vehicle stands, or -1 if it does not.
+    """Time (s) within the step at which the vehicle comes to rest, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
     kinetic energy along the step is least, if it was about to lose all of its speed in that step anyhow.

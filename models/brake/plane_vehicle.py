@@ -36,7 +36,7 @@ class Truck(Strict):
 
     @property
     def wheelbase(self) -> float:
-        """Distance of the axles (m)."""
+        """Distance between the axles (m)."""
         return self.front.x - self.rear.x
 
 
@@ -73,7 +73,7 @@ class Plane(NamedTuple):
 
 
 def truck(vehicle: Truck, transfer: bool = True) -> Plane:
-    """Numbers of a vehicle of two axles; without ``transfer`` its loads stay as they are at rest."""
+    """``Plane`` of a two-axle vehicle; without ``transfer`` its wheel loads stay as they are at rest."""
     check_wheels(vehicle, vehicle.mass)
     none = np.zeros(4, dtype=np.int64)
     place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
@@ -94,7 +94,8 @@ def truck(vehicle: Truck, transfer: bool = True) -> Plane:
 
 
 def check_wheels(vehicle: Truck, mass: float) -> None:
-    """Refuse two axles whose wheels cannot be part of a mass (kg): no wheel is lighter than J / r^2, all in its rim."""
+    """Refuse a vehicle whose mass (kg) is at most its wheels' smallest possible mass: J / r^2 each, as if all in the
+    rim."""
     least = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
     if mass <= least:
         allowed = f"must be above {least:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
@@ -102,7 +103,8 @@ def check_wheels(vehicle: Truck, mass: float) -> None:
 
 
 def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
-    """place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the wheels of two axles under a body."""
+    """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
+    body."""
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share
@@ -111,7 +113,7 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
     front, rear, side = vehicle.front, vehicle.rear, np.array([1.0, -1.0, 1.0, -1.0])
 
     def each(name: str) -> np.ndarray:
-        """A parameter of the axle of each wheel."""
+        """One value per wheel (4,) of a parameter that belongs to its axle."""
         return np.repeat([getattr(front, name), getattr(rear, name)], 2)
 
     share = np.repeat([-rear.x / vehicle.wheelbase, front.x / vehicle.wheelbase], 2)

@@ -21,7 +21,7 @@ NONE = np.zeros(0)
 
 
 class Chambers(NamedTuple):
-    """How brake chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
+    """Dynamics of brake chambers (W,): time constants (s) of first-order filling and emptying; supply pressure (bar).
 
     volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
     keeps its pressure and asks for no volumes. delay : of the valves (s). slow (W,) : time constants (s) of filling by
@@ -38,7 +38,7 @@ class Chambers(NamedTuple):
 
 
 class Air(NamedTuple):
-    """State of the brake's air system, from which pressures are stepped in place.
+    """State of the brakes' air system, which is updated in place.
 
     pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
     states of the valves as they were commanded, the latest last, d the whole samples of the valves' delay.
@@ -51,7 +51,7 @@ class Air(NamedTuple):
 
 
 def resting_chambers(chambers: Chambers, sample: float) -> Air:
-    """No pressure anywhere but in the supply, all valves released; sample (s)."""
+    """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample (s)."""
     wheels = chambers.fill.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
@@ -66,7 +66,7 @@ def resting_chambers(chambers: Chambers, sample: float) -> Air:
 
 @lean
 def chamber(pressure, valve, time, fill, empty, supply):
-    """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
+    """Pressure (bar) of a chamber after a time (s) in which its valve applies, holds or releases."""
     if valve >= APPLY:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
     if valve == RELEASE:
@@ -76,7 +76,8 @@ def chamber(pressure, valve, time, fill, empty, supply):
 
 @lean
 def press(valves, time, air, chambers, brakes):
-    """Go on for a time (s) with valves (W,) as they are: no pressure turns back, so the torque law holds."""
+    """Update pressures and torques over a time (s) with constant valve states (W,). Every pressure changes
+    monotonically, so the torque law holds."""
     taken = 0.0
     for i in range(valves.size):
         before = air.pressure[i]
@@ -91,7 +92,7 @@ def press(valves, time, air, chambers, brakes):
 
 @lean
 def by_valves(valves, sample, air, chambers, brakes, torques):
-    """Mode V: fill ``torques`` (n + 1, W), those at the ends of the n steps of a sample (s)."""
+    """Mode V, control by valves: fill ``torques`` (n + 1, W), at the ends of the n steps of a sample (s)."""
     steps, last = torques.shape[0] - 1, air.commands.shape[0] - 1
     for i in range(valves.size):
         for k in range(last):
@@ -111,7 +112,8 @@ def by_valves(valves, sample, air, chambers, brakes, torques):
 
 @lean
 def by_pressures(pressures, air, brakes, torques):
-    """Mode P: pressures (W,) in bar are there at once and stay for the sample; ``torques`` (n + 1, W) as above."""
+    """Mode P, control by pressures: pressures (W,) in bar are reached at once and stay for the sample; fills
+    ``torques`` (n + 1, W)."""
     for i in range(pressures.size):
         air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
         for n in range(torques.shape[0]):

@@ -35,7 +35,7 @@ class QuarterPath(NamedTuple):
 
 
 class Quarter(Strict):
-    """A quarter vehicle: one wheel and the mass that it carries."""
+    """A quarter vehicle: one wheel, and the vehicle mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
     radius: float = quantity("m", "of the wheel")
@@ -50,8 +50,7 @@ class Quarter(Strict):
 
     @property
     def plane(self) -> Plane:
-        """The vehicle of this wheel as compiled functions take it: unit and group are the only ones, the wheel is at
-        the centre."""
+        """The quarter vehicle as a ``Plane`` for compiled functions: one unit with one wheel at its centre."""
         none, unit = np.zeros(1, dtype=np.int64), np.ones(1)
         return Plane(
             self.mass * unit,
@@ -69,25 +68,25 @@ class Quarter(Strict):
         )
 
     def steady_torque(self, slip: float, force: float) -> float:
-        """Torque (N m) under which a slip stays as it is while the tyre gives a force (N)."""
+        """Brake torque (N m) that keeps a slip constant while the tyre gives a force (N)."""
         return force * (self.radius + self.spin_inertia * (1.0 - slip) / (self.mass * self.radius))
 
 
 @dataclass(frozen=True, eq=False)
 class QuarterStop:
-    """Path from the start on, and the step (index) in which it came to rest, or -1."""
+    """Motion from the start to the end, and the index of the step in which the vehicle came to rest, or -1."""
 
     path: QuarterPath
     rest: int
 
     @property
     def distance(self) -> float:
-        """Way (m) from the start to the end of the path."""
+        """Distance (m) from the start to the end of the path."""
         return float(self.path.position[-1] - self.path.position[0])
 
     @property
     def released(self) -> float:
-        """Time (s) at which a wheel that was locked in one run of steps turned again; not a number if it never did."""
+        """Time (s) at which the wheel first turned again after a locked period; NaN if it never did."""
         time, locked = self.path.time, self.path.locked
         held = np.flatnonzero(locked > 0.0)
         if held.size == 0 or self.path.turning[held[-1]] == 0.0:
@@ -97,7 +96,7 @@ class QuarterStop:
 
 @njit(cache=True, error_model="numpy")
 def march(motion, torques, step, vehicle, path):
-    """Steps (s) of a ``Motion`` on one wheel under torques (n + 1, 1) at their ends, see ``advance``.
+    """Advance one wheel's ``motion`` in steps (s) under torques (n + 1, 1) at the steps' ends; see ``advance``.
 
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
@@ -125,7 +124,7 @@ def braked(
     speed: float,
     turning: float | None = None,
 ) -> QuarterStop:
-    """Motion along x from a speed (m/s) under torques (n + 1,) in N m at the ends of steps (s), linear in between.
+    """Straight braking from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s), linear between.
 
     turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """

@@ -40,16 +40,17 @@ class Lag(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def taken_up(a, u, v, time, length):
-    """tan of the slip angle after a time (s) at constant speeds u, v (m/s) with a relaxation length (m)."""
+    """tan of the slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with a relaxation
+    length (m)."""
     return a + (v - abs(u) * a) * phi_1(-abs(u) * time / length) * time / length
 
 
 @inlined
 def take_up(i, u, v, time, slope, lag, lagging):
-    """Move the angle of wheel i of a ``Lag`` on by a time (s) at speeds u, v (m/s), and fill its place in ``lagging``
-    (W,) with that and the damper's part; slope : see ``OnRoad``.
+    """Advance the lagging angle of wheel i by a time (s) at speeds u, v (m/s). Put the tan of the slip angle with the
+    damper's part into ``lagging`` (W,); slope : see ``OnRoad``.
 
-    What is NaN begins as if the speeds had been there for ever.
+    An angle that is NaN starts at its steady value for these speeds.
     """
     length = lag.length[i]
     if math.isnan(lag.angle[i]):
@@ -73,7 +74,7 @@ def longest_step(slope: float, lively: float, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def lag_on(state, time, steer, vehicle, lag, lagging):
-    """Move a ``Lag`` on by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
+    """Advance the lagging angles of all wheels by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
@@ -84,7 +85,7 @@ def lag_on(state, time, steer, vehicle, lag, lagging):
 
 @njit(cache=True, error_model="numpy")
 def advance_lagging(motion, torques, step, steer, vehicle, lag):
-    """``advance`` with tyres of a ``Lag``, which is moved in place."""
+    """``advance`` for tyres with relaxation, whose ``Lag`` is updated in place."""
     surfaces, time = surfaces_of(np.empty((4, motion.turning.size))), 0.0
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)

@@ -39,12 +39,12 @@ class Row(NamedTuple):
     report: np.ndarray
 
     def motion(self, accelerations: np.ndarray) -> PlaneMotion:
-        """``PlaneMotion`` of the vehicle at these accelerations (2 + U,)."""
+        """``PlaneMotion`` of this row's state, with the given accelerations (2 + U,)."""
         return PlaneMotion(self.state, self.turning, accelerations, self.report)
 
 
 def row(coordinates: int, wheels: int) -> Row:
-    """A row of zeros of so many coordinates and wheels."""
+    """A ``Row`` of zeros for so many coordinates and wheels."""
     shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORTED, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     whole = np.zeros(ends[-1])
@@ -53,7 +53,8 @@ def row(coordinates: int, wheels: int) -> Row:
 
 
 def parts(rows: list[np.ndarray], like: Row) -> Row:
-    """``Row`` of blocks of rows laid out as ``like``, each part with an axis for the rows before its own."""
+    """``Row`` whose fields hold many rows each, from blocks of rows laid out as ``like``: every field has a first axis
+    more, over the rows."""
     ends = np.cumsum([part.size for part in like[1:]])
     whole = np.concatenate(rows)
     columns = np.split(whole, ends[:-1], axis=1)
@@ -67,8 +68,8 @@ def parts(rows: list[np.ndarray], like: Row) -> Row:
 
 
 class Commands(NamedTuple):
-    """Commands that hold for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,)
-    in bar, of which the first is not a number where valves hold, and steer angles (W,) in rad."""
+    """Commands that stay constant over the next ``samples`` (1,) samples: states of the valves (W,), pressures (W,) in
+    bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad."""
 
     samples: np.ndarray
     valves: np.ndarray
@@ -78,8 +79,8 @@ class Commands(NamedTuple):
 
 class Record(NamedTuple):
     """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
-    such moments, of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or
-    after."""
+    states at earlier samples, of which the first ``left`` (1,) are filled and not yet collected; until (s): the run
+    ends with the first sample that ends then or later."""
 
     now: np.ndarray
     rows: np.ndarray
@@ -97,7 +98,8 @@ class Braking(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """All that samples work on; sample (s); others: what ``advance`` takes after the steer angles."""
+    """All data of a run that samples need; sample (s); others: further arguments of ``advance``, after the steer
+    angles."""
 
     commands: Commands
     record: Record
@@ -113,7 +115,7 @@ class ReferenceType(types.StructRef):
 
 
 class Reference(structref.StructRefProxy):
-    """A ``Subject`` that compiled code holds by its address."""
+    """A ``Subject`` that compiled code refers to by its address."""
 
 
 structref.define_proxy(Reference, ReferenceType, Subject._fields)
@@ -130,8 +132,8 @@ go: Callable[..., Any] = advance
 
 
 def some_samples(commands, record, sample, braking, motion, simulated_time, *others):
-    """Move a vehicle that is at a time (s) on by as many samples as it is told for, less only where it does not move
-    any further, by ``go``, which is ``advance`` or stands in for it. How the last sample ended, and the time (s)."""
+    """Advance a vehicle from a time (s) on by ``commands.samples`` samples, or until it stops or the run ends. ``go``
+    makes each step: ``advance`` or a function in its place. Returns how the last sample ended, and the time (s)."""
     air, chambers, brakes, torques = braking
     status, step = FINE, sample / (torques.shape[0] - 1)
     for _ in range(commands.samples[0]):
@@ -156,7 +158,7 @@ some: Callable[..., Any] = some_samples
 
 
 def samples(subject):
-    """Generator of a vehicle that ``some_samples`` moves on, of a ``Subject`` or a ``Reference``.
+    """Generator that advances the vehicle of a ``Subject`` or a ``Reference`` by ``some_samples``.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
     (m/s) and the supply (bar).
@@ -177,8 +179,8 @@ def samples(subject):
 
 
 def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
-    """The function with other globals, and no cells of a closure, by whose contents numba would know it, and which are
-    others in every process if they are compiled."""
+    """A copy of the function with other globals and without closure cells. numba identifies functions by the contents
+    of these cells, which differ between processes if they hold compiled functions."""
     return FunctionType(function.__code__, globals() | given, function.__name__)
 
 
@@ -187,7 +189,7 @@ Moving = Callable[..., Iterator[tuple[int, float, float, float]]]
 
 
 def moved(step_function: Callable[..., Any]) -> Moving:
-    """``samples`` by one ``step_function``."""
+    """``samples`` that advances its vehicle by the given ``step_function``."""
     march = _with(samples, some=_with(some_samples, go=step_function))
 
     def begun(commands, record, sample, braking, motion, *others):
@@ -198,17 +200,17 @@ def moved(step_function: Callable[..., Any]) -> Moving:
 
 @dataclass(frozen=True)
 class CompiledSamples:
-    """``samples`` as compiled code: march takes a ``Reference``."""
+    """Compiled version of ``samples``; march takes a ``Reference``."""
 
     march: Callable[[Reference], Iterator[tuple[int, float, float, float]]]
 
     def __call__(self, commands, record, sample, braking, motion, *others):
-        """``samples`` of the fields of a ``Subject``."""
+        """Generator of ``samples``, from the fields of a ``Subject``."""
         return self.march(by_reference(commands, record, sample, braking, motion, others))
 
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
-    """``moved`` by a compiled function, compiled."""
+    """Compiled version of ``moved``, for a compiled step function."""
     some = lean(named_closure(_with(some_samples, go=step_function), name))
     return CompiledSamples(njit(cache=True, error_model="numpy")(named_closure(_with(samples, some=some), name)))
 

@@ -39,9 +39,10 @@ LEADING: tuple[tuple[str, Freedom], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Sprung:
-    """The vehicle as the engines build it, and the plane one that has its mass, axles and wheels, without what it tows.
+    """A vehicle on its suspension as engines build it, and the plane vehicle with the same mass, axles and wheels,
+    without trailers.
 
-    spins : (W,) kg m^2, of its wheels and of those of what it tows
+    spins : (W,) kg m^2, inertias of the wheels, including those of trailers
     """
 
     handling: Handling
@@ -60,12 +61,13 @@ class Sprung:
 
     @property
     def turns(self) -> np.ndarray:
-        """(towed,) numbers of the coordinates by which what is towed yaws beside what tows it."""
+        """Numbers (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
         return self._turning("rz")
 
     @property
     def leans(self) -> np.ndarray:
-        """Numbers of the coordinates of roll and pitch: of the chassis, then of what is towed beside what tows it."""
+        """Numbers of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the one before
+        it."""
         return np.concatenate(([ROLL, PITCH], self._turning("rx"), self._turning("ry")))
 
     def _turning(self, freedom: Freedom) -> np.ndarray:
@@ -75,9 +77,9 @@ class Sprung:
         return np.array([known.index(place) for place in places if place in known], dtype=np.int64)
 
     def in_plane(self, transfer: bool = True) -> Plane:
-        """Numbers of the vehicle and its wheels in the plane; of a train loads are those at rest, by its springs.
+        """``Plane`` of the vehicle and its wheels. In a train, loads are the static ones that its springs carry.
 
-        Each hitch is taken to lie in the middle plane of what tows by it.
+        Each hitch is taken to lie in the middle plane of the towing unit.
         """
         alone, free = truck(self.plane, transfer), self.handling.vehicle
         if not free.towed:
@@ -107,7 +109,8 @@ class Sprung:
 
 
 def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """reach (U, U) of ``Plane``, m: hitches (U - 1,) and centres (U,) ahead of the vehicle's centre."""
+    """reach (U, U) of ``Plane``, m, from the hitches' positions (U - 1,) and the units' centres (U,), both ahead of the
+    vehicle's centre."""
     reach = np.zeros((centres.size, centres.size))
     for k in range(1, centres.size):
         reach[k:, k - 1] = hitches[k - 1] - (hitches[k - 2] if k > 1 else centres[0])
@@ -116,8 +119,8 @@ def _hitch_reach(hitches: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 
 def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
-    """Mass (kg), yaw inertia (kg m^2) and place ahead (m) of the centre of a towed body with all that it carries, or of
-    the vehicle without what it tows."""
+    """Mass (kg), yaw inertia (kg m^2) and position ahead (m) of a unit's centre of mass. The unit is a towed body with
+    all that it carries, or the vehicle without its trailers."""
     bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
     masses, places = np.array([body.mass for body in bodies]), np.array([body.position for body in bodies])
     x, y, _ = masses @ places / masses.sum()
@@ -125,7 +128,7 @@ def _unit(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
 
 
 def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
-    """Inertia (kg m^2) of bodies about the vertical through a place (m)."""
+    """Inertia (kg m^2) of bodies about the vertical through a point x, y (m)."""
     return sum(
         body.inertia[2][2] + body.mass * ((body.position[0] - x) ** 2 + (body.position[1] - y) ** 2) for body in bodies
     )
@@ -134,8 +137,12 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
 def sprung(
     vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
 ) -> Sprung:
-    """A vehicle of two axles with two wheels each, and what it tows; spin_inertia (kg m^2): of a wheel
-    whose tyre names none.
+    """A two-axle vehicle with two wheels per axle, and its trailers; spin_inertia (kg m^2): for wheels whose tyres name
+    no inertia.
+
+    front : share of the front axle in the lateral load transfer of the plane vehicle, while here the springs determine
+    it; forces : who computes the trailers' springs, see ``Handling``. Raises InputError for a vehicle with other axles,
+    with trailers that do not form a row, or without steering.
 
     front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
     here; forces : whose the springs of what is towed are, see ``Handling``. Raises InputError for a vehicle of other
@@ -152,8 +159,8 @@ def sprung(
 
 
 def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
-    """Tyres axle by axle, the left one first; InputError unless two are on each of the vehicle's two axles, and on
-    each one behind them, which is towed."""
+    """Tyres axle by axle, left before right; InputError unless the vehicle has two axles, and these and all trailer
+    axles have two tyres each."""
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
     names, ahead = [tyre.name for tyre in tyres], [vehicle.towed_under(tyre.body) is None for tyre in tyres]
     pairs = list(zip(tyres[::2], tyres[1::2], strict=False))
@@ -170,7 +177,8 @@ def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
 
 
 def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
-    """Inertias (kg m^2) of the wheels of these tyres, axle by axle; InputError unless both of an axle are alike."""
+    """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
+    equal."""
     inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:
@@ -180,7 +188,7 @@ def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
 
 
 def _check_row(vehicle: SpatialVehicle) -> None:
-    """Refuse what is not towed in a row, or whose coupling does not yaw."""
+    """Refuse trailers that are not coupled one behind the other, or have a coupling without yaw."""
     before: str | None = None
     for name in vehicle.towed:
         hitch = vehicle.body(hitch_of(name))
@@ -199,7 +207,7 @@ def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
 
 
 def centre(vehicle: SpatialVehicle) -> np.ndarray:
-    """(3,) m: centre of mass, in the design position, of a vehicle without what it tows."""
+    """Centre of mass (3,) in m, in the design position, of a vehicle without its trailers."""
     bodies = without_trailer(vehicle)
     masses = np.array([body.mass for body in bodies])
     return masses @ np.array([body.position for body in bodies]) / masses.sum()
@@ -210,7 +218,7 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 
 
 def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
-    """The vehicle drawn elsewhere on the ground."""
+    """The vehicle with all positions shifted by ``distance`` on the ground."""
 
     def at(part: Any, name: str) -> Vector:
         x, y, z = np.add(getattr(part, name), (distance[0], distance[1], 0.0))
@@ -227,7 +235,8 @@ def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
 
 
 def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
-    """The plane vehicle of a centred one, without what it tows; spin_inertias (kg m^2): of its wheels."""
+    """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
+    wheels."""
     bodies = without_trailer(vehicle)
     front_axle, rear_axle = (
         Axle(

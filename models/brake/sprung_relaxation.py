@@ -22,7 +22,8 @@ class ContactLag(NamedTuple):
 
 @lean
 def relax(contacts, half, slope, lag, surfaces):
-    """Move a ``ContactLag`` on to half a step (s) after its ``Contacts``, and let the tyres of the ``Surfaces`` lag."""
+    """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
+    ``Surfaces``."""
     time = lag.behind[0] + half
     for i in range(lag.angle.size):
         take_up(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)

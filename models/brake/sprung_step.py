@@ -85,7 +85,7 @@ class AtWheels(NamedTuple):
 
 @lean
 def wheel_forces_of(numbers):
-    """Views of the constant wheel quantities, which are the last numbers of a table for compiled forces."""
+    """``WheelForces`` of views of the last numbers in a table for compiled force functions."""
     wheels = int(numbers[TYRES])
     rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
     return WheelForces(rows[0], rows[1], rows[2], rows[3])
@@ -126,7 +126,8 @@ def forces(numbers, q, v, f):
 
 @lean
 def held(numbers, time, q, v, f):
-    """Add the forces to ``f``, for callbacks: pointers to doubles; nothing depends on the time."""
+    """Add the forces to ``f``. For callbacks: all arguments but the time are pointers to doubles; the time is not
+    used."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     forces(array(numbers, (int(head[COUNT]) + HELD * w,)), array(q, (n,)), array(v, (n,)), array(f, (n,)))
@@ -134,7 +135,8 @@ def held(numbers, time, q, v, f):
 
 @lean
 def set_held(block, t, n):
-    """``held`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``held``. All data are in one block of doubles at an address: f, q and v (n,), then
+    the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
@@ -142,8 +144,8 @@ def set_held(block, t, n):
 
 @lean
 def meet(contacts, regular, lag, angles, wheels):
-    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag
-    (W,) of ``Surfaces``; angles of the tyres' tables."""
+    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag (W,)
+    of ``Surfaces``; angles of the tyres' tables."""
     for i in range(contacts.load.size):
         slide(i, contacts.along[i], contacts.across[i], regular, lag, angles, wheels)
         wheels.load[i] = contacts.load[i]
@@ -151,7 +153,8 @@ def meet(contacts, regular, lag, angles, wheels):
 
 @lean
 def hold(known, before, after, step, motion, vehicle):
-    """Let the wheels hold the tyres' mean forces over a step (s) between torques (W,) of the brakes, and report them.
+    """Compute the tyres' mean forces over a step (s) between brake torques (W,), store them as the wheels' constant
+    forces, and fill the report.
 
     known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
@@ -173,10 +176,11 @@ PLANE = 3
 
 
 class Units(NamedTuple):
-    """The vehicle and what it tows as units in the plane.
+    """The vehicle and its trailers as units in the plane.
 
-    turns (U - 1,) : numbers of the coordinates by which each one behind yaws beside the one before; leans (L,) : of
-    those of roll and pitch; motion (2, 2 + U) : place of the first and headings of all, and their rates.
+    turns (U - 1,) : numbers of the yaw coordinates of each trailer relative to the unit before it; leans (L,) : numbers
+    of the roll and pitch coordinates; motion (2, 2 + U) : position of the first unit and headings of all, and their
+    rates.
     """
 
     turns: np.ndarray
@@ -186,7 +190,7 @@ class Units(NamedTuple):
 
 @lean
 def to_units(whole, turns, plane):
-    """Fill values (2 + U,) of the ``Units`` from those of all coordinates (n,): positions, rates or accelerations."""
+    """Fill values (2 + U,) of the ``Units`` from values of all coordinates (n,): positions, rates or accelerations."""
     for a in range(PLANE):
         plane[a] = whole[a]
     for k in range(turns.size):
@@ -195,7 +199,7 @@ def to_units(whole, turns, plane):
 
 @inlined
 def ended(q, units, fold):
-    """Whether positions (n,) leave the vehicle FINE, or how they end a run: it turns over, or a train jackknifes."""
+    """FINE, or how positions (n,) end a run: the vehicle turns over, or a train jackknifes."""
     status = FINE
     for k in range(units.turns.size):
         if not abs(q[units.turns[k]]) <= fold:
@@ -207,7 +211,7 @@ def ended(q, units, fold):
 
 
 class OnEngine(NamedTuple):
-    """Data that a step of a vehicle with suspension needs in addition to those of a step in the plane.
+    """Data that a step of a vehicle on its suspension needs in addition to those of a plane step.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -228,23 +232,24 @@ class OnEngine(NamedTuple):
 
 @inlined
 def relax(contacts, half, slope, lag, surfaces):
-    """Tyres answer at once; ``models.brake.sprung_relaxation`` has what stands here where they lag."""
+    """Do nothing: these tyres have no lag. ``models.brake.sprung_relaxation`` replaces this function for tyres that
+    lag."""
 
 
 def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
-    """Fill ``out`` (n,) with the accelerations of a ``FreeModel``; stands here for others, too."""
+    """Fill ``out`` (n,) with the accelerations of a ``FreeModel``; engines replace this function by their own."""
     out[:] = engine.acceleration(0.0, q, v)
 
 
 def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """Advance positions and rates (n,) by the engine's step; other engines replace this function."""
+    """Advance positions and rates (n,) by one step of the engine; other engines replace this function."""
     q[:], v[:] = np.split(engine.march(q, v, 1, engine.step)[-1], 2)
     return True
 
 
 def advance(motion, torques, step, steer, vehicle, course):
-    """Advance the vehicle on its suspension as ``models.brake.advance.advance`` does in the plane, the state (2, n)
-    having all coordinates and their rates.
+    """Advance a vehicle on its suspension, as ``models.brake.advance.advance`` does in the plane; the state (2, n)
+    holds all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.
@@ -296,10 +301,10 @@ def advance(motion, torques, step, steer, vehicle, course):
 
 
 def advance_with(**parts: Callable[..., Any]) -> Callable[..., Any]:
-    """``advance`` with other functions in the places of those that stand here for others; see ``samples.moved``."""
+    """``advance`` in which the engines' own functions replace this module's default ones; see ``samples.moved``."""
     return FunctionType(advance.__code__, globals() | parts, "advance")
 
 
 def compiled(name: str, **parts: Callable[..., Any]) -> Callable[..., Any]:
-    """``advance_with`` an engine's own compiled functions, compiled."""
+    """Compiled ``advance_with`` for an engine's own compiled functions."""
     return njit(cache=True, error_model="numpy")(named_closure(advance_with(**parts), name))

@@ -14,7 +14,8 @@ STEADY_RANGE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """Angles (n,) in rad at times (n,) in s of the wheels that ``steered`` (W,) marks: linear between, held outside."""
+    """Angles (n,) in rad of the wheels marked by ``steered`` (W,), at times (n,) in s: linear between the times,
+    constant outside."""
 
     times: np.ndarray
     angles: np.ndarray
@@ -26,7 +27,7 @@ class Steering:
 
     @property
     def half(self) -> float:
-        """Time (s) at which the angle first reaches half of its last one."""
+        """Time (s) at which the angle first reaches half of its final value."""
         goal, last = HALF_SHARE * abs(self.angles[-1]), np.sign(self.angles[-1])
         reached = last * self.angles >= goal
         i = int(np.argmax(reached))
@@ -37,8 +38,8 @@ class Steering:
 
 @dataclass(frozen=True)
 class YawResponse:
-    """time : from half of the steering to 0.9 of the steady yaw rate, s; overshoot : of the largest beyond the steady
-    one, by it; steady : yaw rate, rad/s."""
+    """time : s, from half of the final steer angle to 90 % of the steady yaw rate; overshoot : ratio of peak yaw rate
+    above the steady one to the steady one; steady : yaw rate, rad/s."""
 
     time: float
     overshoot: float
@@ -46,8 +47,7 @@ class YawResponse:
 
 
 def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
-    """Step response of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it
-    is not.
+    """Step response from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
     vehicles); not checked against the text of the standard.

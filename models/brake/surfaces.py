@@ -28,7 +28,7 @@ class Road(NamedTuple):
 
 
 class OnRoad(NamedTuple):
-    """A vehicle in the plane on its tyres and its road: what stays as it is over a run.
+    """A vehicle in the plane with its tyres and road: all data that stay constant during a run.
 
     kind (W,): which of the road's kinds of tyre each wheel has; slope: largest cornering coefficient of the tables
     (1/rad); tables: surface by surface and kind by kind.
@@ -52,7 +52,7 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(wheels: int) -> Surfaces:
-    """``Surfaces`` of so many wheels: the first table under all of them, without lag of the tyres."""
+    """``Surfaces`` for so many wheels, with the first table under each and without lag of the tyres."""
     return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
@@ -73,7 +73,7 @@ class Stretch:
 
 
 def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
-    """Road of stretches in the order of their x; the first also holds before it begins.
+    """Road of stretches in ascending order of x; the first one also extends to minus infinity.
 
     Another level of friction on a stretch is a surface of its own, ``TyreTable.scaled``.
     """
@@ -92,7 +92,7 @@ UNIFORM_ROAD = road([Stretch(0.0, 0, 0)])
 
 
 def check_way(road: Road, distance: float) -> None:
-    """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
+    """Refuse steps in which a wheel may travel a distance (m) longer than the shortest inner stretch of the road."""
     shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
     if distance > shortest:
         raise InputError(
@@ -105,7 +105,7 @@ def check_way(road: Road, distance: float) -> None:
 
 @inlined
 def is_uniform(road):
-    """Whether one surface is everywhere."""
+    """Whether the road has the same surface everywhere."""
     return road.starts.size == 1 and road.left[0] == road.right[0]
 
 

@@ -24,7 +24,7 @@ from models.tyre.tyre_table import Tables
 
 
 class Trailer(Truck):
-    """The body, with its axles ahead of and behind its centre of mass, and the drawbar."""
+    """A trailer: body with axles ahead of and behind its centre of mass, and drawbar."""
 
     drawbar: float = quantity("m", "from the hook to the front axle")
     drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")
@@ -40,14 +40,14 @@ class Trailer(Truck):
 
 
 def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
-    """Numbers of a trailer whose hook, the first two coordinates, follows a prescribed motion."""
+    """``Plane`` of a trailer whose hook has a prescribed motion; the hook's position is the first two coordinates."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
     parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
     return Plane(*parts)
 
 
 def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
-    """Numbers of a truck with a trailer on its hook: eight wheels."""
+    """``Plane`` of a truck with a trailer on its hook: eight wheels."""
     truck_records, reach = truck(vehicle, transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units(trailer), strict=True))
@@ -61,7 +61,8 @@ def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
-    """Unit, group and what ``wheels`` gives, the front ones on the drawbar, which is unit ``first``."""
+    """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
+    unit ``first``."""
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
     place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
     place[:2, 0] = 0.0
@@ -71,8 +72,8 @@ def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, .
 
 
 class Pull(NamedTuple):
-    """A hooked trailer behind its hook: states (n + 1, 2, 2 + U), positions and rates at the ends of the steps, and the
-    mean forces (n, 2) in N that the hook has from the vehicle, in the ground's axes."""
+    """Motion of a trailer behind its hook: states (n + 1, 2, 2 + U), positions and rates at the steps' ends, and the
+    mean forces (n, 2) in N on the hook from the vehicle, in the ground's axes."""
 
     states: np.ndarray
     forces: np.ndarray
@@ -81,7 +82,7 @@ class Pull(NamedTuple):
 def follow(
     plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
 ) -> Pull:
-    """A hooked trailer behind a hook of given velocities (n + 1, 2) in m/s, one at every step (s).
+    """Motion of a trailer behind a hook with prescribed velocities (n + 1, 2) in m/s at the steps' ends; step (s).
 
     state (2, 2 + U) : positions and rates at the start; slope : see ``OnRoad``; torques (W,) : of its brakes, N m.
     Raises InputError.

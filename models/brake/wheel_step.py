@@ -36,7 +36,7 @@ class Wheel(NamedTuple):
 
 
 class Grip(NamedTuple):
-    """The force along the wheel by slip, of a tyre whose slip angle and load stay as they are.
+    """Longitudinal tyre force as a function of slip, at a constant slip angle and load.
 
     first, second : its two tables; share : of the second; cells : of the slip angle and the load in both; load : N;
     slips (s,), mu_x (t, a, f, s) : see ``models.tyre.tyre_table.Tables``.
@@ -80,10 +80,11 @@ def phi_1(z):
 
 @lean
 def passed(distance, rate, decay, time):
-    """Integral over a time of what covers a way with a rate that decays as exp(-decay t).
+    """Integral over a time of the distance covered at a rate that decays as exp(-decay t), ``distance`` being its end
+    value.
 
-    With z = decay t it is t way (1 / (1 - exp(-z)) - 1 / z), whose series 1/2 + z/12 - z^3/720 ends with an error of
-    z^5/30240: both branches lose at most 1e-13 of it, the other one by the difference of two like numbers.
+    With z = decay t it is t distance (1 / (1 - exp(-z)) - 1 / z). The series 1/2 + z/12 - z^3/720 for small z has an
+    error of z^5/30240. Each branch loses at most 1e-13 of the value: the other one by cancellation.
     """
     z = decay * time
     return time * distance * (0.5 + z / 12.0 - z**3 / 720.0) if abs(z) < 0.01 else (rate * time - distance) / decay
@@ -91,13 +92,13 @@ def passed(distance, rate, decay, time):
 
 @lean
 def node(k, slips):
-    """Slip at node k; at -k the opposite one."""
+    """Slip at node k; for a negative k, minus the slip at node -k."""
     return slips[k] if k >= 0 else -slips[-k]
 
 
 @lean
 def node_force(k, grip):
-    """Force (N) of a ``Grip`` at slip node k, at -k the opposite one."""
+    """Force (N) of a ``Grip`` at slip node k; for a negative k, minus the force at node -k."""
     mu = longitudinal_adhesion(grip.first, grip.cells, abs(k), grip.mu_x)
     if grip.share > 0.0:
         mu += grip.share * (longitudinal_adhesion(grip.second, grip.cells, abs(k), grip.mu_x) - mu)
@@ -106,7 +107,7 @@ def node_force(k, grip):
 
 @lean
 def roll(slip, remaining, kappa, fade, held, grip):
-    """A wheel at a slip from -1 to 1 for at most ``remaining`` seconds or until it leaves them.
+    """Advance a wheel with a slip from -1 to 1 for at most ``remaining`` seconds, or until the slip leaves this range.
 
     kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N. Returns the time used, slip then and
     integral of the slip (s).
@@ -147,7 +148,7 @@ def roll(slip, remaining, kappa, fade, held, grip):
 
 @lean
 def _way(decay, rate, way):
-    """Time in which a rate that decays as exp(-decay t) covers a way of its sign; infinite if it never does."""
+    """Time in which the distance ``way`` is covered at a rate that decays as exp(-decay t); infinite if it never is."""
     if rate == 0.0:
         return math.inf
     share = decay * way / rate
@@ -160,7 +161,7 @@ def _way(decay, rate, way):
 
 @lean
 def wheel_step(step_input, wheel, grip):
-    """Step a ``Wheel`` through a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
+    """Advance a ``Wheel`` over a ``StepInput``, whose speeds are 0 or more, on a ``Grip``; returns a ``Rolled``."""
     torque0, torque1, step = step_input.torque0, step_input.torque1, step_input.step
     radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
     u0, u1 = max(step_input.speed0, SLOWEST_SPEED), max(step_input.speed1, 0.0)

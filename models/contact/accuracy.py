@@ -57,7 +57,7 @@ that of the moment divided by mu N times the lever: abscissa is ``used_with_mome
 
 @dataclass(frozen=True)
 class Error:
-    """Error of the tangential force (N) and of the moment (N m).
+    """Estimated errors of the tangential force (N) and of the moment (N m).
 
     cells : what the cells leave at most. theory : what 95 % of contacts like this keep to. moment_cells and
     moment_theory : the same of the moment. likely, moment_likely : what the cells leave, a third of the times more.
@@ -72,17 +72,17 @@ class Error:
 
     @property
     def total(self) -> float:
-        """Error of the force by cells and theory together (N)."""
+        """Error of the force (N) from the grid of cells and from the theory together."""
         return self.cells + self.theory
 
     @property
     def moment(self) -> float:
-        """Error of the moment by cells and theory together (N m)."""
+        """Error of the moment (N m) from the grid of cells and from the theory together."""
         return self.moment_cells + self.moment_theory
 
 
 def rolled(contact: RollingContact, motion: Motion, cells: int, *, fields: bool = False) -> tuple[Rolled, Error]:
-    """Forces and how far they are off."""
+    """Forces at the given creepages and spin, and their estimated errors."""
     fine = contact.roll(motion, cells, fields=fields)
     if isinstance(contact, LinearTheory):
         force, moment = _of_linear(contact, motion, fine)
@@ -97,12 +97,12 @@ def rolled(contact: RollingContact, motion: Motion, cells: int, *, fields: bool 
 
 
 def remaining_errors(contact: RollingContact, motion: Motion, cells: int, fine: Rolled) -> tuple[float, float]:
-    """Errors of force (N) and moment (N m) that the cells leave at most."""
+    """Upper bounds of the errors that the finite number of cells causes in force (N) and moment (N m)."""
     return _largest_errors(contact, cells, fine, contact.roll(motion, coarser_cells(cells)))
 
 
 def _by_friction(contact: RollingContact, *rolled: Rolled) -> list[Array]:
-    """Forces divided by mu N, and moments divided by mu N times the lever, (3,) each."""
+    """Ratios (3,) for each result: fx and fy to mu N, and mz to mu N times the lever."""
     limit = contact.friction * contact.pressing.load
     return [np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in rolled]
 
@@ -117,7 +117,8 @@ def _largest_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: R
 
 
 def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[float, float]:
-    """Force and moment each by its own difference, LIKELY of it, with small shares of what two grids miss together."""
+    """Likely discretisation errors of force (N) and moment (N m): LIKELY times the difference between fine and coarse
+    grid, plus a small allowance for errors that both grids share."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
@@ -132,12 +133,13 @@ def _likely_errors(contact: RollingContact, cells: int, fine: Rolled, coarse: Ro
 
 
 def coarser_cells(cells: int) -> int:
-    """Cells of the coarser grid."""
+    """Number of cells of the coarser grid that is compared with one of ``cells`` cells."""
     return (cells + 1) // 2
 
 
 def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
-    """Error divided by mu N, and of the moment divided by mu N times the lever, that ``cells`` leave, (...).
+    """Relative discretisation errors (...) on ``cells`` cells: of the force to mu N, and of the moment to mu N times
+    the lever.
 
     fine, coarse : (3, ...) fx and fy divided by mu N, mz divided by mu N times the lever, on ``cells`` and half of
     them. order : of the theory in the size of a cell.
@@ -148,34 +150,35 @@ def cells_error(fine: Array, coarse: Array, cells: int, order: float) -> Array:
 
 
 def band(name: str, used: Array, spinning: Array) -> Array:
-    """Error divided by mu N of a theory, one of BANDS, at forces ``used`` (divided by mu N) and shares ``spinning`` of
-    spin."""
+    """Ratio of a theory's force error to mu N, for one of BANDS, at force ratios ``used`` (force to mu N) and weights
+    ``spinning`` of spin from ``spin_share``."""
     without, with_spin = (np.interp(used, KNOTS, values) for values in BANDS[name])
     without = without * np.minimum(used / KNOTS[0], 1.0)  # the linear theory is met, but not where spin meets creepage
     return without + spinning * (with_spin - without)
 
 
 def moment_band(name: str, used: Array, spinning: Array) -> Array:
-    """Error of the moment divided by mu N times the lever; ``used`` as by ``used_with_moment``, the rest as of
-    ``band``."""
+    """Ratio of a theory's moment error to mu N times the lever. ``used`` comes from ``used_with_moment``; other
+    arguments as in ``band``."""
     without, with_spin = (np.interp(used, (0.0, *KNOTS), (0.0, *values)) for values in MOMENT_BANDS[name])
     return without + spinning * (with_spin - without)
 
 
 def slenderness(a: Array, b: Array) -> Array:
-    """Factor on the bands of an ellipse: 1 on those that they were measured on, more beyond."""
+    """Factor on the error bands for ellipses: 1 for the axis ratios at which the bands were measured, larger beyond."""
     ratio = a / b
     return np.maximum(np.maximum(SLENDER[0] / ratio, ratio / SLENDER[1]), 1.0)
 
 
 def used_with_moment(used: Array, moment: Array) -> Array:
-    """Share of friction that is used where moments count: force divided by mu N and moment divided by mu N times the
-    lever."""
+    """Share of the friction limit used by force and moment: root of the sum of squares of force / (mu N) and moment /
+    (mu N lever)."""
     return np.hypot(used, moment)
 
 
 def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
-    """Weight of a motion (3, ...) as one with spin, 0 to 1: 1 from a third of the linear work on."""
+    """Weight 0 to 1 of spin in a motion (3, ...). It is three times the share of spin in the sum of squares of the
+    linear theory's terms, at most 1."""
     c = coefficients(a / b, nu)
     parts = np.stack([c.c11 * motion[0], c.c22 * motion[1], np.sqrt(a * b) * c.c23 * motion[2]]) ** 2
     whole = parts.sum(axis=0)
@@ -183,7 +186,7 @@ def spin_share(a: Array, b: Array, motion: Array, nu: float | Array) -> Array:
 
 
 def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple[float, float]:
-    """Bands of force (N) and moment (N m) of the simplified theories; of the exact one there are none."""
+    """Error bands of force (N) and moment (N m) of the simplified theories; zero for the exact theory."""
     limit = contact.friction * contact.pressing.load
     if limit == 0.0 or not isinstance(contact, Fastsim | Simplified):
         return 0.0, 0.0
@@ -198,7 +201,8 @@ def _of_theory(contact: RollingContact, motion: Motion, forces: Rolled) -> tuple
 
 
 def _of_linear(contact: OnEllipse, motion: Motion, forces: Rolled) -> tuple[float, float]:
-    """Distances of force (N) and moment (N m) from FASTSIM, and its bands."""
+    """Errors of the linear theory in force (N) and moment (N m): its difference from FASTSIM plus FASTSIM's own
+    error."""
     better, error = rolled(Fastsim(contact.hertz, contact.friction, contact.pair, **BEST_CHOICES), motion, 31)
     off = float(np.linalg.norm(forces.force - better.force))
     return off + error.total, abs(forces.mz - better.mz) + error.moment

@@ -13,7 +13,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def weights(t):
-    """Weights of the four nodes about a point at the share ``t`` of its segment, and of their slope per spacing."""
+    """Weights of four neighbouring nodes at the position ``t`` (0 to 1) in a segment, and of the interpolated slope per
+    spacing."""
     value = (
         0.5 * t * (-1.0 + t * (2.0 - t)),
         1.0 + 0.5 * t * t * (-5.0 + 3.0 * t),
@@ -31,7 +32,8 @@ def weights(t):
 
 @njit(cache=True)
 def segment(position, segments):
-    """Index of the segment and the share of it at a position in spacings, held to the ends."""
+    """Index of the segment that holds a position (in spacings), and the position as a share of that segment; clamped to
+    the ends."""
     i = min(max(math.floor(position), 0), segments - 1)
     return i, position - i
 
@@ -66,7 +68,7 @@ def values(padded, u, v):
 
 @njit(cache=True)
 def row_at(padded, v):
-    """Padded values along x at v spacings along y."""
+    """Interpolated row of padded values along x, at v spacings along y."""
     j, s = segment(v, padded.shape[0] - 3)
     w, _ = weights(s)
     return w[0] * padded[j] + w[1] * padded[j + 1] + w[2] * padded[j + 2] + w[3] * padded[j + 3]
@@ -74,7 +76,7 @@ def row_at(padded, v):
 
 @njit(cache=True)
 def value_along_row(row, u):
-    """Value of a padded row at u spacings."""
+    """Interpolated value of a padded row at u spacings along x."""
     i, t = segment(u, row.size - 3)
     w, _ = weights(t)
     return w[0] * row[i] + w[1] * row[i + 1] + w[2] * row[i + 2] + w[3] * row[i + 3]
@@ -100,7 +102,8 @@ def least_of_row(row):
 
 @njit(cache=True)
 def lowest(cube, square, linear):
-    """Share of the segment at which cube t^3 + square t^2 + linear t has its minimum, 0 where it has none inside."""
+    """Position (0 to 1) in a segment of the minimum of cube t^3 + square t^2 + linear t; 0 if there is no minimum
+    inside."""
     root = square * square - 3.0 * cube * linear
     if root <= 0.0:
         return 0.0
@@ -111,7 +114,8 @@ def lowest(cube, square, linear):
 
 @njit(cache=True)
 def valley(padded, finer):
-    """Least value along x on lines across y, ``finer`` lines per spacing, and where along x: (lines,), (lines,)."""
+    """Least value along x, and its position along x, on each of ``finer`` lines per spacing across y: two arrays
+    (lines,)."""
     lines = (padded.shape[0] - 3) * finer + 1
     least, where = np.empty(lines), np.empty(lines)
     for k in range(lines):
@@ -121,9 +125,11 @@ def valley(padded, finer):
 
 @njit(cache=True)
 def sides(lines, roots, bottom, root):
-    """Where the lengths below ``root``, added up from the bottom, end on the low and on the high side.
+    """Ends of the valley below the level ``root``. From the bottom, the total length of all parts below the level is
+    laid off on the low and on the high side.
 
-    lines : positions, one of them the bottom; roots : root of the height above the bottom there, linear in between.
+    lines : positions, one of them the bottom; roots : square root of the height above the bottom at these, linear
+    between.
     """
     before = after = 0.0
     for k in range(lines.size - 1):

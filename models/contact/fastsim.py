@@ -59,7 +59,7 @@ LEAST_CELLS, MOST_CELLS = 3, 2000
 
 @dataclass(frozen=True)
 class RollingEllipse:
-    """One elliptic contact that rolls, or many: every value a number, or arrays of any shapes that broadcast.
+    """One rolling elliptic contact, or many: each field is a number or an array, and all arrays broadcast.
 
     a, b : semi-axes along and across the direction of rolling (m); load : N, zero or less makes all forces zero; mu :
     coefficient of friction, 0 to 10; xi_x, xi_y : creepages; spin : 1/m, signs as in ``models.contact``
@@ -76,7 +76,7 @@ class RollingEllipse:
 
 @dataclass(frozen=True)
 class Creep:
-    """Forces on the wheel; every field has the common shape of what was given.
+    """Creep forces on the wheel; every field has the common shape of the inputs.
 
     fx, fy : N. mz : N m, about the centre. stick : share of the area that sticks. dissipation : -(fx xi_x + fy xi_y +
     mz spin) in J per metre rolled, times the rolling speed the power in W; never negative (on fewer than 20 cells per
@@ -134,7 +134,7 @@ def fastsim(
 
 
 class Ellipse:
-    """FASTSIM on ellipses of one shape, as a wheel on a rail has them: all that does not change is computed once.
+    """FASTSIM for ellipses of one shape, as of a wheel on a rail; all that depends on the shape alone is computed once.
 
     ``Ellipse(ratio, pair)(a, load, mu, xi_x, xi_y, spin)`` is (fx, fy, mz) in N, N, N m, from plain numbers and for
     plain numbers, in microseconds; ratio = a/b. Options are those of ``fastsim``. Raises InputError.
@@ -162,7 +162,7 @@ class Ellipse:
     def __call__(
         self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
     ) -> tuple[float, float, float]:
-        """Forces and moment; a : semi-axis along the direction of rolling (m)."""
+        """Forces fx, fy (N) and moment mz (N m); a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
             forces = point(tuple(map(float, given)), *self._fixed)
@@ -177,7 +177,7 @@ class Ellipse:
 
 
 def check_choices(cells: int, bound: str, flexibilities: str, march: str, falling: Falling | None = None) -> None:
-    """Raise InputError for an option that is not one, and for a march that knows no falling friction."""
+    """Raise InputError for an unknown option, or for falling friction with a march that does not support it."""
     whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     for name, value, known in (
         ("bound", bound, tuple(POWERS)),
@@ -191,7 +191,8 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
 
 
 def contacts_of(ellipse: RollingEllipse, material_pair: MaterialPair) -> tuple[Array, tuple[int, ...]]:
-    """CONTACT (n,) as the kernels read it, and the shape of what was given; those without load have axes of 0.1 m."""
+    """Inputs as records CONTACT (n,) for the kernels, and their common shape. Contacts without load get semi-axes of
+    0.1 m."""
     axis = "a semi-axis in m, zero or more"
     given = together(
         a=quantity("a", ellipse.a, axis, 0.0),

@@ -34,7 +34,7 @@ from models.machine.compiled import compiled
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Forces with their derivatives.
+    """Creep forces with their derivatives.
 
     forces : (..., 3) of fx, fy (N), mz (N m). slopes : (..., 3, 4), of each to xi_x, xi_y, spin (1/m) and load (N).
     """
@@ -80,7 +80,7 @@ def derivatives(
 
 @compiled
 def _slopes(contacts, strips, cells, kind, forces, slopes):
-    """Fill FORCES (n,), but for the sticking share, and their derivatives (n, 3, 3) to the creepages."""
+    """Fill FORCES (n,), without the sticking share, and their derivatives (n, 3, 3) with respect to the creepages."""
     sums, moved, total, scale = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for c in range(len(contacts)):
         contact = contacts[c]
@@ -105,7 +105,7 @@ def _slopes(contacts, strips, cells, kind, forces, slopes):
 
 @compiled
 def _scale_slopes(contact, cells, kind, scale):
-    """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
+    """Derivatives (3, 3) of the three numbers from ``rigid_slip`` with respect to xi_x, xi_y and spin."""
     a, c, flexible = contact.a, math.sqrt(contact.a * contact.b), (contact.l1, contact.l2, contact.l3)
     bound = contact.mu * cells.peak * contact.load / (a * contact.b)
     step, creep = 2.0 * a / (cells.centre.size * bound), (contact.xi_x, contact.xi_y, contact.spin * c)
@@ -130,7 +130,8 @@ def _scale_slopes(contact, cells, kind, scale):
 
 @compiled
 def _strip(contact, strips, s, cells, slip, sums, moved):
-    """Sums of q_x, q_y, t q_y along strip number s, and their derivatives (3, 3) to the three numbers of rigid slip."""
+    """Sums of q_x, q_y and t q_y over the cells of strip number s, and their derivatives (3, 3) with respect to the
+    three numbers of rigid slip."""
     spread, off, arm = strips.spread[s], contact.b * strips.y[s], contact.a * strips.half[s]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
@@ -179,7 +180,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 
 @compiled
 def _turning(px, py, u, v, before, rate):
-    """Turning of a slipping traction by ``advance``: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
+    """Rotation of a slipping traction in ``advance``: sin psi' / sin psi, the derivative of psi' to |w|, and |w|."""
     size = math.sqrt(u * u + v * v)
     h = min(size * rate, LARGEST_EXPONENT)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))

@@ -42,7 +42,8 @@ def forces_falling(contacts, strips, cells, kind, law, answers):
 
 @compiled
 def friction_left(contact, strips, s, cells, law, left):
-    """Fill ``left`` (2, cells) of strip number s as ``strip_tractions`` reads it: at the rigid slip of the points."""
+    """Fill ``left`` (2, cells) for strip number s, as ``strip_tractions`` expects it, from the friction at each point's
+    rigid slip."""
     along = contact.xi_x - contact.spin * contact.b * strips.y[s]
     across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
     for i in range(cells.centre.size):
@@ -52,6 +53,6 @@ def friction_left(contact, strips, s, cells, law, left):
 
 @compiled
 def _friction_share(along, across, law):
-    """Share of the friction that is left at a slip."""
+    """Ratio of the friction coefficient at a slip (along, across) to that without slip."""
     floor, decay = law
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

@@ -22,7 +22,7 @@ ROUNDED = 1.0 + 2e-15
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The net of one ellipse, in its own scale, as tables of doubles hold it.
+    """Grid of one ellipse in dimensionless form, as tables of doubles.
 
     strips : (4, strips), rows as the fields of ``Strips``
     cells : (5, cells), rows as the fields of ``Cells``
@@ -35,14 +35,15 @@ class Grid:
 
     @property
     def records(self) -> tuple[Strips, Cells]:
-        """The grid's strips and cells as records with named fields."""
+        """Strips and cells of the grid as records with named fields."""
         y, half, spread, part = self.strips
         centre, bound, middle, before, rate = self.cells
         return Strips(y, half, spread, part), Cells(centre, bound, middle, before, rate, self.middle)
 
 
 def strips_of(ratio: Array, cells: int) -> Array:
-    """Strips that a net of ``cells`` per strip has on ellipses of a/b = ``ratio``: an even number of at least as many.
+    """Number of strips of a grid with ``cells`` cells per strip, for ellipses of a/b = ``ratio``: even, and at least
+    ``cells``.
 
     Under spin the traction turns about a pole, within a distance of a: strips of a narrow ellipse must not be wider.
     An even number, because a strip through the pole of pure spin would stand for both its sides.
@@ -52,7 +53,7 @@ def strips_of(ratio: Array, cells: int) -> Array:
 
 
 def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
-    """Numbers of the contacts of a/b = ``ratio`` (n,) that have the same net, and that net."""
+    """Pairs of indices and grid: the contacts of ratios a/b = ``ratio`` (n,) that share a grid, and that grid."""
     strips = strips_of(ratio, cells)
     for count in np.unique(strips):
         yield np.flatnonzero(strips == count), grid(cells, int(count), bound)
@@ -60,7 +61,7 @@ def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]
 
 @lru_cache(maxsize=256)
 def grid(cells: int, strips: int, bound: Bound) -> Grid:
-    """Net of ``strips`` strips of one width with ``cells`` cells each, of one length within a strip.
+    """Grid of ``strips`` strips of equal width with ``cells`` cells each; cells of a strip have equal lengths.
 
     Pressure is sampled at the cells' centres and scaled so that its sum over all cells is the load exactly.
     """
@@ -78,5 +79,5 @@ def grid(cells: int, strips: int, bound: Bound) -> Grid:
 
 
 def _pressure(t: Array, bound: Bound) -> Array:
-    """Pressure over that in the middle, at distance ``t`` from it in semi-axes."""
+    """Ratio of the pressure at the distance ``t`` from the centre (in semi-axes) to the pressure in the centre."""
     return ((1.0 - t) * (1.0 + t)) ** POWERS[bound]

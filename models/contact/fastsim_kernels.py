@@ -25,7 +25,8 @@ NEGLIGIBLE_SLIP = 1e-60
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def lateness(z):
-    """Where on a step a turning rigid slip counts, in steps after the middle: coth(4 z)/2 - 1/(8 z), within 0.04.
+    """Point in a step at which a turning rigid slip is evaluated, in steps after the step's middle: a piecewise linear
+    approximation, within 0.04, of coth(4 z)/2 - 1/(8 z).
 
     A traction that forgets as exp(-8 z) follows the slip at the end of a long step and at the middle of a short one;
     with it the step is right for a slip that turns evenly, however stiff. A concave function, so the least of lines.
@@ -35,7 +36,7 @@ def lateness(z):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def advance(traction, slip, bound):
-    """Traction in the next cell, and 1 if it slips there or 0, by the second-order march.
+    """Traction in the next cell by the second-order march, and 1 if it slips there, else 0.
 
     traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
     and y in the middle of the step, as traction, and the change of the second over it; bound : in the next cell, where
@@ -72,7 +73,7 @@ def advance(traction, slip, bound):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def cut(x, y, g):
-    """Traction held to the bound g, and 1 if it had to be or 0."""
+    """Traction, shortened to the bound g if it exceeds it, and 1 if it was shortened, else 0."""
     size = math.sqrt(x * x + y * y)
     sticks = size <= g
     part = 1.0 if sticks else g / size
@@ -114,7 +115,7 @@ def march_plain(block, cells):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def _keep(block, j, t, x, y, slips):
-    """A cell's traction into state and sums."""
+    """Add a cell's traction to the sums, and store it as the lane's state."""
     block.qx[j] = x
     block.qy[j] = y
     block.slips[j] = slips
@@ -126,7 +127,7 @@ def _keep(block, j, t, x, y, slips):
 
 @compiled
 def _clear(block):
-    """Sums and states of all lanes to zero."""
+    """Set sums and states of all lanes to zero."""
     for j in range(LANES):
         block.sum_x[j] = block.sum_y[j] = block.sum_t[j] = block.slid[j] = 0.0
         block.qx[j] = block.qy[j] = block.slips[j] = 0.0

@@ -27,7 +27,7 @@ SLIDING, MOST = 8.0, 100.0
 
 @compiled
 def forces(contacts, strips, cells, kind, march, answers):
-    """Fill ``answers``, FORCES (n,).
+    """Fill ``answers`` with the creep forces of many contacts, FORCES (n,).
 
     contacts : CONTACT (n,); strips, cells : a net from ``fastsim_grid``; kind : of flexibility; march : PLAIN or
     SECOND_ORDER. A contact without load or friction has zeros all over.
@@ -38,7 +38,7 @@ def forces(contacts, strips, cells, kind, march, answers):
 
 @lean
 def forces_within(contacts, strips, cells, kind, march, room, answers):
-    """``forces`` that makes no array; room : ``Workspace``."""
+    """``forces`` without allocating arrays; room : ``Workspace`` for intermediate values."""
     slips, block, m = room.slips, room.blocks[0], strips.y.size
     for c in range(len(contacts)):
         slip, answer = slips[c], answers[c]
@@ -62,13 +62,13 @@ def forces_within(contacts, strips, cells, kind, march, room, answers):
 
 @lean
 def touches(contact):
-    """Whether there is anything that friction could hold."""
+    """Whether the contact has load and friction, so that tangential forces can be transmitted."""
     return contact.mu * contact.load > NEGLIGIBLE_BOUND
 
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """Rigid slip of every cell by the creepages (x, y, spin), for the march.
+    """Rigid slip of every cell from the creepages (x, y, spin), in the form that the march needs.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
@@ -94,7 +94,13 @@ def stiffness(contact, bound, kind):
 
 @lean
 def blend(contact, bound, kind):
-    """Part of the one flexibility, 0 to 1, and its derivatives to xi_x, xi_y and spin sqrt(a b).
+    """Weight, 0 to 1, of the common mean flexibility against three separate ones, and the weight's derivatives with
+    respect to xi_x, xi_y and spin sqrt(a b).
+
+    The weight grows with x, y and z, ratios of the linear theory's tractions to the bound. Lateral creepage that
+    opposes spin contributes less: the pole about which the rigid slip turns then lies in the patch, and much of the
+    area near it still sticks while the remaining area slides. A second term brings the weight to 1 where the whole area
+    slides, so that force and slip have the same direction.
 
     It grows with x, y and z, the reach of the linear theory's tractions by the bound. Lateral creepage against spin
     reaches less: the pole about which the rigid slip turns lies in the patch then, and near it much still sticks when
@@ -125,7 +131,7 @@ def blend(contact, bound, kind):
 
 @lean
 def mean_flexibility(contact, turn, kind):
-    """One flexibility for all creepages, ``turn`` = spin sqrt(a b) the third.
+    """Common flexibility for all creepages; ``turn`` = spin sqrt(a b) is the third of them.
 
     That of 1982 weights by their sizes and divides by their root mean square, which makes up to sqrt(3) times too much
     of mixed ones; the blend's is the mean weighted by their squares.
@@ -143,8 +149,9 @@ def mean_flexibility(contact, turn, kind):
 
 @lean
 def strip_slip(contact, strips, s, slip):
-    """Rigid slip (u, v0, v1) of strip number s, of that of its contact: the traction by the bound in the strip's middle
-    that it builds up over one cell, along x and, at the position t, along y (v0 + v1 t)."""
+    """Rigid slip (u, v0, v1) of strip number s from that of its contact. It is the traction that would build up over
+    one cell without sliding, in units of the bound in the strip's middle: u along x, and v0 + v1 t along y at position
+    t."""
     spread = strips.spread[s]
     return (
         spread * (slip.x - slip.spin * contact.b * strips.y[s]),
@@ -155,7 +162,7 @@ def strip_slip(contact, strips, s, slip):
 
 @lean
 def _fill(block, first, count, contacts, strips, slips):
-    """The strips from number ``first`` on into the lanes; those beyond ``count`` stay at rest."""
+    """Put rigid slips of ``count`` strips, from number ``first`` on, into the lanes; further lanes get zero slip."""
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(LANES):
         if j >= count:
@@ -169,7 +176,8 @@ def _fill(block, first, count, contacts, strips, slips):
 
 @lean
 def _collect(block, first, count, contacts, strips, answers):
-    """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
+    """Add the lanes' sums to the forces of their ellipses, and their slipping cells, weighted by length, to the slip
+    area."""
     c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
         contact, answer = contacts[c], answers[c]
@@ -184,7 +192,8 @@ def _collect(block, first, count, contacts, strips, answers):
 
 @lean
 def add_strip(contact, strips, s, sums, answer):
-    """Add to the forces of a contact those of strip number s, of its sums of q_x, q_y and t q_y over the cells."""
+    """Add the forces of strip number s to those of its contact, from the strip's sums of q_x, q_y and t q_y over its
+    cells."""
     part, (x, y, turn) = contact.mu * contact.load * strips.part[s], sums
     answer.fx += part * x
     answer.fy += part * y
@@ -193,7 +202,8 @@ def add_strip(contact, strips, s, sums, answer):
 
 @compiled
 def strip_tractions(slip, cells, march, left, answers):
-    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells).
+    """Fill ``answers`` (3, cells) of a strip: tractions along x and y in units of the bound in its middle, and 1 where
+    it slips.
 
     slip : of the strip, see ``strip_slip``; left : (2, cells), share of the friction that is left in the cells' centres
     and in the middles of the steps there.
@@ -215,7 +225,7 @@ def strip_tractions(slip, cells, march, left, answers):
 
 @compiled
 def point(motion, unit, strips, cells, choices):
-    """fx, fy, mz of one ellipse of the shape of ``unit``, NaN for bad input.
+    """Forces fx, fy and moment mz of one ellipse with the shape of ``unit``; NaN for invalid input.
 
     motion : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
     choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of

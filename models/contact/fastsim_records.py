@@ -33,8 +33,8 @@ q_y, t q_y and of slipping cells; the state. One record, as the compiler must kn
 
 
 class Strips(NamedTuple):
-    """Strips of an ellipse, (m,) each: y/b, half length by a, that by the bound in the strip's middle, share of the
-    load per bound."""
+    """Strips of an ellipse, (m,) each: position y/b, ratio of half length to a, ratio of this to the bound in the
+    strip's middle, and share of the load per bound."""
 
     y: Array
     half: Array
@@ -43,8 +43,8 @@ class Strips(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a strip, (n,) each, about the step that ends in the cell's centre: t there, the bound g there, t in the
-    middle of the step, g where it starts (more by a rounding), 1/(8 g) in its middle.
+    """Cells of a strip, (n,) each, for the step that ends in the cell's centre: position t and bound g there, t in the
+    middle of the step, g at its start (enlarged by a rounding), and 1/(8 g) in its middle.
 
     peak : pressure in the middle of the ellipse times a b / N.
     """
@@ -58,7 +58,7 @@ class Cells(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that a march writes over: a SLIP for each contact, one BLOCK."""
+    """Arrays for intermediate values of a march: one SLIP per contact, and one BLOCK."""
 
     slips: Array
     blocks: Array
@@ -66,11 +66,11 @@ class Workspace(NamedTuple):
 
 @inlined
 def strips_in(table):
-    """``Strips`` that lie in a table (4, m) of a net."""
+    """``Strips`` as views of a grid's table (4, m)."""
     return Strips(table[0], table[1], table[2], table[3])
 
 
 @inlined
 def cells_in(table, peak):
-    """``Cells`` that lie in a table (5, n) of a net."""
+    """``Cells`` as views of a grid's table (5, n)."""
     return Cells(table[0], table[1], table[2], table[3], table[4], peak)

@@ -15,7 +15,7 @@ from models.core.errors import InputError
 
 @dataclass(frozen=True)
 class Fields:
-    """Pressure and tractions in the cells of one contact area; every array has one and the same shape.
+    """Pressure and tractions in the cells of one contact area; all arrays have the same shape.
 
     x, y : centres of the cells (m). dx, dy : their sizes (m). pressure, px, py : Pa, tractions on the wheel.
     slips : whether the cell slips. inside : whether it belongs to the contact area.
@@ -42,7 +42,7 @@ def fastsim_fields(
     march: March = "second-order",
     falling: Falling | None = None,
 ) -> Fields:
-    """Pressure, traction and slip of one ellipse, plain numbers, as ``fastsim`` marches them.
+    """Pressure, traction and slip in the cells of one ellipse (inputs are plain numbers), as ``fastsim`` computes them.
 
     Arrays of the shape (strips, cells in a strip), each strip from its leading edge back. The pressure is that of the
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.

@@ -20,7 +20,8 @@ X, Y, Z = 0, 1, 2
 
 
 def influence(x: Array, y: Array, dx: float, dy: float, material_pair: MaterialPair) -> Array:
-    """Displacement difference (m) at a point by a unit traction (1 Pa) on a rectangle dx by dy (m).
+    """Relative displacement (m) of the two bodies at a point, caused by a unit traction (1 Pa) on a rectangle dx by dy
+    (m).
 
     x, y : (...) coordinates of the point from the rectangle's centre (m), broadcast against each other.
     Returns (..., 3, 3): [i, j] is the displacement of body 1 relative to body 2 along i by a traction along j that acts
@@ -61,7 +62,7 @@ def _primitives(x: Array, y: Array) -> Array:
 
 
 def _angle(opposite: Array, adjacent: Array) -> Array:
-    """atan(opposite / adjacent), pi/2 where adjacent is zero."""
+    """Arc tangent of opposite / adjacent; pi/2 where adjacent is zero."""
     return np.arctan2(opposite * np.sign(adjacent), np.abs(adjacent))
 
 
@@ -80,12 +81,12 @@ class Convolution:
         self._spectrum = fft.rfft2(np.moveaxis(rolled, (0, 1), (-2, -1)), workers=1)
 
     def __call__(self, values: Array) -> Array:
-        """Values (ny, nx, in) to their sums (ny, nx, out)."""
+        """Sums (ny, nx, out) over all cells of kernel times values (ny, nx, in)."""
         spectrum = fft.rfft2(np.moveaxis(values, -1, 0), self._size, workers=1)
         sums = fft.irfft2(np.einsum("ijyx,jyx->iyx", self._spectrum, spectrum), self._size, workers=1)
         return np.moveaxis(sums[:, : self.cells[0], : self.cells[1]], 0, -1)
 
 
 def offsets(cells: int, step: float) -> Array:
-    """Distances (m) between the centres of two of ``cells`` cells: (2 cells - 1,), ascending."""
+    """All differences (m) between the centres of two cells in a row of ``cells`` cells: (2 cells - 1,), ascending."""
     return np.arange(1 - cells, cells) * step

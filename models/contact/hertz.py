@@ -32,7 +32,7 @@ LEAST_AXIS, LARGEST_AXIS = 1e-30, 1e3
 
 @dataclass(frozen=True)
 class Hertz:
-    """The contact of two bodies; every field has the common shape of what was given.
+    """Hertzian contact of two bodies; every field has the common shape of the inputs.
 
     Where nothing touches, axes, pressure, approach and load are exactly zero.
 
@@ -50,7 +50,7 @@ class Hertz:
 
 
 def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact under a given load.
+    """Hertzian contact under a given load.
 
     A, B : curvatures (1/m), above 0; load : N, compression positive; arrays of any shapes that broadcast. A load of
     zero or less makes no contact. Raises InputError for a curvature that is not above zero, a number that is not
@@ -64,7 +64,8 @@ def by_load(A: Any, B: Any, load: Any, material_pair: MaterialPair) -> Hertz:
 
 
 def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> Hertz:
-    """Contact of bodies brought nearer to each other by ``approach`` (m) from first touch; zero or less is a gap.
+    """Contact of bodies that have approached each other by ``approach`` (m) since first touching; zero or less means a
+    gap.
 
     Otherwise as ``by_load``.
     """
@@ -80,7 +81,8 @@ def by_approach(A: Any, B: Any, approach: Any, material_pair: MaterialPair) -> H
 def by_axes(
     a: float, b: float, material_pair: MaterialPair, *, load: float | None = None, approach: float | None = None
 ) -> Hertz:
-    """Contact of known semi-axes a, b (m), plain numbers, under a load (N) or at an approach (m), above 0.
+    """Hertzian contact with known semi-axes a, b (m) under a load (N) or at an approach (m), which must be above 0; all
+    plain numbers.
 
     The curvatures follow from both: the same axes under twice the load are those of bodies curved twice as much.
     Raises InputError as ``by_load`` does.
@@ -103,7 +105,7 @@ def by_axes(
 
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
-    """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
+    """Both curvatures as arrays; raises InputError where they do not make a Hertzian contact."""
     answer = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", maximum=1e12)
         for name, value in (("A", A), ("B", B))
@@ -130,7 +132,8 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
 def _contact(
     A: Array, B: Array, load: Array, short: Array, ratio: Array, curvature_sum: Array, material_pair: MaterialPair
 ) -> Hertz:
-    """The contact from its short axis; ``curvature_sum`` is K = B + D. Where it is zero, so is everything."""
+    """The contact computed from its short semi-axis; all results are zero where this axis is. ``curvature_sum`` is K =
+    B + D."""
     long = short / ratio
     area = math.pi * short * long
     p0 = np.divide(1.5 * load, area, out=np.zeros_like(area), where=area > 0.0)
@@ -141,7 +144,7 @@ def _contact(
 
 
 def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
-    """``aspect`` of each ratio of curvatures, of any shape: three arrays of that shape."""
+    """Results of ``aspect`` for an array of curvature ratios: three arrays of the same shape."""
     answer = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
     return answer[0], answer[1], answer[2]
 
@@ -156,7 +159,7 @@ def _aspects(curvatures: Array) -> Array:
 
 @njit(cache=True)
 def aspect(curvatures: float) -> tuple[float, float, float]:
-    """Ratio g of the short axis to the long one, and the integrals B and D there.
+    """Ratio g of the short to the long semi-axis, and the elliptic integrals B and D at this g.
 
     curvatures : the smaller by the larger, above 0 and up to 1. Newton's method for ln(g^2 D / B) as a function of
     ln g, whose slope 1 + C (1/D + g^2/B), C = (D - B)/e^2, stays between 1.5 and 2.

@@ -21,7 +21,8 @@ NEGLIGIBLE_BOUND = 1e-60
 
 
 def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> Array:
-    """``value`` as a floating-point array of any shape, every element finite and from ``minimum`` to ``maximum``.
+    """``value`` as a floating-point array of any shape; every element must be finite and between ``minimum`` and
+    ``maximum``.
 
     Raises InputError with the first value that is not, and ``allowed``: what is expected, with its unit. Texts, complex
     numbers and masked elements are none, and nothing is guessed in their place.
@@ -42,7 +43,7 @@ def quantity(name: str, value: Any, allowed: str, minimum: float = -np.inf, maxi
 
 
 def number(name: str, value: Any, allowed: str, minimum: float = -np.inf, maximum: float = np.inf) -> float:
-    """``quantity`` of a function that takes one number and no array."""
+    """As ``quantity``, for functions that accept a single number and no array."""
     numbers = quantity(name, value, allowed, minimum, maximum)
     if numbers.ndim:
         raise InputError("", name, value, f"must be one number, not an array: {allowed}")
@@ -57,7 +58,7 @@ def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
 
 
 def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quantity) -> dict[str, Any]:
-    """Creepages and spin (1/m) by their names, each read by ``quantity`` or by ``number``."""
+    """Creepages and spin (1/m) in a dict by name, each checked by ``read``, which is ``quantity`` or ``number``."""
     allowed, turn = f"a creepage within +-{LARGEST_CREEPAGE:g}", f"a spin in 1/m within +-{LARGEST_SPIN:g}"
     return {
         "xi_x": read("xi_x", xi_x, allowed, -LARGEST_CREEPAGE, LARGEST_CREEPAGE),
@@ -67,7 +68,7 @@ def creepages(xi_x: Any, xi_y: Any, spin: Any, read: Callable[..., Any] = quanti
 
 
 def together(**arrays: Array) -> tuple[Array, ...]:
-    """The arrays broadcast to their common shape; raises InputError that names the shapes where there is none."""
+    """The given arrays, broadcast to their common shape; raises InputError with their shapes if there is none."""
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
         return tuple(a if a.shape == shape else np.broadcast_to(a, shape).copy() for a in arrays.values())

@@ -57,7 +57,8 @@ OTHER = record("cells", "law")
 
 @lru_cache(maxsize=64)
 def net(cells: int) -> Array:
-    """Table for ``cells`` per strip, from 3 to 2000, or 0 for the linear theory; raises InputError. Not to be changed.
+    """Table of the grid for ``cells`` cells per strip, from 3 to 2000, or 0 for the linear theory; raises InputError.
+    Must not be modified.
 
     Narrow ellipses have more strips: there is one net for every number of strips that may be asked for.
     """
@@ -102,7 +103,7 @@ def contact(kind, inputs, table, outputs):
 
 @compiled
 def _status(kind, values, numbers, any_shape):
-    """Whether the inputs, by name and as an array, are numbers, and numbers in SI."""
+    """Status code of the inputs: whether all are finite, and plausible in SI units."""
     if not BY_LOAD <= kind <= AXES_BY_APPROACH or (any_shape and kind != BY_APPROACH):
         return NOT_KNOWN
     for value in numbers:
@@ -131,7 +132,7 @@ def _status(kind, values, numbers, any_shape):
 
 @compiled
 def _press(kind, values, out):
-    """Semi-axes, approach and load by Hertz, and whether the theories of rolling accept the ellipse."""
+    """Fill semi-axes, approach and load by Hertz's theory. Returns whether rolling theories can handle this ellipse."""
     x, y, elastic = values.shape_x, values.shape_y, values.G / (1.0 - values.nu)
     small, large = min(x, y), max(x, y)
     if kind in (BY_LOAD, BY_APPROACH):
@@ -161,7 +162,7 @@ def _press(kind, values, out):
 
 @compiled
 def _linear(values, out):
-    """Forces as long as nothing slips."""
+    """Fill the forces of the linear theory, in which nothing slips."""
     a, b, shear = out.a, out.b, values.G
     area, ratio, nu = a * b, a / b, values.nu
     c = array(doubles(4), (4,))
@@ -175,7 +176,7 @@ def _linear(values, out):
 
 @compiled
 def _creep(values, table, out):
-    """FASTSIM on one ellipse: as ``fastsim_many.forces``, all arrays on the stack."""
+    """Fill the forces of FASTSIM on one ellipse, as in ``fastsim_many.forces``, with all arrays on the stack."""
     head = records(table, 1, HEAD)[0]
     n, first = int(head.cells), int(head.first)
     wide = n * min(max((0.5 / (out.a / out.b)) ** 0.6, 1.0), 1.0 * MOST_STRIPS)

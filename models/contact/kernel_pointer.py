@@ -30,7 +30,7 @@ EXAMPLE = Path(__file__).with_name("kernel_example.c")
 
 @dataclass(frozen=True, eq=False)
 class Pointer:
-    """Addresses of the function and of its ``net``, and ``call``, the function as ctypes knows it."""
+    """Addresses of the compiled function and of its ``net``, and ``call``, the function in the form of ctypes."""
 
     address: int
     net: Array
@@ -43,7 +43,8 @@ class Pointer:
 
 
 def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
-    """The kernel and the table for ``cells`` per strip; 0 for the linear theory. Raises InputError.
+    """Pointer to the compiled contact with the table for ``cells`` cells per strip, or 0 for the linear theory. Raises
+    InputError.
 
     distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
     """

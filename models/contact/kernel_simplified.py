@@ -65,7 +65,7 @@ TRIES = 100
 
 
 def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAIN) -> Array:
-    """Table for an undeformed distance of one valley; its first number is below zero. Not to be changed.
+    """Table for an undeformed distance with a single valley; its first number is below zero. Must not be modified.
 
     cells : strips of the fine net, and cells in each, 3 to 200. Raises InputError, also for several valleys.
     """
@@ -99,7 +99,7 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
 
 @compiled
 def surface_at(numbers, depth):
-    """Numbers of the patch at a depth (m) for compiled functions, as ``Patch.surface`` has it."""
+    """``Surface`` of the patch at a depth (m) for compiled functions, as ``Patch.surface`` gives it."""
     head = records(numbers, 1, HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))
@@ -120,7 +120,8 @@ def fit_at(numbers, depth, modulus):
 
 @compiled
 def settle(numbers, approach, modulus):
-    """Depth (m), stiffness and sum of W p dA that belong to an approach (m); not a number beyond the table's edge.
+    """Depth (m) at which the approach (m) is reached, with its stiffness (Pa/m) and sum of W p dA; NaN if the contact
+    would pass the table's edge.
 
     False position by Illinois' rule: the approach grows with the depth, for one valley in proportion.
     """
@@ -156,7 +157,8 @@ def settle(numbers, approach, modulus):
 
 @compiled
 def simplified(inputs, numbers, outputs):
-    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``, of ``inputs`` that ``kernel`` has found fine.
+    """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``. The caller, ``kernel``, must have checked
+    ``inputs``.
 
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
@@ -178,7 +180,8 @@ def simplified(inputs, numbers, outputs):
 
 @compiled
 def _roll(values, numbers, depth, stiffness, out):
-    """Fill ``out``, the load of which is known, of the patch at a depth: as ``simplified_theory.roll``."""
+    """Fill the rolling forces in ``out``, whose load is known, of the patch at a depth: as
+    ``simplified_theory.roll``."""
     surface, head = surface_at(numbers, depth), records(numbers, 1, HEAD)[0]
     box, cells, meshes = surface.box, -int(head.cells), int(head.net)
     net = strips(surface, cells, cells, int(head.shape))
@@ -213,7 +216,7 @@ def normalise(net, load):
 
 @cache
 def _law():
-    """A shell about ``simplified``, whose address the tables hold."""
+    """Callback with C calling convention around ``simplified``; tables store its address."""
 
     @cfunc(types.int32(DOUBLES, DOUBLES, DOUBLES), error_model="numpy")
     def law(inputs, numbers, outputs):

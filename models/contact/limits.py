@@ -25,5 +25,5 @@ NO_SLIP = 0.5
 
 
 def yields(*bodies: Material) -> bool:
-    """Whether the pressure at which the bodies flow is known."""
+    """Whether a pressure limit for yielding is known."""
     return all(body.E >= STEEL_LIKE for body in bodies)

@@ -59,7 +59,7 @@ class Coefficients:
 
 
 def coefficients(ratio: Any, nu: Any) -> Coefficients:
-    """Kalker's coefficients.
+    """Kalker's creepage and spin coefficients.
 
     ratio : a/b, from 1e-9 to 1e9; nu : Poisson's ratio, 0 to 1/2; arrays of shapes that broadcast. Raises InputError.
 
@@ -75,7 +75,7 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
 
 
 def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, material_pair: MaterialPair) -> tuple[Array, Array, Array]:
-    """Fx, Fy (N) and Mz (N m) on the wheel as long as nothing slips.
+    """Fx, Fy (N) and Mz (N m) on the wheel according to linear theory, in which nothing slips.
 
     a, b : semi-axes (m), zero where nothing touches; xi_x, xi_y : creepages (1); spin : 1/m; arrays of shapes that
     broadcast. Friction does not enter: the forces have no bound. Raises InputError, also for too unlike a pair.
@@ -181,7 +181,7 @@ def _tabulated(kind: int, ratio: float, nu: float) -> float:
 
 @njit(cache=True)
 def _parabola(nu: float) -> tuple[float, float, float]:
-    """Weights of the values at nu = 0, 1/4 and 1/2."""
+    """Weights of the values at nu = 0, 1/4 and 1/2 for quadratic interpolation in nu."""
     s = 4.0 * nu
     return (1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0
 

@@ -43,7 +43,7 @@ STEEL = Material(E=2.1e11, nu=0.28)
 
 @dataclass(frozen=True)
 class MaterialPair:
-    """Two bodies in touch, ``wheel`` and ``rail``; a pair of equal materials has that material's constants."""
+    """Two bodies in contact, ``wheel`` and ``rail``; a pair of equal materials has the constants of that material."""
 
     wheel: Material = STEEL
     rail: Material = STEEL
@@ -78,7 +78,7 @@ class MaterialPair:
         return self.G / 4.0 * ((1.0 - 2.0 * wheel.nu) / wheel.G - (1.0 - 2.0 * rail.nu) / rail.G)
 
     def quasi_identity_error(self, friction: float) -> float:
-        """Force, as a share of mu N, that leaving K out may cost at this coefficient of friction: 2 |K| / mu.
+        """Ratio of the force error by neglecting K to mu N, at this coefficient of friction: up to 2 |K| / mu.
 
         The mean of the strain 2 K p / G over the patch is a creepage of K N / (pi a b G) on a circle and up to twice
         that on a band, which the linear theory answers with G a b C11 times as much: 1.3 to 2 times K N.
@@ -86,7 +86,8 @@ class MaterialPair:
         return 2.0 * abs(self.mismatch) / friction
 
     def require_likeness(self) -> None:
-        """Raise InputError for a pair too unlike to leave K out where there is friction (see LARGEST_MISMATCH)."""
+        """Raise InputError if the materials differ so much that K must not be neglected where there is friction (see
+        LARGEST_MISMATCH)."""
         if abs(self.mismatch) > LARGEST_MISMATCH:
             raise InputError(
                 "",
@@ -113,5 +114,5 @@ class Falling(Strict):
 
     @property
     def law(self) -> tuple[float, float]:
-        """Floor, and decay per unit of slip by the rolling speed."""
+        """Parameters of the law: floor, and decay per unit of the ratio of slip to rolling speed."""
         return self.floor, self.decay * self.speed

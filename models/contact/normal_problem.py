@@ -96,7 +96,7 @@ class NormalSolution(PressureGrid):
 
 
 def centres(cells: int, step: float) -> Array:
-    """Centres (m) of ``cells`` cells about zero."""
+    """Positions (m) of the centres of ``cells`` cells of size ``step``, symmetric about zero."""
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
@@ -105,9 +105,8 @@ AVERAGING_POINTS = 8
 
 
 def hertzian(a: float, b: float, load: float, cells: int) -> PressureGrid:
-    """Pressure of an ellipse with semi-axes a, b (m), the mean of each of ``cells`` x ``cells`` cells, scaled to the
-    load (N).
-    """
+    """Hertzian pressure on an ellipse with semi-axes a, b (m): means over ``cells`` x ``cells`` cells, scaled to the
+    load (N)."""
     inner = (np.arange(cells * AVERAGING_POINTS) + 0.5) / (cells * AVERAGING_POINTS) * 2 - 1
     height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(
         cells, AVERAGING_POINTS, cells, AVERAGING_POINTS
@@ -161,7 +160,7 @@ def solve_normal(
 
 
 def _checked_distance(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
-    """The distance as an array of numbers; raises InputError."""
+    """The undeformed distance as a numerical array, after checks of all inputs; raises InputError."""
     distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
     if distance.ndim != 2 or min(distance.shape) < 2:
         raise InputError("", "distance", list(distance.shape), "must have the shape (ny, nx), two cells or more each")
@@ -177,7 +176,7 @@ def _checked_distance(distance: Array, dx: float, dy: float, load: float | None,
 def _conjugate_gradients(
     distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float
 ) -> tuple[Array, int]:
-    """Pressure (ny, nx) that meets the contact conditions, and the iterations taken."""
+    """Pressure (ny, nx) that satisfies the contact conditions, and the number of iterations."""
     if load is not None:  # even over the grid
         pressure = np.full(distance.shape, load / (distance.size * cell))
     else:  # in proportion to the overlap
@@ -207,6 +206,6 @@ def _conjugate_gradients(
 
 
 def _violation(gap: Array, contact: Array, displacement: Array) -> float:
-    """Largest violated condition as a part of the greatest displacement."""
+    """Largest violation of the contact conditions, relative to the largest displacement."""
     inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
     return float(max(inside, outside) / displacement.max())

@@ -27,11 +27,11 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """One valley of a distance.
+    """One valley of an undeformed distance; one contact patch can arise in it.
 
     cut : which sides (low x, high x, low y, high y) touch another valley. lean : angle (rad) between the patch's normal
-    and the direction in which the bodies approach, which is that of the load. contour_position : where its
-    y = 0 lies along the contour (m), to tell how far patches are apart.
+    and the direction in which the bodies approach, which is that of the load. contour_position : position (m) of its y
+    = 0 along the contour, from which distances between patches follow.
     """
 
     distance: Distance
@@ -52,22 +52,20 @@ class Patch:
 
     @property
     def low(self) -> float:
-        """Least distance (m): nothing touches at a smaller depth."""
+        """Smallest distance (m) between the undeformed surfaces; at a smaller depth there is no contact."""
         return self.bottom[2]
 
     @cached_property
     def edge(self) -> float:
-        """Depth (m) at which the area {h < depth} reaches a side that is no cut."""
+        """Depth (m) at which the area {h < depth} reaches a side of the grid that is not a border to another valley."""
         x, y = self.distance.valley_x[1], self.distance.valley_y[1]
         sides = (x[0], x[-1], y[0], y[-1])
         return float(min((side for side, cut in zip(sides, self.cut, strict=True) if not cut), default=np.inf))
 
     @cached_property
     def lines(self) -> tuple[Table, Table]:
-        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola.
-
-        The bottom itself is one more line.
-        """
+        """Lines along x and along y, with the square root of the least height above the bottom on each, which is linear
+        for a paraboloid."""
         tables = []
         for (lines, least, _), bottom in zip(
             (self.distance.valley_x, self.distance.valley_y), self.bottom, strict=False
@@ -77,7 +75,7 @@ class Patch:
         return tables[0], tables[1]
 
     def surface(self, depth: float) -> Surface:
-        """Numbers of the patch at a depth (m) for compiled functions."""
+        """``Surface`` of the patch at a depth (m) for compiled functions."""
         known = self.distance
         origin = float(known.x[0]), float(known.y[0])
         return Surface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)
@@ -105,7 +103,7 @@ class Patch:
 
 
 def no_bottom() -> InputError:
-    """The error of a distance that does not rise to all sides: it falls to one, or is flat."""
+    """Error for a distance without an inner minimum: it decreases towards one side, or is flat."""
     return InputError(
         "",
         "distance",
@@ -115,7 +113,8 @@ def no_bottom() -> InputError:
 
 
 def separate(distance: Distance) -> list[Patch]:
-    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``RIDGE``."""
+    """The valleys of a distance, in order of ascending y (then x). Every ridge higher than ``RIDGE`` separates two of
+    them."""
     return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
 
 
@@ -125,7 +124,8 @@ def as_single_patch(distance: Distance) -> list[Patch]:
 
 
 def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
-    """Parts of the distance along an axis (0: x, 1: y), each with whether its two ends are cuts."""
+    """Parts of the distance, split at ridges along an axis (0: x, 1: y), each with flags on whether its two ends are
+    cuts."""
     lines, least, _ = distance.valley_y if axis else distance.valley_x
     nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
     inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
@@ -138,7 +138,7 @@ def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool
 
 
 def ridges(heights: Array) -> list[int]:
-    """Indices of the maxima of a line that rise more than ``RIDGE`` above the valleys on both sides."""
+    """Indices of maxima of a line that are more than ``RIDGE`` above the valleys on both sides."""
     maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
@@ -157,7 +157,8 @@ def ridges(heights: Array) -> list[int]:
 
 
 def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
-    """Minimum along an axis of the parabola through three points near by; the place itself if there is none."""
+    """Position of the minimum, along an axis, of the parabola through three nearby points; the given position if there
+    is none."""
     nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step

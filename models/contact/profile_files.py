@@ -37,7 +37,7 @@ OFF_TAPING = 5e-3
 
 
 def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror: bool = False) -> ContactProfile:
-    """The profile in a file, as the package has it (m, z down, flange or gauge corner at negative y).
+    """Profile read from a file, in the package's axes (m, z down, flange or gauge corner at negative y).
 
     kind : "wheel" or "rail". smoothing : wavelength (m) of which half is left. mirror : exchange left and right.
     Raises InputError for a file that cannot be read or understood, naming the line and its text.
@@ -61,7 +61,8 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
 
 
 def _check_taping(wheel: ContactProfile, path: Path) -> None:
-    """Refuse a wheel whose y and z count from elsewhere, its flange's back or the axle."""
+    """Refuse a wheel profile whose y or z is not measured from the taping line, but from the flange's back or the
+    axle."""
     middle = float(np.interp(0.0, wheel.y, wheel.z, left=np.nan, right=np.nan))
     if not abs(middle) <= OFF_TAPING:
         raise InputError(
@@ -82,7 +83,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _parse_numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
-    """The numbers of one line; raises InputError with the line where it holds anything else or too few."""
+    """Numbers in one line; raises InputError with the line if it has too few numbers or other text."""
     if DECIMAL_COMMA.search(text.strip()):
         raise InputError(
             path, f"line {number}", text.strip()[:SHOWN_CHARACTERS], "has decimal commas: write decimal points"
@@ -103,7 +104,7 @@ def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
 
 
 def _columns(lines: list[str], path: Path) -> Points:
-    """Two columns of text, in m."""
+    """Two columns of numbers from text, converted to m."""
     plain = [(k, COMMENTS.sub("", line)) for k, line in enumerate(lines, 1)]
     rows = [(k, _parse_numbers(line, k, path)) for k, line in plain if line.strip()]
     for k, row in rows:
@@ -119,7 +120,7 @@ def _columns(lines: list[str], path: Path) -> Points:
 
 
 def _miniprof(lines: list[str], path: Path) -> Points:
-    """MiniProf: header to the first empty line, then points with y upwards."""
+    """Points of a MiniProf file: a header that ends with the first empty line, then points with y upwards."""
     rows, columns, heading = [], ["X", "Y"], True
     for k, line in enumerate(lines, 1):
         if heading:
@@ -143,7 +144,7 @@ def _miniprof(lines: list[str], path: Path) -> Points:
 
 
 def _simpack(lines: list[str], path: Path) -> Points:
-    """Simpack: the points as the header transforms them."""
+    """Points of a Simpack file, transformed as its header says."""
     keys: dict[str, tuple[str, int]] = {}
     rows: list[list[float]] = []
     inside = ended = False
@@ -189,7 +190,8 @@ def _key(keys: dict[str, tuple[str, int]], name: str, path: Path) -> float:
 
 
 def _transformed(points: Points, key: dict[str, float]) -> Points:
-    """Shift, rotation, bounds, mirrors, order and unit of a Simpack header, in this order."""
+    """Points after the operations of a Simpack header: shift, rotation, bounds, mirrors, order and unit, in this
+    order."""
     y, z = points[0] + key["shift.y"], points[1] + key["shift.z"]
     angle = key["rotate"] / key["units.ang.f"]
     y, z = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
@@ -203,7 +205,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
 
 
 def _upright_points(y: Array, z: Array, kind: Kind) -> Points:
-    """The points with the rail's top up, or the wheel's flange down and at negative y."""
+    """Points turned so that the rail's top is up, or the wheel's flange is down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])
         return (y, z) if ends >= np.median(z) else (y, -z)

@@ -28,7 +28,7 @@ TURNING = 0.3
 
 @dataclass(frozen=True, eq=False)
 class ContactProfile:
-    """A profile as points.
+    """A wheel or rail profile, given by points.
 
     y, z : (n,) in m, y ascending. smoothing : wavelength (m) along the contour of which smoothing left half, 0 for
     none; longer waves pass, shorter ones are damped by 1 / (1 + (smoothing / wavelength)^4).
@@ -40,7 +40,7 @@ class ContactProfile:
 
     @cached_property
     def curve(self) -> CubicSpline:
-        """z(y), twice continuously differentiable."""
+        """Curve z(y) through the points, twice continuously differentiable."""
         return CubicSpline(self.y, self.z)
 
     def turned(self, angle: float) -> "ContactProfile":
@@ -99,7 +99,7 @@ def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
 
 
 def _check_spikes(points: Array, file: object) -> None:
-    """A point far off the way from its neighbour to the next is no part of a contour, which never turns back."""
+    """Refuse outliers: points far from the line between their neighbours. A contour never turns back sharply."""
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
     spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
     if spikes.any():
@@ -113,7 +113,8 @@ def _check_spikes(points: Array, file: object) -> None:
 
 
 def _check_rough(y: Array, keep: slice, file: object) -> None:
-    """Refuse a contour that turns back for a moment, as rough or coarsely rounded points do: the rest would be lost."""
+    """Refuse a contour whose y briefly decreases, as in rough or coarsely rounded data; the remaining points would be
+    lost."""
     for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
         rough = np.logical_and.accumulate(highest - beyond < BACK)
@@ -130,7 +131,8 @@ def _check_rough(y: Array, keep: slice, file: object) -> None:
 
 
 def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
-    """Coordinate at even lengths: interpolated, then the curve that minimises error^2 + (L / 2 pi)^4 curvature^2."""
+    """Smoothed coordinate at evenly spaced lengths along the contour: the curve that minimises error^2 + (L / 2 pi)^4
+    curvature^2."""
     interpolated = CubicSpline(length, values)(even)
     if smoothing == 0.0:
         return interpolated
@@ -139,7 +141,7 @@ def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Ar
 
 
 def _ascending(y: Array) -> slice:
-    """The longest run of points along which y ascends."""
+    """Longest run of consecutive points with ascending y."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])
     k = int(np.argmax(ends - starts))

@@ -35,7 +35,8 @@ def sweep(traction, rigid, kernel, bound, relaxation):
 
 @njit(cache=True, nogil=True)
 def answer(slip_x, slip_y, own_x, own_y, bound):
-    """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): sticking, or opposite to its slip.
+    """Traction of one cell whose slip is (slip_x + own_x p_x, slip_y + own_y p_y): it sticks, or slides with the
+    traction opposite to the slip.
 
     In slip p = -slip / (own + l) with l > 0 such that |p| = bound: Newton's iteration on 1/|p|, monotone from l = 0.
     """
@@ -55,7 +56,7 @@ def answer(slip_x, slip_y, own_x, own_y, bound):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def factor(systems, spans):
-    """Each of the matrices (many, n, n) to its factors L (unit diagonal) and U, in place.
+    """LU factors of each matrix in (many, n, n), in place: L with unit diagonal, and U.
 
     spans (many, 2) : first row of each that is not the unit matrix's, and one beyond its last. Without pivoting, which
     a matrix with a positive definite symmetric part does not need.
@@ -92,10 +93,12 @@ def substitute(factors, spans, values):
 
 @njit(cache=True, nogil=True)
 def turned(column, turns, components):
-    """The image's components (count + 1,) by Givens' rotations that leave a triangle, (count,).
+    """Apply Givens' rotations to the new image's components (count + 1,), so that the system stays triangular; returns
+    its new column (count,).
 
     turns (most, 2) : cosine and sine of the rotations, of which the last is added; components (most + 1,) : what the
-    residual was turned to, its last component the residual's size."""
+    residual was turned to, its last component the residual's size.
+    """
     count = len(column) - 1
     for i in range(count - 1):
         low, high = column[i], column[i + 1]
@@ -112,7 +115,8 @@ def turned(column, turns, components):
 
 @njit(cache=True, fastmath=True, nogil=True)
 def orthogonalise(basis, count, vector):
-    """Write the part of ``vector`` orthogonal to the first rows of ``basis``, of length 1, as its next row.
+    """Remove from ``vector`` its components along the first ``count`` rows of ``basis``, and write the rest, scaled to
+    length 1, as the next row.
 
     Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
     """

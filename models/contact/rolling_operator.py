@@ -22,7 +22,8 @@ MOST_PRODUCTS = 300
 
 
 class SlipOperator:
-    """C: tractions (ny, nx, 2) in units of G to their part of the slip, (ny, nx, 2): -du/dx, or u/dx in a shift.
+    """Linear operator C from tractions (ny, nx, 2), in units of G, to their contribution to the slip, (ny, nx, 2):
+    -du/dx in rolling, u/dx in a shift.
 
     The gradient at a cell's centre is taken from there and from the next two centres upstream, where the material
     comes from. The symmetric part of C then has the symbol (1 - cos)^2 times that of the positive definite A.
@@ -46,23 +47,23 @@ class SlipOperator:
         self._convolution = Convolution(self.kernel)
 
     def __call__(self, traction: Array) -> Array:
-        """Slip (ny, nx, 2) by tractions (ny, nx, 2)."""
+        """Slip (ny, nx, 2) caused by tractions (ny, nx, 2)."""
         return self._convolution(traction)
 
     @cached_property
     def reversed(self) -> Array:
-        """Kernel as ``rolling_kernels.sweep`` reads it, (3, 2 ny - 1, 2 nx - 1)."""
+        """Kernel (3, 2 ny - 1, 2 nx - 1) in the reversed order that ``rolling_kernels.sweep`` needs."""
         kernel = self.kernel[::-1, ::-1]
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
 
     @cached_property
     def own_slip(self) -> Array:
-        """Slip of a cell by its own traction, (2,)."""
+        """Slip of a cell caused by its own unit traction, (2,)."""
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
     @cached_property
     def strip(self) -> Array:
-        """Coupling within one strip, (nx, 2, nx, 2)."""
+        """Coupling matrix (nx, 2, nx, 2): slip of each cell of a strip by the traction of each cell of that strip."""
         index = np.arange(self.columns)
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
 
@@ -71,7 +72,7 @@ Map = Callable[[Array], Array]
 
 
 def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: float, maximum_iterations: int) -> Array:
-    """x with |apply(x) - b| <= tolerance |b|, b the right-hand side (n,), by preconditioned GMRES.
+    """Solution x with |apply(x) - b| <= tolerance |b| by preconditioned GMRES; b is the right-hand side (n,).
 
     Raises RunFailed after ``maximum_iterations`` products.
 
@@ -100,7 +101,7 @@ def gmres(apply: Map, precondition: Map, right_hand_side: Array, tolerance: floa
 
 
 class FreeSystem:
-    """The system free (C + stiff) d = free wanted for changes d of traction within the free directions.
+    """Linear system free (C + stiff) d = free wanted for changes d of traction within the free directions.
 
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
@@ -130,7 +131,8 @@ class FreeSystem:
         return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
 
     def solve(self, right_hand_side: Array, tolerance: float = INNER_TOLERANCE) -> Array:
-        """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
+        """Change of traction (ny, nx, 2) that produces a change of slip (ny, nx, 2), to a relative residual of
+        ``tolerance``."""
         # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
         right = (self.scale * _times(self.free, _times(self.free, right_hand_side))).ravel()
         return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(right_hand_side.shape)

@@ -99,7 +99,7 @@ def solve_rolling(
 def solve_shift(
     normal_solution: PressureGrid, mu: float, shift_x: float, shift_y: float, material_pair: MaterialPair
 ) -> RollingSolution:
-    """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
+    """Tractions after the wheel has been shifted over the rail without rolling, from a state of rest without tractions.
 
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
     shifts in m; in the result ``slip`` is in m and ``power`` the work of friction in J.
@@ -117,7 +117,7 @@ def solve_shift(
 def _rubbed(
     normal_solution: PressureGrid, mu: float, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> RollingSolution:
-    """Solution for a rigid slip, on the cells in contact."""
+    """Stick and slip solution for the given rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     material_pair.require_likeness()
     shape = normal_solution.pressure.shape
@@ -141,13 +141,13 @@ def _rubbed(
 
 
 def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Array:
-    """Slip (ny, nx, 2) of rigid bodies, by the rolling speed, at x (nx,) and y (ny,)."""
+    """Ratio (ny, nx, 2) of the rigid bodies' slip velocity to the rolling speed, at positions x (nx,) and y (ny,)."""
     along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
     return np.stack([along, across], axis=-1)
 
 
 class _State:
-    """Tractions (ny, nx, 2), by G, with their slip and how far they are from meeting every cell's condition."""
+    """Tractions (ny, nx, 2) in units of G, their slip, and the residual of every cell's stick or slip condition."""
 
     def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
         self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
@@ -159,18 +159,19 @@ class _State:
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
     def moved(self, traction: Array) -> "_State":
-        """The state of other tractions."""
+        """A new state with other tractions."""
         return _State(self.operator, self.rigid, self.bound, traction)
 
     @property
     def stick(self) -> Array:
-        """Cells whose traction need not be cut to the bound."""
+        """Which cells stick: their traction is within the friction bound."""
         return (self.size <= self.bound) & (self.bound > 0)
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Centres x (nx,) and y (ny,) of cells (m), their sides dx and dy (m), bounds of their tractions by G (ny, nx)."""
+    """Grid of cells: centres x (nx,) and y (ny,) (m), sides dx and dy (m), and traction bounds in units of G (ny,
+    nx)."""
 
     x: Array
     y: Array
@@ -179,7 +180,8 @@ class _Cells:
     bound: Array
 
     def coarser(self) -> "_Cells":
-        """Cells twice as long and wide, whose bounds are the means over the old ones; a last one may reach beyond."""
+        """Grid of cells twice as long and wide; their bounds are means over the smaller cells. A last cell may extend
+        beyond the old grid."""
         rows, columns = (count + count % 2 for count in self.bound.shape)
         bound = np.zeros((rows, columns))
         bound[: self.y.size, : self.x.size] = self.bound
@@ -195,7 +197,8 @@ class _Cells:
 def _solve(
     cells: _Cells, rigid: RigidSlip, material_pair: MaterialPair, weights: tuple[float, ...]
 ) -> tuple[_State, int]:
-    """Tractions that meet all conditions, and the rounds taken on these cells."""
+    """State in which all stick and slip conditions hold, and the number of rounds on this grid; a coarser grid gives
+    its start."""
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, material_pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
@@ -227,7 +230,8 @@ def _at_quarter_cells(values: Array) -> Array:
 
 
 def _solve_tractions(state: _State) -> tuple[_State, int]:
-    """Tractions that meet all conditions, by sweeps and Newton's steps in turn, and the rounds taken."""
+    """State that satisfies all stick and slip conditions, by alternating sweeps and Newton steps, and the number of
+    rounds."""
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
         if done == MOST_ROUNDS:
@@ -246,7 +250,7 @@ def _solve_tractions(state: _State) -> tuple[_State, int]:
 
 
 def _after_newton_step(state: _State) -> _State:
-    """The state after Newton's step; the same where the step is lost in rounding."""
+    """The state after one Newton step, or the unchanged state if the linear solver fails for rounding."""
     try:
         return state.moved(_newton(state))
     except RunFailed:
@@ -254,7 +258,7 @@ def _after_newton_step(state: _State) -> _State:
 
 
 def _newton(state: _State) -> Array:
-    """Tractions after Newton's step for the cells that stick and slip in ``state``.
+    """Tractions after a Newton step in which the sets of sticking and slipping cells are those of ``state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
     opposite to its slip: t.C d + (|s| / g) d = -t.s along the tangent t.

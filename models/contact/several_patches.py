@@ -44,7 +44,7 @@ has kinks, in which one way or the other is caught."""
 
 @dataclass(frozen=True, eq=False)
 class Net:
-    """Crude net of one patch, rows along y; without a load only x and y of its bottom.
+    """Coarse grid of one patch, rows along y; for a patch without load it has a single point, the bottom.
 
     x, y : meshes along the common contour (m). height : h (m). pressure : W p (m). cover : covered shares. step :
     dx, dy of a mesh (m). volume : W times the load (m^3).
@@ -60,12 +60,12 @@ class Net:
 
     @property
     def forces(self) -> Array:
-        """W times the load of every mesh, flat (m^3)."""
+        """W times the load of every grid cell, as a flat array (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
 
 def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
-    """Net of a patch at a depth (m)."""
+    """Coarse grid of a patch at a depth (m)."""
     x, y, low = patch.bottom
     nothing = np.zeros((1, 1))
     empty = Net(nothing + x, nothing + y + patch.contour_position, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
@@ -85,7 +85,8 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
 def solve_common_approach(
     nets: Sequence[Net], material_pair: MaterialPair, kind: int, lows: Array, depths: Array
 ) -> tuple[Array, Array]:
-    """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
+    """Stiffnesses 1/W (Pa/m) of patches at given depths (m), zero for patches without load, and their approaches
+    (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
     pushed = {(k, m): _displacement_by(nets[m], net, material_pair) for k, net in enumerate(nets) for m in loaded}
     products, right = np.zeros((len(loaded), len(loaded))), np.zeros(len(loaded))
@@ -106,7 +107,8 @@ def solve_common_approach(
 
 
 def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> Array:
-    """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
+    """Normal displacement (m) at the points of one grid caused by W times the pressure of another grid, or of
+    itself."""
     if source is target:
         return displacement(source.pressure, *source.step, material_pair.modulus)
     answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
@@ -114,7 +116,8 @@ def _displacement_by(source: Net, target: Net, material_pair: MaterialPair) -> A
 
 
 def _product(net: Net, first: Array, second: Array, kind: int) -> float:
-    """Sum over the net for least squares: products of the slopes, or of what differs from the mean."""
+    """Scalar product of two displacement fields for the least-squares fit: of their slopes, or of their deviations from
+    the mean."""
     if kind == GRADIENT:
         return float(slope_products(first, second, net.cover, *net.step, True)[0])
     return float(covariances(first, second, net.cover)[1])
@@ -127,7 +130,7 @@ def solve_depths(
     material_pair: MaterialPair,
     options: tuple[int, int, int],
 ) -> tuple[Array, Array, Array]:
-    """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
+    """Depths (m) of patches followed by the common rigid approach (m), their stiffnesses (Pa/m) and loads (N).
 
     start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
     common direction. options : cells of a net, shape and kind of fit.
@@ -158,7 +161,8 @@ def solve_depths(
 
 
 def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, material_pair: MaterialPair) -> Array:
-    """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
+    """Tangential displacement (2, cells, cells) (m) in grid k caused by the tractions (2, cells, cells) (Pa) on all
+    other grids."""
     answer, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:

@@ -46,7 +46,8 @@ class FineNet(NamedTuple):
 
 @compiled
 def overlap_pressure(surface, height, shape):
-    """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
+    """W times the pressure at a height: depth - height (parabolic), or the elliptic root function with the same value
+    at the bottom."""
     over = surface.depth - height
     if over <= 0.0:
         return 0.0
@@ -55,13 +56,13 @@ def overlap_pressure(surface, height, shape):
 
 @compiled
 def mesh_of(box, cells):
-    """Sizes dx, dy of a mesh of a net of cells x cells over a box."""
+    """Cell sizes dx, dy of a grid of cells x cells over a rectangle."""
     return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
 
 
 @compiled
 def crude_net(surface, cells, shape):
-    """Height, W p and covered share of every mesh (cells, cells), rows along y.
+    """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
     """
@@ -82,7 +83,7 @@ def crude_net(surface, cells, shape):
 
 @compiled
 def resultant(surface, points, shape):
-    """Sum of W p dA over the box from points x points midpoints."""
+    """Integral of W p over the rectangle, by the midpoint rule with points x points points."""
     total, (padded, origin, step, box, _, _) = 0.0, surface
     dx, dy = mesh_of(box, points)
     for j in range(points):
@@ -103,7 +104,8 @@ def corner(x, y):
 
 @compiled
 def displacement(pressure, dx, dy, modulus):
-    """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
+    """Normal displacement (m) of both bodies together at the centres of the grid cells, by a pressure (Pa) on each
+    cell."""
     cells = pressure.shape[0]
     edges = np.empty((cells + 1, cells + 1))
     for j in range(cells + 1):
@@ -128,7 +130,8 @@ def displacement(pressure, dx, dy, modulus):
 
 @compiled
 def covariances(u, h, cover):
-    """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
+    """Weighted mean of u; weighted sums (not divided) for the covariance of u and h and the variance of u. The covered
+    shares are the weights."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
     both = square = 0.0
     for k in range(u.size):
@@ -140,7 +143,7 @@ def covariances(u, h, cover):
 
 @compiled
 def weighted_mean(values, weights):
-    """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
+    """Weighted mean of values; weights of the same shape. Loops compile ten times as fast as array expressions."""
     total = weight = 0.0
     for k in range(values.size):
         total += weights.flat[k] * values.flat[k]
@@ -150,7 +153,7 @@ def weighted_mean(values, weights):
 
 @compiled
 def slope_products(u, h, cover, dx, dy, along_y):
-    """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
+    """Weighted sums over neighbouring cells: products of the slopes of u and h, and squares of the slopes of u."""
     product = square = 0.0
     for down in range(2 if along_y else 1):
         right, step = 1 - down, dy if down else dx
@@ -184,7 +187,7 @@ def crude_fit(surface, cells, shape, kind, modulus):
 
 @compiled
 def tangential(traction, dx, dy, nu):
-    """Displacement (2, cells, cells) at the meshes' centres by a traction (2, cells, cells), times pi G (Cerruti)."""
+    """Displacement (2, cells, cells) times pi G at the cells' centres, by a traction (2, cells, cells) (Cerruti)."""
     cells = traction.shape[1]
     corners = np.empty((3, cells + 1, cells + 1))  # integrals of y^2/r^3, x^2/r^3 and xy/r^3 from the origin
     for j in range(cells + 1):
@@ -216,9 +219,10 @@ def tangential(traction, dx, dy, nu):
 
 @compiled
 def tangential_fit(u, traction, cover, dx, dy, kind):
-    """W_1 = W_2 (m/Pa) by least squares of u = W p + a, both (2, cells, cells); 0 where none can be fitted.
+    """Flexibility W_1 = W_2 (m/Pa) from the least-squares fit u = W p + a, u and p both (2, cells, cells); 0 if no fit
+    is possible.
 
-    Of both directions together, weighted by the covered shares; by DISPLACEMENT or by GRADIENT along x.
+    Both directions are fitted together, weighted by the covered shares, by DISPLACEMENT or by its GRADIENT along x.
     """
     both = square = 0.0
     for k in range(2):
@@ -233,7 +237,7 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
 
 @compiled
 def push(x, y, force, at_x, at_y):
-    """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
+    """Sum of force / r at points; times 1 / (pi E*) it is the normal displacement by loads (N) of another patch.
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
     """
@@ -247,8 +251,8 @@ def push(x, y, force, at_x, at_y):
 
 @compiled
 def drag(x, y, force, at_x, at_y, nu):
-    """Tangential displacements at points by tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson,
-    section 3.6)."""
+    """Tangential displacements (2, points) times pi G at points, by tangential loads (2, n) (Cerruti; Johnson, section
+    3.6)."""
     sums = np.zeros((2, at_x.size))
     for k in range(at_x.size):
         for m in range(x.size):
@@ -262,7 +266,7 @@ def drag(x, y, force, at_x, at_y, nu):
 
 @compiled
 def strips(surface, rows, cells, shape):
-    """``FineNet`` of a patch, with W p for the pressure.
+    """``FineNet`` of a patch, with W p in place of the pressure.
 
     Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
     depth.
@@ -300,7 +304,8 @@ def strips(surface, rows, cells, shape):
 
 @compiled
 def crossing(row, depth, inner, outer):
-    """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
+    """Position where the row's height equals the depth, between points below and not below it (false position, Illinois
+    rule)."""
     at_inner, at_outer = value_along_row(row, inner) - depth, value_along_row(row, outer) - depth
     middle, kept = outer, 0
     for _ in range(30):
@@ -321,7 +326,7 @@ def crossing(row, depth, inner, outer):
 
 @compiled
 def march(net, mu, flexibility, motion, traction):
-    """FASTSIM along the strips of a ``FineNet`` at creepages and spin ``motion``; fills the tractions (s, n, 2).
+    """FASTSIM along the strips of a ``FineNet``, for creepages and spin ``motion``; fills the tractions (s, n, 2).
 
     Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
     second-order one: half a first step, and the exact turning of a slipping traction.
@@ -352,10 +357,10 @@ def march(net, mu, flexibility, motion, traction):
 
 @compiled
 def step_on(px, py, u, v, bound, middle, slips):
-    """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
+    """Traction after a step, and whether it slips; without slip the rigid slip would subtract (u, v) from the traction.
 
-    A traction that slips on keeps to the bound and turns towards -(u, v): with psi between the two, tan(psi/2) shrinks
-    by exp(-|(u, v)| / middle), ``middle`` the bound half way.
+    A traction that continues to slip stays on the bound and turns towards -(u, v): with psi between the two, tan(psi/2)
+    shrinks by exp(-|(u, v)| / middle), where ``middle`` is the bound in the middle of the step.
     """
     x, y = px - u, py - v
     size = math.hypot(x, y)
@@ -375,7 +380,8 @@ def step_on(px, py, u, v, bound, middle, slips):
 
 @compiled
 def gather(net, traction, box, cells):
-    """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
+    """Mean tractions (2, cells, cells) on the coarse grid; each strip cell counts by its overlap with the coarse
+    cell."""
     (y, low_x, high_x, width, _), sums = net, np.zeros((2, cells, cells))
     dx, dy = mesh_of(box, cells)
     steps = traction.shape[1]

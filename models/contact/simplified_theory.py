@@ -92,7 +92,7 @@ class SimplifiedOptions:
 
     @property
     def numbers(self) -> tuple[int, int, int]:
-        """Meshes, shape and fit as compiled functions read them."""
+        """Number of grid cells, shape and fit, coded as compiled functions read them."""
         return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
@@ -161,7 +161,7 @@ def press(
     approach: float | None = None,
     options: SimplifiedOptions = PLAIN,
 ) -> NormalContact:
-    """Area, pressure and approach of two bodies, by a load (N) or by a rigid approach (m).
+    """Normal contact of two bodies under a load (N), or at a rigid approach (m): area, pressure and approach.
 
     bodies : their undeformed distance, or the patches of a wheel on a rail.
 
@@ -190,7 +190,7 @@ def press(
 def load_at_depth(
     patch: Patch, depth: float, material_pair: MaterialPair, options: SimplifiedOptions = PLAIN
 ) -> PatchPressure:
-    """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
+    """Load and approach of one patch at a depth d = -a_3 (m), the paper's N(a_3); W_3 is fitted on the coarse grid."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
@@ -203,7 +203,8 @@ def load_at_depth(
 def _by_load(
     patches: list[Patch], lowest: float, load: float, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """Find the depth of a single patch, or the depths and the common approach of several, that carry the load."""
+    """Normal contact that carries a load: the depth of a single patch, or depths and common approach of several, are
+    searched."""
     if len(patches) == 1:
         patch, along = patches[0], np.cos(patches[0].lean)
         depth = _depth_for_load(
@@ -222,7 +223,8 @@ def _by_load(
 
 
 def _depth_for_load(load_at: Callable[[float], float], load: float, lowest: float, limit: float) -> float:
-    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until it is, then Brent's method."""
+    """Depth or approach (m) above ``lowest`` at which the load is carried: doubled until the load is exceeded, then
+    refined by Brent's method."""
     if limit - lowest <= NO_DEPTH:
         raise no_bottom()
     low, high = 0.0, min(1e-6, limit - lowest)
@@ -244,7 +246,7 @@ def _total(parts: Sequence[PatchPressure]) -> float:
 
 
 def _shallow(patches: list[Patch], approach: float) -> list[float]:
-    """Depths (m) of patches at an approach (m), about: a part of what is left above the bottom."""
+    """Rough depths (m) of patches at an approach (m): a fixed share of the approach beyond each patch's first touch."""
     over = [approach * np.cos(patch.lean) - patch.low for patch in patches]
     return [float(patch.low + (ABOUT * o if o > 0.0 else o)) for patch, o in zip(patches, over, strict=True)]
 
@@ -252,7 +254,7 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
 def _patches_at_common_approach(
     patches: list[Patch], approach: float, load: float | None, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """The patches at their common approach (m), or near it where a load (N) is given."""
+    """Patches at their common approach (m); if a load (N) is given, the approach that carries it is found from here."""
     start = np.array([*_shallow(patches, approach), approach])
     (*depths, reached), stiffnesses, loads = solve_depths(patches, start, load, material_pair, options.numbers)
     parts = []
@@ -266,7 +268,7 @@ def _patches_at_common_approach(
 def _gathered(
     approach: float, parts: tuple[PatchPressure, ...], material_pair: MaterialPair, options: SimplifiedOptions
 ) -> NormalContact:
-    """The sum of the patches; area and peak from strips with exact ends."""
+    """Normal contact summed over the patches; area and peak pressure come from strips with exact ends."""
     area = sum(_area(part) for part in parts)
     peak = max((part.stiffness * (part.depth - part.patch.low) for part in parts), default=0.0)
     return NormalContact(approach, _total(parts), area, peak, parts, material_pair, options)
@@ -312,7 +314,7 @@ def roll(
 
 
 def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -> FineNet:
-    """Strips of a patch as ``march`` takes them."""
+    """``FineNet`` of a patch, as ``march`` expects it."""
     net = strips(patch.patch.surface(patch.depth), cells, cells, SHAPES[options.shape])
     carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
     net.pressure[:] *= patch.load / carried  # full sliding gives mu N exactly
@@ -320,9 +322,10 @@ def _fine_strips(patch: PatchPressure, options: SimplifiedOptions, cells: int) -
 
 
 def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[float]:
-    """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
+    """Flexibility W_1 = W_2 (m/Pa) of each patch from the least-squares fit u = W p + a on the coarse grids, with
+    displacements u by the tractions of all patches.
 
-    W_3 where no traction can be fitted.
+    It is W_3 if no traction can be fitted.
     """
     options, pair = normal_contact.options, normal_contact.pair
     nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in normal_contact.patches]
@@ -335,7 +338,7 @@ def _refitted(normal_contact: NormalContact, tractions: list[Array]) -> list[flo
 
 
 def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
-    """Pressure and tractions by strip and cell."""
+    """Pressure, tractions and slip in each cell of each strip."""
     y, low, high, width, pressure = net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]

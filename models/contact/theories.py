@@ -28,7 +28,8 @@ Motion = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Rolled:
-    """Forces on the wheel (N), moment (N m), share of the area that sticks, dissipation by rolling speed (N)."""
+    """Result of rolling: forces on the wheel (N), moment (N m), sticking share of the area, ratio of dissipated power
+    to rolling speed (N)."""
 
     fx: float
     fy: float
@@ -45,7 +46,8 @@ class Rolled:
 
 @dataclass(frozen=True)
 class Pressing:
-    """Normal contact: load (N) along the normals of all patches, area (m^2), largest pressure (Pa), approach (m)."""
+    """Result of normal contact: load (N) along the normals of all patches, area (m^2), largest pressure (Pa), approach
+    (m)."""
 
     load: float
     area: float
@@ -54,7 +56,8 @@ class Pressing:
 
 
 class RollingContact(ABC):
-    """Two bodies pressed together, to be rolled by one theory; ``order``: of the error in the size of a cell."""
+    """Two bodies pressed together whose rolling one theory computes; ``order``: convergence order of the error in the
+    cell size."""
 
     order = 1.0
 
@@ -64,11 +67,12 @@ class RollingContact(ABC):
     @property
     @abstractmethod
     def lever(self) -> float:
-        """Largest distance along an axis from where moments count to the edge of the contact (m)."""
+        """Largest distance (m), along an axis, between the reference point of moments and the edge of the contact."""
 
     @abstractmethod
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces at creepages and spin; with ``fields`` also what happens in every cell, patch by patch."""
+        """Forces at the given creepages and spin; with ``fields``, also pressure, traction and slip in every cell of
+        each patch."""
 
 
 class OnEllipse(RollingContact):
@@ -86,17 +90,17 @@ class OnEllipse(RollingContact):
 
 
 class LinearTheory(OnEllipse):
-    """Forces without slip, in proportion to the creepages and without a bound."""
+    """Linear theory: no slip, forces proportional to the creepages and not limited by friction."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces; there are no cells and no fields."""
+        """Forces of the linear theory, which has no cells and no fields."""
         fx, fy, mz = (float(f) for f in linear_theory.forces(self.a, self.b, *motion, self.pair))
         return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """Sentence against the linear theory's forces ``used`` (n,) divided by mu N; "" where friction can carry them
-    all."""
+    """Warning that the linear theory's force ratios ``used`` (n,), force to mu N, exceed the friction limit; "" if none
+    does."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""
@@ -115,7 +119,7 @@ class Fastsim(OnEllipse):
         self.order = 2.0 if choices["march"] == "second-order" and choices["bound"] != "elliptic" else 1.0
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` cells in each strip."""
+        """Creep forces, computed with ``cells`` cells in each strip."""
         ellipse = RollingEllipse(self.a, self.b, self.pressing.load, self.friction, *motion)
         creep = fastsim(ellipse, self.pair, cells=cells, **self.choices)
         inside = (fastsim_fields(ellipse, self.pair, cells=cells, **self.choices),) if fields else ()
@@ -125,15 +129,16 @@ class Fastsim(OnEllipse):
 
 
 class ExactOnEllipse(OnEllipse):
-    """Half-spaces with Coulomb friction under Hertz' pressure."""
+    """Half-space theory with Coulomb friction under Hertzian pressure."""
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` x ``cells`` cells about the ellipse."""
+        """Creep forces, computed with ``cells`` x ``cells`` cells around the ellipse."""
         return _exact_sum([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
 
 
 class OnPatches(RollingContact):
-    """Patches of any shape, whose depths and loads are those of the theory of 1983; its load is along the normals."""
+    """Patches of any shape; their depths and loads come from the simplified theory of 1983. The load acts along the
+    normals."""
 
     def __init__(
         self, normal_contact: NormalContact, friction: float, area: float, peak: float, approach: float
@@ -144,11 +149,12 @@ class OnPatches(RollingContact):
 
     @property
     def lever(self) -> float:
-        """Lever of the moment (m), of the patch that reaches farthest."""
+        """Lever of the moment (m) for the patch with the largest extent."""
         return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
 
     def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
-        """Fields with y along the contour of the rail, so that several patches lie beside one another."""
+        """Fields whose y is the position along the rail's contour, so that several patches can be shown in one
+        picture."""
         pairs = zip(fields, self.pressed.patches, strict=True)
         return tuple(replace(cells, y=cells.y + part.patch.contour_position) for cells, part in pairs)
 
@@ -160,14 +166,16 @@ class Simplified(OnPatches):
         super().__init__(normal_contact, friction, normal_contact.area, normal_contact.peak, normal_contact.approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
+        """Creep forces, with ``cells`` strips and as many cells per strip in each patch; fields are placed along the
+        rail's contour."""
         forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
         inside = self.placed(forces.fields)
         return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 
 
 class Exact(OnPatches):
-    """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
+    """Half-space theory with Coulomb friction for pressure and tractions; the load of each patch comes from the theory
+    of 1983."""
 
     def __init__(self, normal_contact: NormalContact, friction: float, cells: int) -> None:
         parts = normal_contact.patches
@@ -178,14 +186,14 @@ class Exact(OnPatches):
         super().__init__(normal_contact, friction, sum(grid.area for grid in grids), peak, approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
-        """Forces on ``cells`` x ``cells`` cells about each patch."""
+        """Creep forces, computed with ``cells`` x ``cells`` cells around each patch."""
         grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
         forces = _exact_sum(grids, motion, self.friction, self.pair)
         return replace(forces, fields=self.placed(forces.fields))
 
 
 def _exact_sum(grids: Sequence[PressureGrid], motion: Motion, friction: float, material_pair: MaterialPair) -> Rolled:
-    """The sum over patches that do not feel each other's tractions."""
+    """Sum of forces over the patches, none of which is affected by the tractions of another one."""
     forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
     for grid in grids:
         patch, (x, y) = solve_rolling(grid, friction, *motion, material_pair), np.meshgrid(grid.x, grid.y)
@@ -204,7 +212,7 @@ MARGINS = (1.2, 1.6, 2.2)
 
 
 def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> NormalSolution:
-    """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
+    """Exact pressure of one patch at the load from the simplified theory, in the patch's own coordinates."""
     (x0, x1, y0, y1), known = patch.box, patch.patch.distance
     for margin in MARGINS:
         dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free

@@ -25,7 +25,7 @@ LARGEST_CONTACT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Distance:
-    """Undeformed distance on even nodes.
+    """Undeformed distance of two surfaces on evenly spaced nodes.
 
     x : (nx,) and y : (ny,) nodes (m), ascending, the axes of the package. height : (ny, nx) distance (m), rows along y.
     The approach of the bodies counts from distance zero, whether or not the least height is zero.
@@ -47,7 +47,8 @@ class Distance:
 
     @property
     def curvatures(self) -> tuple[float, float]:
-        """Second derivatives (1/m) in the middle of x and y, over four nodes, along and across."""
+        """Second derivatives (1/m) of the distance along x and along y at x = y = 0, from differences over four node
+        spacings."""
         second_differences = []
         for x, y in ((4.0 * self.dx, 0.0), (0.0, 4.0 * self.dy)):
             low, here, high = self.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
@@ -70,12 +71,13 @@ class Distance:
 
     @cached_property
     def valley_y(self) -> tuple[Array, Array, Array]:
-        """Lines y (m), the least height on each (m), and the x where it is (m): how the valley runs across y."""
+        """Lines y (m), the least height on each (m), and the x of that height (m): the course of the valley across
+        y."""
         return self._valley(self.padded, self.y, self.x, self.dx)
 
     @cached_property
     def valley_x(self) -> tuple[Array, Array, Array]:
-        """Lines x (m), the least height on each (m), and the y where it is (m)."""
+        """Lines x (m), the least height on each (m), and the y of that height (m)."""
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
@@ -85,7 +87,7 @@ class Distance:
         return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
 
     def part(self, x: slice, y: slice) -> "Distance":
-        """The distance on a part of the nodes."""
+        """The distance restricted to some of its nodes."""
         return Distance(self.x[x], self.y[y], self.height[y, x])
 
 
@@ -138,7 +140,7 @@ def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Dis
 
 
 def _continued(rows: Array) -> Array:
-    """One more row before and after, on the parabola through the three nearest."""
+    """The rows with one more at each end, extrapolated by the parabola through the three nearest rows."""
     first = 3.0 * (rows[0] - rows[1]) + rows[2]
     last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]
     return np.vstack([first, rows, last])

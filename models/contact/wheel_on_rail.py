@@ -40,7 +40,8 @@ ITERATIONS = 12
 
 @dataclass(frozen=True)
 class Track:
-    """gauge : between the rails (m), ``gauge_depth`` below their tops (m). inclination : of the rails (rad)."""
+    """Track geometry. gauge : between the rails (m), measured ``gauge_depth`` below their tops (m). inclination : of
+    the rails (rad)."""
 
     gauge: float = 1.435
     gauge_depth: float = 0.014
@@ -49,7 +50,8 @@ class Track:
 
 @dataclass(frozen=True)
 class Wheelset:
-    """radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping : line to back (m)."""
+    """Wheelset geometry. radius : at the taping line (m). back_to_back : between the flanges' backs (m). taping :
+    distance of the taping line from the back (m)."""
 
     radius: float = 0.46
     back_to_back: float = 1.360
@@ -63,7 +65,7 @@ class Wheelset:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where the wheelset is, seen from one side.
+    """Position and attitude of the wheelset, seen from one side.
 
     shift : towards this side's rail (m). yaw, roll : rad. fall : of the axle (m) below the height at which the taping
     line is level with the top of the rail.
@@ -103,18 +105,18 @@ class TouchingPlace:
 
 @dataclass(frozen=True, eq=False)
 class WheelAndRail:
-    """One wheel on one rail. rail : as it lies in the track, y from the middle of the track."""
+    """One wheel on one rail. rail : in its position in the track, y from the middle of the track."""
 
     wheel: ContactProfile
     rail: ContactProfile
     wheelset: Wheelset
 
     def centre(self, pose: Pose) -> Array:
-        """Middle of the axle in the track (m)."""
+        """Position of the middle of the axle in the track's coordinates (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
     def outline(self, pose: Pose) -> Array:
-        """Points (n, 3) of the wheel nearest to straight rails, in the track (m)."""
+        """Points (n, 3) of the wheel's surface nearest to straight rails, in the track's coordinates (m)."""
         y, radius = self.wheel.y, self.wheelset.radius + self.wheel.z
         lead = np.sin(pose.roll) * np.tan(pose.yaw)
         sine = -self.wheel.curve(y, 1) * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
@@ -139,7 +141,7 @@ class WheelAndRail:
         return points[over], self.rail.curve(points[over, 1]) - points[over, 2]
 
     def clearance(self, pose: Pose) -> float:
-        """Least vertical gap (m), between the points by a parabola."""
+        """Least vertical gap (m), refined between the points by a parabola."""
         gap = self.gaps(pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
         rise, bend = _parabola(gap, k)
@@ -147,7 +149,7 @@ class WheelAndRail:
 
 
 def _parabola(gap: Array, k: int) -> tuple[float, float]:
-    """Slope and curvature per step of the parabola through three gaps."""
+    """First and second derivative, per step, of the parabola through the gaps at k - 1, k, k + 1."""
     return (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
 
 
@@ -160,7 +162,8 @@ def wheel_on_rail(
     track: Track | None = None,
     wheelset: Wheelset | None = None,
 ) -> list[TouchingPlace]:
-    """Touching places of the right wheel, the one that touches first, others by their gap while this is below 0.2 mm.
+    """Touching places of the right wheel: first the one in contact, then others with vertical gaps below 0.2 mm in
+    ascending order.
 
     wheel, rail : profiles; the rail upright, ``track.inclination`` turns it (0 for one that is measured as it lies).
     lateral_shift : of the wheelset to the right (m). yaw : rad. For the left wheel give both with the other sign.
@@ -195,7 +198,8 @@ def rail_in_track(rail: ContactProfile, track: Track) -> ContactProfile:
 
 
 def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
-    """Point (3,) of the wheel's outline nearest to the rail, between the points by a parabola, in the track (m)."""
+    """Point (3,) of the wheel's outline nearest to the rail, refined between the points by a parabola, in the track's
+    coordinates (m)."""
     points, gap = side.gaps(pose)
     k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
     share = _parabola_minimum(gap, k)
@@ -203,13 +207,14 @@ def lowest_point(side: WheelAndRail, pose: Pose) -> Array:
 
 
 def _parabola_minimum(gap: Array, k: int) -> float:
-    """Where the parabola through three gaps is least, in steps from the one in the middle."""
+    """Offset, in steps from point k, at which the parabola through three gaps has its minimum."""
     rise, bend = _parabola(gap, k)
     return float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
 
 
 def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRail | None = None) -> Pose:
-    """The pose in which both wheels just touch; ``left``: the left side in a mirror where it is not as the right."""
+    """Pose of the wheelset in which both wheels just touch. ``left`` : the mirrored left side, if it differs from the
+    right one."""
     other = left or side
 
     def right_over_left(roll: float) -> float:
@@ -222,7 +227,7 @@ def touching_pose(side: WheelAndRail, shift: float, yaw: float, left: WheelAndRa
 
 
 def touches_of(side: WheelAndRail, pose: Pose) -> list[TouchingPlace]:
-    """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
+    """Places where a wheel touches the rail or nearly does: minima of the vertical gap, one between each two ridges."""
     points, gap = side.gaps(pose)
     touches = []
     for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
@@ -235,7 +240,7 @@ def touches_of(side: WheelAndRail, pose: Pose) -> list[TouchingPlace]:
 def _touching_place(
     side: WheelAndRail, pose: Pose, points: Array, gap: Array, indices: tuple[int, int, int]
 ) -> TouchingPlace:
-    """One touching place, where the parabola through three gaps is least, and the distance around it."""
+    """One touching place, at the minimum of the parabola through three gaps, with the undeformed distance around it."""
     first, k, last = indices
     share = _parabola_minimum(gap, k)
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
@@ -259,7 +264,8 @@ def _touching_place(
 def distance_over(
     side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, contour_limits: tuple[float, float]
 ) -> Distance:
-    """Distance over the plane that touches the rail at a place, between two ends along the rail's contour.
+    """Undeformed distance over the tangent plane at a contact point of the rail, between two ends along the rail's
+    contour.
 
     contact_point : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
     """
@@ -273,7 +279,8 @@ def distance_over(
 
 
 def _rail_heights(rail: ContactProfile, contact_point: Array, angle: float) -> tuple[Array, Array]:
-    """The rail over its tangent plane: s along it and n into the rail (m), where s ascends around the place."""
+    """Coordinates (m) of the rail relative to its tangent plane: s along it and n into the rail, where s ascends around
+    the place."""
     y, z = rail.y - contact_point[1], rail.z - contact_point[2]
     s, n = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
     backward, here = np.flatnonzero(np.diff(s) <= 1e-9), int(np.argmin(np.abs(s)))
@@ -283,7 +290,8 @@ def _rail_heights(rail: ContactProfile, contact_point: Array, angle: float) -> t
 
 
 def _wheel_heights(side: WheelAndRail, pose: Pose, contact_point: Array, angle: float, x: Array, s: Array) -> Array:
-    """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
+    """Heights (s, x) of the wheel over the tangent plane, by Newton's method on the condition that the distance to the
+    axle is the radius."""
     ahead, along, into = np.array(
         [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
     )

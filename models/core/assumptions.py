@@ -18,7 +18,8 @@ ALLOWED_TIME_SHARE = 0.00135
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Values of which mean and standard deviation (rows,) are known; ``rows`` tells them apart, as "at 20 m/s"."""
+    """Values known only by mean and standard deviation (rows,); ``rows`` holds a label for each, such as "at 20
+    m/s"."""
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -31,9 +32,9 @@ Watched = Mapping[str, np.ndarray | Gaussian]
 
 @dataclass(frozen=True)
 class Assumption:
-    """One thing that is taken for granted: that ``watched`` stays from ``least`` to ``most``, in ``unit``.
+    """One assumption: that the values of ``watched`` stay between ``least`` and ``most``, in ``unit``.
 
-    name : a few words; says : a sentence; remedy : what lifts it, such as the effect to name.
+    name : a few words; says : a sentence; remedy : what removes the assumption, such as an effect to name.
     """
 
     name: str
@@ -46,7 +47,7 @@ class Assumption:
 
     @property
     def allowed(self) -> str:
-        """The range in words."""
+        """Text on the allowed range."""
         low, high = f"at least {self.least:g}", f"at most {self.most:g}"
         if math.isinf(self.most):
             return f"{low} {self.unit}".rstrip()
@@ -55,7 +56,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class BrokenAssumption:
-    """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value.
+    """A violated assumption: ``where``, the share of time, the time of the first violation (s), and the worst value.
 
     law : by which the share is told where no values over time are known; the worst value then is three deviations off.
     """
@@ -73,11 +74,11 @@ class BrokenAssumption:
 
     @property
     def _worst(self) -> str:
-        """The worst value in four digits, without a power of ten up to a million, and its unit."""
+        """Text with the worst value in four digits and its unit; no power of ten below a million."""
         return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
 
     def brief(self) -> str:
-        """A few words for a figure."""
+        """Short text for a figure."""
         return f"assumption broken: {self.fact()}"
 
     def fact(self) -> str:
@@ -91,7 +92,7 @@ class BrokenAssumption:
         return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
-        """A sentence for readers."""
+        """A full sentence for readers who do not know the assumption."""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
             f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst} "
@@ -100,7 +101,8 @@ class BrokenAssumption:
 
 
 def broken(run: Result, assumption: Assumption) -> BrokenAssumption | None:
-    """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
+    """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
+    judged."""
     judged = [
         _longest_exceedance(run, assumption, where, values)
         if isinstance(values, Gaussian)
@@ -122,8 +124,8 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
 
 
 def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian) -> BrokenAssumption | None:
-    """Where a Gaussian lies beyond a limit for more than ALLOWED_TIME_SHARE of the time, by the row where that is for
-    longest."""
+    """The violation by the row whose normally distributed values exceed a limit for the largest share of time; None if
+    no share is above ALLOWED_TIME_SHARE."""
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -142,7 +144,7 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
 
 
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
-    """The result with what it assumes, and what of that it broke; its status says so, too."""
+    """The result with a list of its assumptions and of those that it violates; its status names violations, too."""
     listed = list(assumptions)
     breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
@@ -159,7 +161,8 @@ _NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambd
 
 @contextmanager
 def watching(note: Callable[[Result], None]) -> Iterator[None]:
-    """Tell ``note`` of every result that is judged inside; where watches are nested the inner one alone is told."""
+    """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
+    inner one is called."""
     before = _NOTED.set(note)
     try:
         yield
@@ -173,20 +176,21 @@ def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list
 
 
 def broken_of(run: Result) -> list[BrokenAssumption]:
-    """Assumptions that the run of a result broke, as the result lists them."""
+    """Violated assumptions that are stored in a result."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
     return [BrokenAssumption(**entry) for entry in said.get("broken", ())]
 
 
 def assumed_of(run: Result) -> list[str]:
-    """Assumptions that a result was judged by."""
+    """Assumptions against which a result was checked."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
     return list(said.get("assumed", ()))
 
 
 @contextmanager
 def breaches() -> Iterator[dict[str, BrokenAssumption]]:
-    """Assumptions that are broken by results which are judged inside: the worst of each by its name."""
+    """Context that collects the assumptions violated by the results checked inside: the worst violation of each, by
+    name."""
     worst: dict[str, BrokenAssumption] = {}
 
     def note(run: Result) -> None:

@@ -35,7 +35,7 @@ _HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
 
 
 class Line(NamedTuple):
-    """A line of the file: its number from 1, its text without the line end, the bytes where it begins and ends."""
+    """A line of the file: number from 1, text without the line end, and the bytes where it begins and ends."""
 
     number: int
     text: str
@@ -45,7 +45,7 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class Head:
-    """The headings of a table: the lines above the numbers.
+    """Headings of a table, and the lines around them up to the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
     left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
@@ -62,12 +62,12 @@ class Head:
     line: int
 
     def cells(self, line: Line) -> tuple[str, ...]:
-        """Cells of a line, as many as there are headings."""
+        """Cells of a line, cut to the number of headings."""
         return tuple((split_cells(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
 
     def groups(self) -> tuple[str, ...]:
-        """Group of every heading from the row above them, where it has as many cells; a cell that is empty carries on
-        the one before it. Nothing where there is no such row."""
+        """Group name of each heading, from the row above if it has as many cells. An empty cell repeats the one before
+        it. Empty if there is no such row."""
         above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
         if len(self.names) < 3 or len(trimmed(above)) < 2 or len(above) not in (len(self.names), self.width):
             return ()
@@ -78,14 +78,14 @@ class Head:
 
 
 def heading(text: str) -> tuple[str, str]:
-    """Name and unit of one heading; the unit is the last pair of brackets, empty where there is none."""
+    """Name and unit in one heading; the unit is in the last pair of brackets, and is empty if there are none."""
     match = _HEADING.fullmatch(text)
     name, unit = match.groups("") if match else (text, "")
     return name.strip(), unit.strip()
 
 
 def split_cells(text: str, separator: str) -> list[str]:
-    """Cells of a line, without quotes and spaces around them."""
+    """Cells of a line, stripped of quotes and surrounding spaces."""
     try:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])]
     except csv.Error:
@@ -93,19 +93,20 @@ def split_cells(text: str, separator: str) -> list[str]:
 
 
 def trimmed(cells: Sequence[str]) -> list[str]:
-    """Cells without those that are empty at the end."""
+    """Cells without the empty ones at the end."""
     used = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
     return list(cells[:used])
 
 
 def separator_line(text: str) -> str:
-    """Separator that a first line ``sep=;`` names; empty where it is no such line."""
+    """Separator given by a first line such as ``sep=;``; empty for any other line."""
     matched = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
     return matched[1] if matched else ""
 
 
 def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequence[str]) -> str:
-    """Decimal sign of cells, the first of which are in ``line_number``; InputError where commas have two meanings."""
+    """Decimal sign used in the cells, which begin in line ``line_number``; InputError where a comma can be read in two
+    ways."""
     commas, why = [cell for cell in cells if "," in cell], ""
     if not commas:
         return "."
@@ -127,8 +128,8 @@ def is_number(cell: str) -> bool:
 
 
 def find_head(lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
-    """Headings above numbers by every separator that makes sense of the first line that has such; none where no line
-    has."""
+    """One ``Head`` for each separator with which a line is headings above numbers; the first such line is used. Empty
+    if there is none."""
     heads = (
         [head for sign in separators if (head := _head(lines, i, is_known_heading, sign))] for i in range(len(lines))
     )
@@ -138,8 +139,8 @@ def find_head(lines: Sequence[Line], is_known_heading: Callable[[str], bool], se
 def find_headings(
     lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]
 ) -> list[Head]:
-    """The headings in the first line that has a known heading, whatever is beneath it: errors there are left to the
-    reader of the rows."""
+    """Headings in the first line with a known heading, whatever rows follow it. Errors in these rows are found when
+    they are read."""
     for i, line in enumerate(lines):
         parted = {sign: trimmed(split_cells(line.text, sign)) for sign in separators}
         heads = [
@@ -153,7 +154,7 @@ def find_headings(
 
 
 def _head(lines: Sequence[Line], i: int, is_known_heading: Callable[[str], bool], separator: str) -> Head | None:
-    """Headings in line ``i`` above a row of numbers; None where this is not so."""
+    """Headings in line ``i`` if a row of numbers follows; else None."""
     names = trimmed(split_cells(lines[i].text, separator))
     place = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
     if place is None or len(names) < 2 or any(is_number(name) or TIMED.fullmatch(name) for name in names):
@@ -172,8 +173,8 @@ def _head(lines: Sequence[Line], i: int, is_known_heading: Callable[[str], bool]
 
 
 def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
-    """The text of a table with commas between columns, decimal points and units in the headings, each line in its
-    place.
+    """Text of a table in plain form: commas between columns, decimal points and units in the headings. Every line keeps
+    its number.
 
     ``wanted`` are names of columns, by which the headings are known. Titles become comments; a separator that ends the
     lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the
@@ -189,7 +190,7 @@ def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
 
 
 def _rewritten(path: str | Path, lines: list[Line], header: Head) -> str:
-    """Text with the head and the rows in the plain form."""
+    """Text of the table with headings and rows in the plain form."""
     rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line :]}
     cells = [cell for row in rows.values() for cell in row]
     sign = decimal_sign(path, header.line + 1, header.separator, cells)
@@ -202,7 +203,7 @@ def _rewritten(path: str | Path, lines: list[Line], header: Head) -> str:
 
 
 def _headings(header: Head) -> list[str]:
-    """Headings with the units of the row beneath them, where there is one."""
+    """Headings, completed by the units in the row beneath them if there is one."""
     if len(header.between) != 1:
         return list(header.names)
     units = [cell.strip("[]() ") for cell in header.cells(header.between[0])]
@@ -210,7 +211,8 @@ def _headings(header: Head) -> list[str]:
 
 
 def _plain(cell: str, sign: str) -> str:
-    """A number with a decimal point; a mark for nothing measured as ``nan``; anything else as it is, less commas."""
+    """Cell text in plain form: a number with a decimal point, ``nan`` for a mark of missing data, other text without
+    commas."""
     if is_number(cell) and sign == ",":
         return cell.replace(",", ".")
     return "nan" if cell and MARKS.fullmatch(cell) else cell.replace(",", ";")

@@ -38,7 +38,8 @@ UNMOVED_DEVIATION, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Estimate:
-    """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
+    """Estimated error of a channel: ``error`` in its unit, ``share`` relative to its standard deviation, ``order`` of
+    convergence.
 
     step : longest step (s), or fewest cells, that would hold the share to GOAL; 0 where no step mends it. of : CELLS
     where it is of cells.
@@ -53,7 +54,7 @@ class Estimate:
 
     @property
     def warned(self) -> bool:
-        """Whether a reader must be warned."""
+        """Whether the error is so large that the user must be warned."""
         return not self.share <= WARNED
 
     def advice(self, step_unit: str) -> str:
@@ -64,20 +65,21 @@ class Estimate:
 
     @property
     def refused(self) -> bool:
-        """Whether the channel is no answer; what no step mends is told, and not refused."""
+        """Whether the error makes the channel useless. An error that no smaller step reduces gives a warning only."""
         return not self.share <= REFUSED and self.step != 0.0
 
 
 def size_of(values: np.ndarray) -> float:
-    """Size of a channel, to which its error is relative: the standard deviation over the first axis, or the size of
-    what is still."""
+    """Size of a channel, to which its error is related: its standard deviation along the first axis, or its magnitude
+    if it is constant."""
     largest = float(np.abs(values).max(initial=0.0))
     deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
     return deviation if deviation > UNMOVED_DEVIATION * largest else largest
 
 
 def observed_order(fine: float, coarse: float, declared: float) -> float:
-    """Order by two differences of neighbouring runs, from LEAST_ORDER to the declared one."""
+    """Order of convergence from the differences between successive runs, limited to LEAST_ORDER up to the declared
+    order."""
     if not (fine > 0.0 and coarse > 0.0 and math.isfinite(fine) and math.isfinite(coarse)):
         return declared if fine == 0.0 else LEAST_ORDER
     return float(np.clip(math.log2(coarse / fine), LEAST_ORDER, declared))
@@ -111,13 +113,14 @@ def _rms(values: np.ndarray) -> float:
 
 
 def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
-    """Rows of ``times`` (n,) that are nearest to the wanted ones (m,), both rising."""
+    """Indices of the times in ``times`` (n,) nearest to the wanted ones (m,); both must be ascending."""
     after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)
     return after - (wanted_times - times[after - 1] < times[after] - wanted_times)
 
 
 class Series(NamedTuple):
-    """Channels (n, ...) of a run by name, at its times (n,) in s; units of those that its result does not have."""
+    """Channels (n, ...) of a run by name, at its times (n,) in s, and units of the channels that the run's result does
+    not contain."""
 
     times: np.ndarray
     channels: Mapping[str, np.ndarray]
@@ -138,7 +141,7 @@ def estimated(
     growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Result:
-    """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
+    """The result with estimated errors of the channels in ``fine``, which are its own rows at steps of ``step`` (s).
 
     growth : by channel, least factor on
     what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
@@ -158,7 +161,7 @@ def by_steps(
     growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
-    """Errors of the channels of ``fine``, without units, and how they were told.
+    """Estimated errors of the channels in ``fine``, without units, and a text on how they were estimated.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
     be, half of it over a part tells. growth, sizes : as in ``estimated``.
@@ -187,7 +190,8 @@ def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> d
 def _by_half_steps(
     fine: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
-    """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
+    """Estimates from part of the run repeated with half the step. The error found there is scaled to the run's own step
+    by the order of the method, and to the rest of the run by its growth."""
     finer = rerun(0.5, FINE_WINDOW)
     slack = 1e-9 * finer.times[-1]
     part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
@@ -203,9 +207,11 @@ def _by_half_steps(
 
 
 def _later(gap: np.ndarray, values: np.ndarray) -> float:
-    """Rms of an error over a whole run by that over its first rows, of which ``gap`` (k, ...) is the difference.
+    """Ratio of the error's rms over the whole run to that over the first rows, in which ``gap`` (k, ...) is the
+    difference of two runs.
 
-    Errors go on to grow with the power of time that they have there, or as the channel (n, ...) gets rougher.
+    The error is assumed to keep growing with the power of time found there, or with the roughness of the channel (n,
+    ...).
     """
     if len(gap) < 4:
         return 1.0
@@ -218,16 +224,14 @@ def _later(gap: np.ndarray, values: np.ndarray) -> float:
 
 
 def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
-    """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
-    being that of the run."""
+    """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
     share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
 def _whole_divisor(minimum: float) -> int:
-    """Least whole number from ``minimum`` on whose part of a step is a short decimal, so that it divides what the step
-    divides."""
+    """Smallest number 2^i 5^j that is at least ``minimum``; a step divided by it stays a short decimal."""
     powers = (2**i * 5**j for i in range(30) for j in range(12))
     return min((number for number in powers if number >= minimum), default=1)
 
@@ -235,8 +239,8 @@ def _whole_divisor(minimum: float) -> int:
 def of_tolerance(
     run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
 ) -> Result:
-    """The result of an adaptive method with the errors of its channels, by a run whose tolerance is ``factor`` times
-    as large: its error is taken to be larger by the power FALL of that only, so that what is told is rather too large.
+    """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
+    times as large. The error is assumed to grow only with the power FALL of the tolerance, so that it is overestimated.
     ``sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
@@ -254,15 +258,15 @@ def of_tolerance(
 
 
 def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
-    """Estimate of the error that a grid of ``cells`` leaves; ``step`` is the number of cells, at most so many, for
-    GOAL."""
+    """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL, at most
+    ``maximum_cells``."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS)
 
 
 def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
-    """An error on top of another, as that of an input on top of that of the run which it drives.
+    """Sum of two errors, such as that of a run and that of the input which drives it.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
@@ -275,8 +279,8 @@ def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
 
 
 def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
-    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: of steps or
-    cells.
+    """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: unit of steps
+    or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
@@ -294,22 +298,22 @@ def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_uni
 
 
 def errors_of(run: Result) -> dict[str, Estimate]:
-    """Estimates that a result says, by channel; empty where none was made."""
+    """Estimates stored in a result, by channel; empty if no estimate was made."""
     said = json.loads(run.data.attrs.get("error", "{}"))
     return {name: Estimate(**values) for name, values in said.get("channels", {}).items()}
 
 
 def not_estimated(run: Result, why: str) -> Result:
-    """The result that says why no number stands for its error, such as a law whose switches do not repeat."""
+    """The result with a statement why its error is not estimated, such as a force law that switches differently in
+    every run."""
     run.data.attrs["error"] = json.dumps({"why": why})
     return run
 
 
 def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
-    """The result with what a theory itself leaves, beside what was said of its cells; ``method``: words that say
-    whence.
+    """The result with the error of the theory itself, stated beside that of the grid; ``method`` : text on its source.
 
-    No grid lessens it, so that it is neither warned of nor refused.
+    A finer grid does not reduce this error, so it leads to no warning and no refusal.
     """
     said = json.loads(run.data.attrs["error"])
     said["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
@@ -318,9 +322,9 @@ def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Re
 
 
 def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
-    """The result of an ensemble with the standard errors of its channels, of ``samples`` paths.
+    """The result of an ensemble with the standard errors of its channels, from ``samples`` paths.
 
-    Beside it stands what was said of the steps before.
+    The errors of the time step stay in the result as well.
     """
     said = json.loads(run.data.attrs["error"])
     said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
@@ -329,20 +333,21 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
 
 
 def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
-    """A standard error as an estimate; ``step`` is the number of samples that would hold it to WARNED."""
+    """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
+    WARNED."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
 
 def worst_of(run: Result) -> Estimate | None:
-    """The estimate of the largest share; None where none was made."""
+    """The estimate with the largest relative error in a result; None if there are no estimates."""
     return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
 
 
 def error_lines(run: Result) -> list[str]:
-    """Printed lines on a result's error: the worst channel of steps and of cells, the worst of both first, with a
-    warning and what to use where one is due; then what its theory and its sample leave."""
+    """Printed lines on a result's error. First the worst channels for the time step and for cells, the worse one first,
+    with a warning and advice if needed; then the errors of its theory and of its sample."""
     said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
     text = [f"error not estimated: {said['why']}"] if "why" in said else []
     shares = {name: estimate.share for name, estimate in sorted(told.items(), key=lambda entry: entry[1].share)}

@@ -33,7 +33,7 @@ class InputError(ValueError):
         super().__init__(f"{where}{_value_text(value)}: {allowed}{nearest(name, choices)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Parts from which the error is made again in another process."""
+        """Arguments for recreating the error in another process."""
         return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
 
 
@@ -47,7 +47,7 @@ def _value_text(value: Any) -> str:
 
 
 def nearest(name: object, choices: tuple[str, ...]) -> str:
-    """Phrase that lists the accepted names and offers the one most like ``name``."""
+    """Phrase that lists the accepted names and proposes the one most similar to ``name``."""
     if not choices:
         return ""
     listed, more = sorted(choices), ""
@@ -65,7 +65,7 @@ def suggestion(name: object, choices: tuple[str, ...]) -> str:
 
 
 def similar_file(path: Path) -> str:
-    """Phrase that offers the file of the same kind in the same folder whose name is most like that of ``path``."""
+    """Phrase that offers the file with the most similar name among those of the same kind in the folder of ``path``."""
     try:
         stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
     except OSError:
@@ -94,17 +94,17 @@ class RunFailed(RuntimeError):
         super().__init__(f"{engine}: {reason}{since}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Parts from which the error is made again in another process, with the recorded state."""
+        """Arguments for recreating the error in another process, with the recorded state."""
         return type(self), (self.engine, self.reason, self.time, self.state), vars(self)
 
 
 class Refused(InputError):
-    """A valid scene that needs something which the engine does not compute correctly."""
+    """A valid scene needs something that the engine does not compute correctly."""
 
     def __init__(self, engine: str, why: str, file: str = "") -> None:
         self.engine, self.why = engine, why
         super().__init__(file, f"engines.{engine}" if file else engine, None, why)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Parts from which the error is made again in another process."""
+        """Arguments for recreating the error in another process."""
         return type(self), (self.engine, self.why, self.file), vars(self)

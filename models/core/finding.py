@@ -31,7 +31,7 @@ class Finding:
 
 
 def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Findings as plain values, for JSON."""
+    """Findings as plain dicts, for JSON."""
     return [
         {"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
         for f in findings
@@ -39,13 +39,13 @@ def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 
 def lines(findings: Iterable[Finding]) -> list[str]:
-    """A line each, or for many of one kind, as plans and summaries print them."""
+    """Text of findings for plans and summaries: one line per finding, or fewer for many of the same kind."""
     return [f"  {f.weight:<10} {f.text}" for f in gathered(findings)]
 
 
 def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings; of more than LISTED_FINDINGS with the same check and weight only the worst, with the number of the
-    others."""
+    """The findings. If more than LISTED_FINDINGS share check and severity, only the worst is kept, with the number of
+    the others."""
     kinds: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         kinds.setdefault((finding.check, finding.weight), []).append(finding)
@@ -55,7 +55,7 @@ def gathered(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def _largest_finding(alike: list[Finding]) -> Finding:
-    """The one of the largest size, with the number of channels or places."""
+    """The finding with the largest size, with the number of channels or places concerned."""
     worst = max(alike, key=lambda finding: abs(finding.size or 0.0))
     names = {name for finding in alike for name in finding.signals or (finding.place,)}
     what = "channels" if worst.signals else "places"

@@ -12,7 +12,7 @@ MOVED_MODULES: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml"
 
 
 class OldModuleFinder(MetaPathFinder):
-    """Finder of imports by old module names, asked after all others."""
+    """Import finder that recognises old module names; Python asks it after all other finders."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> None:
         """Raise ModuleNotFoundError with the new name for an old one."""
@@ -21,6 +21,6 @@ class OldModuleFinder(MetaPathFinder):
 
 
 def tell_new_names() -> None:
-    """Have old names answered, once per process."""
+    """Register the finder of old module names, once per process."""
     if not any(isinstance(finder, OldModuleFinder) for finder in sys.meta_path):
         sys.meta_path.append(OldModuleFinder())

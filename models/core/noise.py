@@ -44,7 +44,7 @@ def normal_block(
 
 
 def _whole_number(name: str, value: int) -> int:
-    """A whole number of 64 bits."""
+    """The value, checked to be a whole number of at most 64 bits."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**64:
         raise InputError("", name, value, "must be a whole number from 0 to 2^64 - 1")
     return int(value)

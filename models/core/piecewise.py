@@ -7,7 +7,8 @@ from models.machine.compiled import njit
 
 @njit(cache=True)
 def evaluate(coefficients, period, start, step, count, derivatives):
-    """Values at start + i step, then first derivatives, then second: shape (count, columns (derivatives + 1)).
+    """Values of a piecewise polynomial at start + i step, then its first and second derivatives: shape (count, columns
+    (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
     the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
@@ -32,7 +33,8 @@ def evaluate(coefficients, period, start, step, count, derivatives):
 
 @njit(cache=True, nogil=True)
 def interpolate(values, index, fraction):
-    """Values (n, columns) the given parts of a period after the samples ``index``, linear up to the next sample."""
+    """Values (n, columns), linearly interpolated from each sample ``index`` by ``fraction`` of a period towards the
+    next sample."""
     rows, columns = values.shape
     out = np.empty((len(index), columns))
     for i in range(len(index)):

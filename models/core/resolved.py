@@ -21,7 +21,8 @@ NEGLIGIBLE_VELOCITY, ROUNDING = 1e-6, 1e-9
 
 
 def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
-    """Largest share of the velocities that two-step ways miss within a second, and the row where that second begins.
+    """Largest velocity error within one second, relative to the velocities, and the row where that second begins. The
+    error compares displacements over two steps with the integral of the rates.
 
     positions, rates (m, n) at every step (s); mass (n, n) or its diagonal (n,) weighs one coordinate against another.
     """
@@ -40,8 +41,8 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
 
 
 def missed_by_first_order(positions: np.ndarray, rates: np.ndarray, step: float, mass: np.ndarray) -> tuple[float, int]:
-    """``missed_velocity_share`` of a method of first order: the least of rates at their times, or in the middle of the
-    steps after or before them."""
+    """``missed_velocity_share`` for first-order methods: the least result when rates belong to the steps' ends, or to
+    the middle of the step after or before them."""
     middle = (rates[1:] + rates[:-1]) / 2.0
     ways = ((positions, rates), (positions[:-1], middle), (positions[1:], middle))
     return min(missed_velocity_share(places, velocities, step, mass) for places, velocities in ways)
@@ -50,7 +51,7 @@ def missed_by_first_order(positions: np.ndarray, rates: np.ndarray, step: float,
 def check_resolved(
     engine: str, times: np.ndarray, positions: np.ndarray, rates: np.ndarray, mass: np.ndarray, order: int = 2
 ) -> None:
-    """Raise RunFailed for a run whose steps were too long for its motion.
+    """Raise RunFailed if the steps of a run were too long to resolve its motion.
 
     times (m,) in s; order : of the method that went the steps; the others as in ``missed_velocity_share``.
     """

@@ -26,7 +26,7 @@ _version = cache(version)
 
 
 class Channel(NamedTuple):
-    """An array with the names of its axes (one name, or one for each), its unit and its meaning."""
+    """An array with the names of its axes (one name, or one per axis), its unit and its meaning."""
 
     axes: str | tuple[str, ...]
     values: Any
@@ -34,7 +34,7 @@ class Channel(NamedTuple):
     meaning: str = ""
 
     def labelled(self) -> tuple[Any, ...]:
-        """Dimensions, values and attributes of the channel, as xarray takes them."""
+        """Dimensions, values and attributes of the channel, in the form that xarray expects."""
         return self.axes, self.values, {"units": self.unit, "long_name": self.meaning}
 
 
@@ -70,17 +70,18 @@ class Result:
         return json.loads(self.data.attrs["counts"])
 
     def every(self, spacing: float) -> "Result":
-        """A copy of the result with rows ``spacing`` (s) apart; all rows where they are that far apart already."""
+        """A copy of the result with rows ``spacing`` (s) apart; all rows if they are already at least that far
+        apart."""
         step = max(1, round(spacing / float(self.times[1] - self.times[0])))
         return replace(self, data=self.data.isel(time=slice(None, None, step)))
 
     @property
     def seconds(self) -> float:
-        """Seconds of the march; of a result that was read from a file there are none."""
+        """Computing time of the run (s); a result that was read from a file does not have it."""
         return float(self.data.attrs["seconds"])
 
     def save(self, path: Path | str) -> None:
-        """Write netCDF without the seconds: the same run gives the same bytes.
+        """Write a netCDF file without the computing time, so that the same run gives identical bytes.
 
         It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
         """
@@ -114,7 +115,7 @@ def result(
     detail: Any = None,
     **attributes: Any,
 ) -> Result:
-    """The result of a scene's run.
+    """``Result`` of a scene's run.
 
     axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
     doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text.
@@ -144,7 +145,7 @@ def result(
 
 
 def join_results(results: Mapping[str, Result], axis: str) -> Result:
-    """Results with the same channels as one, along a new first axis whose places have the mapping's names.
+    """Results with the same channels joined into one, along a new first axis labelled with the names in the mapping.
 
     The attributes are those of the first; counts, seconds, errors and assumptions stand by name.
     """
@@ -161,8 +162,8 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
 
 
 def tabulated(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
-    """A table as a result: a channel per column of its rows, along ``axis``; seconds are left out, as they never
-    repeat.
+    """A table as a ``Result``: one channel per column along ``axis``. Columns with computing times are left out, since
+    they never repeat.
 
     Values are numbers, text, or None for no number; a name's unit is what it has in brackets, as "heave [m]".
     """
@@ -204,7 +205,7 @@ def provenance(command: str = "") -> dict[str, Any]:
 
 @cache
 def _commit() -> str:
-    """Commit of the checkout that runs, with a mark if it was changed since."""
+    """Commit of the checkout that runs, marked if files were changed since."""
     asked = partial(subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True)
     try:
         commit, changes = (

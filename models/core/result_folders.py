@@ -16,7 +16,7 @@ RESULTS = Path("results")
 
 
 def new_folder(requested_folder: Path | None, name: str) -> Path:
-    """The folder that the user names, if it is empty, or the first free one under ``results/``.
+    """The folder that the user named, which must be empty, or the first unused one under ``results/``.
 
     Raises InputError if the named folder holds anything or cannot be made. Two runs at the same time never
     get the same folder: it is made, or its first file is, in one step that only one of them can take.
@@ -36,7 +36,7 @@ def new_folder(requested_folder: Path | None, name: str) -> Path:
 
 
 def resumed_folder(requested_folder: Path, blocks: str) -> Path:
-    """The folder of an earlier run, with finished work in its folder ``blocks`` or nothing yet; else InputError.
+    """The folder of an earlier run, which has no results yet except finished work in ``blocks``; else InputError.
 
     What the run left of files when it was killed is removed.
     """
@@ -49,7 +49,7 @@ def resumed_folder(requested_folder: Path, blocks: str) -> Path:
 
 
 def _take_folder(folder: Path) -> bool:
-    """Put the command into the folder as its first file; False if another run was faster."""
+    """Claim the folder by writing the command into it as its first file; False if another run did so before."""
     try:
         with (folder / COMMAND).open("x", encoding="utf-8", errors="backslashreplace") as file:
             file.write(" ".join(sys.argv) + "\n")
@@ -63,7 +63,7 @@ def _take_folder(folder: Path) -> bool:
 
 
 def drop_if_empty(folder: Path) -> None:
-    """Leave no trace of a run that saved nothing."""
+    """Remove the folder of a run that saved nothing."""
     with suppress(OSError):
         if [path.name for path in folder.iterdir()] == [COMMAND]:
             (folder / COMMAND).unlink()
@@ -79,7 +79,7 @@ def _candidates(name: str) -> Iterator[Path]:
 
 
 def _make_folder(path: Path) -> bool:
-    """Make a folder; False if it is there already."""
+    """Create a folder; False if it exists already."""
     try:
         path.mkdir(parents=True)
     except FileExistsError:
@@ -90,7 +90,7 @@ def _make_folder(path: Path) -> bool:
 
 
 def _unwritable_folder(folder: Path, reason: str, error: OSError) -> Exception:
-    """A full disk is no mistake of what the user wrote."""
+    """Error for a folder that cannot be written; a full disk is not reported as a mistake of the user."""
     return (
         error
         if error.errno in DISK_FULL_ERRORS

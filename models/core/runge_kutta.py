@@ -14,7 +14,8 @@ STAGES = 4
 
 
 def step_on(rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float) -> np.ndarray:
-    """The state after a step (s), by its rate at a time (s) and a state, which is asked at 0, 1/2, 1/2 and 1 step."""
+    """State after one classical Runge-Kutta step (s). ``rate`` gives the derivative at a time (s) and state; it is
+    evaluated at 0, 1/2, 1/2 and 1 step."""
     half = 0.5 * step
     first = rate(time, state)
     second = rate(time + half, state + half * first)

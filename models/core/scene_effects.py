@@ -34,7 +34,7 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a system's table of effects: one that a key of the system's own tables names.
+    """An entry in a system's table of effects, for an effect that is named by a key of the system's own tables.
 
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
     adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
@@ -89,7 +89,7 @@ class Entry:
 
 
 class Effect:
-    """An effect as its file or its line of the table gives it; what it has not of these is as here.
+    """An effect as defined by its file or its table entry; attributes missing there have the defaults given here.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Effect:
 
 
 def _of_entry(entry: Entry) -> Effect:
-    """An effect of the table, with the names that an effect's file has."""
+    """An ``Effect`` made from a table entry, with the attribute names that an effect's own file would use."""
     said = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
     known = {key.upper(): getattr(entry, key) for key in said}
     known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
@@ -124,12 +124,12 @@ def _of_entry(entry: Entry) -> Effect:
 
 
 def names_of(system: str) -> tuple[str, ...]:
-    """All effects that scenes of a system may have; none is imported."""
+    """Names of all effects that scenes of a system may have, found without importing them."""
     return tuple(sorted({*_files(system), *_table(system)}))
 
 
 def _table(system: str) -> Mapping[str, Entry]:
-    """The table of effects of a system; empty where all of them have files."""
+    """Entries of a system's table of effects; empty if all its effects are in files."""
     package = SYSTEMS[system].effects
     return getattr(import_module(package), "TABLE", {}) if package else {}
 
@@ -141,7 +141,7 @@ def _files(system: str) -> dict[str, Path]:
 
 
 def listing(system: str) -> dict[str, str]:
-    """First sentence of every effect of a system, read and not imported."""
+    """First sentence about each effect of a system, read from its text without importing it."""
     says = {name: _first_sentence(file) for name, file in _files(system).items()}
     says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
     return dict(sorted(says.items()))
@@ -156,7 +156,8 @@ def _first_sentence(file: Path) -> str:
 
 
 def module_of(system: str, name: str) -> Any:
-    """``Effect`` of a name; any other attribute is its file's own. Raises InputError for a file that is none."""
+    """The ``Effect`` with a name, from the system's table or from the effect's own file. Raises InputError for an
+    unknown name, or a file that lacks something."""
     if entry := _table(system).get(name):
         return _of_entry(entry)
     try:
@@ -176,14 +177,14 @@ def module_of(system: str, name: str) -> Any:
 
 
 def named_effects(scene: Any) -> tuple[str, ...]:
-    """Effects that a scene names; none that it could name by a table alone is imported to know it."""
+    """Effects that a scene names; effects that only a table can name are not imported for this."""
     there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
     there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
     return tuple(sorted(there))
 
 
 def _names(scene: Any, file: Path) -> bool:
-    """Whether a scene names the effect of a file by its system's own tables."""
+    """Whether the scene's system tables contain the key that names the effect in this file."""
     return _is_in_own_tables(file) and module_of(scene.system, file.stem).named(scene)
 
 
@@ -201,17 +202,20 @@ def tables_of(scene: Any) -> Mapping[str, Any]:
 
 @cache
 def _is_in_own_tables(file: Path) -> bool:
-    """Whether an effect is named by its system's own tables, as its file says, read and not imported."""
+    """Whether a key in the system's own tables names the effect; found by reading the effect's file, without importing
+    it."""
     return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
 
 
 def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
-    """Parameters of every table [effects.NAME]; raises InputError for what is no effect or has another place."""
+    """Parameters of every table [effects.NAME]; raises InputError for an unknown effect, or for one that another key
+    names."""
     return {name: _read(name, values, system, file) for name, values in tables.items()}
 
 
 def with_own(scene: Any) -> Any:
-    """The scene with its tables [effects.NAME] read; refuses what is no effect, and what cannot be together."""
+    """The scene with its tables [effects.NAME] read and checked; refuses unknown effects and effects that exclude each
+    other."""
     extended_scene = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
     if extended_scene.effects:
         check(extended_scene)
@@ -219,7 +223,7 @@ def with_own(scene: Any) -> Any:
 
 
 def extended(system_object: Any, scene: Any) -> Any:
-    """The object that a system built of a scene, extended by the scene's tables [effects.NAME]."""
+    """The object that a system built from a scene, extended by the effects in the tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
         system_object = _extend(name, module_of(scene.system, name), system_object, table)
     return system_object
@@ -251,12 +255,12 @@ def _read(name: str, values: Any, system: str, file: str) -> Any:
 
 
 def check(scene: Any) -> None:
-    """Refuse effects that cannot be together, with the remedy."""
+    """Refuse effects that exclude each other or lack an effect that they need; the message gives the remedy."""
     legal(named_effects(scene), scene)
 
 
 def legal(present: Iterable[str], scene: Any) -> None:
-    """Check that effects of a scene may stand together, of names that are known to exist."""
+    """Check that effects of a scene, given by existing names, are allowed together."""
     present = tuple(present)
     for name in present:
         module = module_of(scene.system, name)
@@ -281,30 +285,31 @@ def legal(present: Iterable[str], scene: Any) -> None:
 
 
 def _what_to_drop(scene: Any, name: str, present: tuple[str, ...]) -> str:
-    """Phrase on what must be dropped for an effect's sake."""
+    """Phrase on the effects that must be dropped so that the effect ``name`` can be added."""
     clash = [other for other in module_of(scene.system, name).EXCLUDES if other in present]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
 def _key_of_effect(module: Any, name: str) -> str:
-    """The key that names an effect."""
+    """Key in the scene that names an effect."""
     return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
 
 
 def _table_of_effect(scene: Any, name: str) -> str:
-    """Where an effect is named that has no table of its name."""
+    """Phrase on the key that names an effect, if this is not the effect's own name."""
     place = _key_of_effect(module_of(scene.system, name), name).removeprefix("effects.")
     return "" if place == name else f"; {name!r} is named by {place}"
 
 
 def own_table(scene: Any) -> Table:
-    """The scene's file as nested tables that may be edited, without defaults."""
+    """The scene's file as nested, editable tables, without default values."""
     table: Table = deepcopy(scene.model_dump(exclude_unset=True))
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
 def without(scene: Any, *left_out: str) -> Any:
-    """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
+    """The scene without the given effects; raises InputError if one cannot be left out, or if another effect needs
+    it."""
     table = own_table(scene)
     for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
@@ -326,12 +331,14 @@ def without(scene: Any, *left_out: str) -> Any:
 
 
 def _depth(name: str, system: str) -> int:
-    """Length of the longest chain of effects that need each other; an effect leaves before those that it needs."""
+    """Length of the longest chain of needed effects that starts at ``name``. Effects are left out before the effects
+    that they need."""
     return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
 def with_effects(scene: Any, *more: str) -> Any:
-    """The scene with these effects at their usual values; raises InputError where one cannot be, or not so."""
+    """The scene with the given effects at their usual values; raises InputError if one cannot be added, or not with
+    these values."""
     table = own_table(scene)
     for name in more:
         _put_in(table, name, scene)
@@ -339,7 +346,7 @@ def with_effects(scene: Any, *more: str) -> Any:
 
 
 def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
-    """The scene, once it is known that it names each of these, or none of them."""
+    """The scene, after a check that it names all these effects (``wanted``), or none of them."""
     there = named_effects(scene)
     for name in effects:
         if (name in there) is not wanted:
@@ -363,14 +370,14 @@ def _put_in(table: Table, name: str, scene: Any) -> None:
 
 
 def rebuilt(table: Table, scene: Any) -> Any:
-    """The scene of an edited table, checked."""
+    """The scene made from an edited table, after all checks."""
     changed_scene = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
     check(changed_scene)
     return changed_scene
 
 
 def lines(scene: Any, width: int = 10) -> list[str]:
-    """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
+    """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
     said = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
     return [*there, f"  {'absent':<{width}} {', '.join(absent_effects(scene)) or 'nothing'} (not computed)"]

@@ -47,7 +47,8 @@ class SceneFile(Strict):
         return self.model_dump(exclude_none=True)
 
     def check_choice(self) -> None:
-        """Quantities and a tolerance belong to a choice of effects, and to nothing else."""
+        """Require quantities and a tolerance where the scene lets its effects be chosen automatically; refuse them
+        elsewhere."""
         given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
         for key, value in given.items():
             if self.study == self.CHOOSING and value is None:
@@ -58,7 +59,7 @@ class SceneFile(Strict):
                 raise InputError(self.file, key, value, allowed)
 
     def path(self, name: str, place: str = "") -> Path:
-        """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
+        """Path of a file that the scene names at ``place``: in the scene's folder, or else in the working folder."""
         return existing(name, Path(self.folder), self.file, place)
 
 
@@ -86,7 +87,7 @@ AUTO = "auto"
 
 
 def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
-    """The table with ``effects = "auto"`` as the study that makes the choice."""
+    """The table of a scene with ``effects = "auto"``, rewritten as the study that chooses the effects."""
     plain = dict(table)
     if plain.get("effects") == AUTO:
         del plain["effects"]
@@ -151,7 +152,7 @@ _WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 
 
 def _apply(table: dict[str, Any], change: str) -> None:
-    """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
+    """Set one nested key from KEY.KEY=VALUE; the value is parsed as TOML, and is text if that fails."""
     key, equals, text = (part.strip() for part in change.partition("="))
     if not equals or not all(key.split(".")):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
@@ -160,7 +161,7 @@ def _apply(table: dict[str, Any], change: str) -> None:
 
 
 def set_key(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set one nested key, as "run.step" or "manoeuvres.0.speed", to a plain value; None takes the key out.
+    """Set one nested key, such as "run.step" or "manoeuvres.0.speed", to a plain value; None removes the key.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
     """
@@ -176,7 +177,7 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
-    """The table or list that holds a nested key, made where there is none, and the key's place in it.
+    """The table or list that holds a nested key, created if missing, and the key or index within it.
 
     value, file : what a message shows as offending, and where it was written.
     """
@@ -190,14 +191,14 @@ def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tup
 
 
 def _entry(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
-    """Place in a list, counted from 0 as in messages; written : file, key and value of the change."""
+    """Index in a list from its text, counted from 0 as in messages; written : file, key and value of the change."""
     if not (number.isdecimal() and int(number) < len(listed)):
         raise InputError(*written, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
     return int(number)
 
 
 def _value(text: str) -> Any:
-    """A value as in a scene file; text needs no quotes."""
+    """Value parsed as in a scene file; text may stand without quotes."""
     for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
         try:
             parsed = tomllib.loads(f"x = {written}")
@@ -212,5 +213,5 @@ BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]
 
 
 def _with_digits(number: re.Match) -> str:
-    """The number with a digit on both sides of its decimal point."""
+    """The number as text, with at least one digit on both sides of the decimal point."""
     return f"{number[1] or '0'}.{number[2] or '0'}"

@@ -20,7 +20,7 @@ SNAP = 1e-6
 
 
 class Signal(Protocol):
-    """Protocol of an engine's input signal."""
+    """Protocol of an input signal of an engine: a function of time with one or more channels."""
 
     @property
     def channels(self) -> int:
@@ -34,12 +34,12 @@ class Signal(Protocol):
 
     @property
     def held(self) -> bool:
-        """True if it is constant over each period."""
+        """Whether the signal is constant over each sampling period."""
         ...
 
     @property
     def resolution(self) -> float:
-        """Longest step (s) that an adaptive solver may take without stepping over something."""
+        """Longest step (s) with which an adaptive solver does not miss a feature of the signal."""
         ...
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
@@ -98,7 +98,8 @@ class Sampled:
         return interpolate(self.values, index, part)
 
     def at(self, time: float) -> np.ndarray:
-        """Values at one time (s), shape (channels,): the bits of ``sample``, by scalars, as solvers ask one by one."""
+        """Values at one time (s), shape (channels,), identical to those of ``sample`` but faster for the single times
+        that solvers need."""
         position, last = time / self.period, len(self.values) - 1
         nearest = round(position)
         snapped = nearest if abs(position - nearest) < SNAP else position
@@ -113,9 +114,8 @@ class Sampled:
 
 @lru_cache(maxsize=2)
 def _placed(start: float, step: float, count: int, period: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the sample at or before each time start + i step, and the part of the period after it; the same for
-    every path of an ensemble.
-    """
+    """Index of the sample at or before each time start + i step, and the fraction of a period after it; the same for
+    all paths of an ensemble."""
     position = (start + step * np.arange(count)) / period
     nearest = np.rint(position)
     snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
@@ -179,12 +179,13 @@ class Smooth:
         return self.sample(time, self.period, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:
-        """Times at which a solver must stop: none for a solver of moderate order."""
+        """Times at which a solver must restart: none, because the signal is smooth enough for solvers of moderate
+        order."""
         return np.empty(0)
 
 
 def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
-    """Signal from uniform samples, shape (n, channels), by the rule that a scene declares.
+    """Signal from uniform samples, shape (n, channels), interpolated by the rule that a scene names.
 
     Raises InputError for a period or a rule that is none, and for fewer samples than the rule needs: 4, or 1 if held
     or linear.
@@ -203,13 +204,13 @@ def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> 
 
 @dataclass(frozen=True)
 class Stacked:
-    """Signals side by side, as one."""
+    """Several signals combined into one, whose channels follow one another."""
 
     parts: tuple[Signal, ...]
 
     @property
     def channels(self) -> int:
-        """Number of columns of all parts."""
+        """Total number of channels of the combined signals."""
         return sum(part.channels for part in self.parts)
 
     @property
@@ -224,15 +225,15 @@ class Stacked:
 
     @property
     def resolution(self) -> float:
-        """The finest one of all parts (s)."""
+        """The shortest resolution (s) among the combined signals."""
         return min(part.resolution for part in self.parts)
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values of all parts at start + i step, shape (count, channels)."""
+        """Values of all combined signals at start + i step, shape (count, channels)."""
         return np.hstack([part.sample(start, step, count) for part in self.parts])
 
     def at(self, time: float) -> np.ndarray:
-        """Values of all parts at one time (s), shape (channels,)."""
+        """Values of all combined signals at one time (s), shape (channels,)."""
         return np.concatenate([part.at(time) for part in self.parts])
 
     def knots(self, duration: float) -> np.ndarray:

@@ -13,8 +13,8 @@ PERIODS = 1.0
 
 
 def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
-    """Samples (n, columns) through a Butterworth low-pass forward and backward: no delay, half the amplitude at
-    ``bandwidth`` (Hz), an eighth order in all.
+    """Samples (n, columns) filtered by a Butterworth low-pass forward and backward: no delay, half the amplitude at
+    ``bandwidth`` (Hz), order eight in total.
 
     Beyond the ends the samples go on point-symmetrically, so that the first and the last one keep their values.
     InputError for a bandwidth that is not in the samples, or so low that what goes on beyond the ends is all it leaves.

@@ -16,7 +16,7 @@ class Speeds(Strict):
     values: list[float] = Field(default_factory=list, description="speeds in m/s instead")
 
     def all(self) -> np.ndarray:
-        """All speeds, m/s."""
+        """All speeds, m/s, from the range or from the list."""
         return np.array(self.values) if self.values else np.linspace(self.start, self.stop, self.count)  # type: ignore[arg-type]
 
 

@@ -20,7 +20,7 @@ Query = Literal["mass", "size", "inertia", "strut", "load", "stiffness", "freque
 
 
 def accepted() -> Any:
-    """Field of the queries about a vehicle that its user has seen, and means so."""
+    """Model field for the queries about a vehicle that its user has seen and confirmed."""
     return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
 
 
@@ -29,7 +29,8 @@ LARGEST_QUANTITY = 1e15
 
 
 def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
-    """Field of a physical quantity in SI: positive, or from zero on, or of either sign, and not beyond all measure."""
+    """Model field for a physical quantity in SI: positive, or non-negative, or of either sign, and of plausible
+    magnitude."""
     above, least = (None, -LARGEST_QUANTITY) if signed else (None, 0) if zero else (0, None)
     return Field(
         default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST_QUANTITY
@@ -53,7 +54,7 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
 
 
 def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
-    """One error with all faults that pydantic listed."""
+    """One InputError from all faults that pydantic listed."""
     first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]
@@ -72,7 +73,7 @@ def _dotted(place: str, keys: tuple[str, ...]) -> str:
 
 
 def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
-    """The table that holds the last key, None where no table of ours does."""
+    """The model class of the table that holds the last key; None if no class of the project describes it."""
     parents = iter(keys[:-1])
     for key in parents:
         field = model.model_fields.get(key)
@@ -131,7 +132,7 @@ ERROR_SENTENCES = {
 
 
 def _facts(field: FieldInfo | None) -> str:
-    """Unit and meaning of a key, in brackets."""
+    """Text with unit and meaning of a key, in brackets."""
     if field is None:
         return ""
     extra = field.json_schema_extra

@@ -26,7 +26,7 @@ DEFAULT_SYSTEM = "pitch-plane"
 
 @dataclass(frozen=True)
 class System:
-    """One system, by the name of its package and its folder."""
+    """One system, identified by the name of its package and its folder."""
 
     package: str
     folder: Path
@@ -54,7 +54,7 @@ class System:
 
     @property
     def on_request(self) -> tuple[str, ...]:
-        """Further implementations that run where ``--engine`` names them, and not with all."""
+        """Further implementations that run only if ``--engine`` names them, not with all."""
         engines: tuple[str, ...] = getattr(import_module(self.package), "ON_REQUEST", ())
         return engines
 
@@ -70,7 +70,7 @@ SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
 
 
 def modules_of(package: str) -> dict[str, str]:
-    """Modules of a package by the names of systems that they bear; none is imported."""
+    """Modules of a package by system name, without importing them."""
     names = [module.name for module in iter_modules(import_module(package).__path__)]
     return {name.replace("_", "-"): f"{package}.{name}" for name in names}
 

@@ -99,7 +99,7 @@ def read_table(
 
 
 def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
-    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
+    """Write columns name -> (unit, values) with all digits, so that reading returns identical numbers."""
     names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
     line = ",".join(["%.17g"] * len(names)) + "\n"
     rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
@@ -107,7 +107,7 @@ def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]])
 
 
 def whole_text(path: str | Path) -> str:
-    """Whole text of a file; whatever prevents reading it is the user's to repair."""
+    """Whole text of a file; InputError for anything that prevents reading it."""
     try:
         data = Path(path).read_bytes()
         return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
@@ -118,7 +118,7 @@ def whole_text(path: str | Path) -> str:
 
 
 def _is_plain(text: str, columns: Columns) -> bool:
-    """Whether the first line of a text is one of headings with units, and no cell is in quotes."""
+    """Whether the first line of a text has known headings with units, separated by commas, and no cell is quoted."""
     first = next((line for line in text[:HEAD].split("\n") if line.strip() and not line.startswith("#")), "")
     names = [cell.partition("[")[0].strip() for cell in first.split(",")]
     strange = '"' in text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
@@ -127,7 +127,7 @@ def _is_plain(text: str, columns: Columns) -> bool:
 
 @lru_cache(CACHED_TEXTS)
 def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
-    """Numbered header line and numbered rows, without comments and empty lines."""
+    """Header line and rows, with line numbers, without comments and empty lines."""
     lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
@@ -149,9 +149,11 @@ def has_line_end(path: str | Path) -> bool:
 
 
 def _cut_off(lines: list[str]) -> bool:
-    """Whether a last line without a line end lacks a cell or digits, or leaps further than any of the last rows.
+    """Whether a last line without a line end is incomplete: it lacks a cell or digits, or its value jumps more than in
+    the rows before.
 
-    A whole number has no fewer digits before the point, after it and in its exponent than all other rows have.
+    A number counts as complete if it has as many digits before the point, after it and in the exponent as every other
+    row has at least.
     """
     *before, last = [line.rpartition(",") for line in lines]
     if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 3:
@@ -182,7 +184,7 @@ def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tup
 
 
 def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
-    """Name and factor to SI of one heading such as ``left [mm]``."""
+    """Name and factor to SI of one column heading, such as ``left [mm]``."""
     match = _HEADING.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
     if name not in columns:
@@ -197,7 +199,7 @@ def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple
 
 
 def _header_wanted(columns: Columns) -> str:
-    """Return the wanted header, with the first unit of each column."""
+    """The header that the file should have, with the first accepted unit of each column."""
     return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
 
 
@@ -228,7 +230,7 @@ def _row(
 
 
 def number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
-    """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
+    """One finite number; Python's extensions (1_000, non-Latin digits) do not count as numbers."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
@@ -285,7 +287,7 @@ def _opened(path: Path) -> TextIO:
 
 
 def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
-    """The set of columns that shares most names with the header."""
+    """The set of columns that has most names in common with the header."""
     in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
@@ -307,7 +309,7 @@ def _block(
 
 
 def _rows_at_once(block: list[tuple[int, str]], width: int) -> np.ndarray | None:
-    """All rows at once, where none of them needs a closer look."""
+    """All rows parsed in one call; None if some row needs to be parsed by itself."""
     rows = [text for _, text in block]
     if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):
         return None

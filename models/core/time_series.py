@@ -44,8 +44,8 @@ def other_unit(lasts: float, needed: float) -> str:
 
 
 def sparse(count: int, period: float, needed: float, needed_period: float = WHEEL_SAMPLE_TIME) -> str:
-    """Sentence on so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
-    ``needed_period`` (s) for what moves: their times may be of another unit; "" of others."""
+    """Warning that nearly all of ``count`` samples, ``period`` (s) apart, lie beyond the needed time (s), and are too
+    far apart to resolve the motion (``needed_period``, s): their times may be in another unit. "" otherwise."""
     lasts = period * (count - 1)
     if count < MANY_SAMPLES or lasts < SHORT_TIME_SHARE * needed or period < needed_period:
         return ""
@@ -58,7 +58,7 @@ def sparse(count: int, period: float, needed: float, needed_period: float = WHEE
 
 
 def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
-    """Refuse what exporters write where they have no value."""
+    """Refuse the special numbers that some exporters write for missing values."""
     marks = np.flatnonzero(np.abs(values) > MARK)
     if len(marks):
         raise InputError(
@@ -72,7 +72,7 @@ def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarr
 
 
 def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
-    """Refuse a clock that jitters or leaves something out, at the first row where it shows."""
+    """Refuse times with jitter or missing samples, at the first row where this shows."""
     slack = 1e-6 * period + 1e-12 * time[-1]
     if np.abs(time - period * np.arange(len(time))).max() <= slack:
         return
@@ -88,6 +88,6 @@ def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
 
 
 def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
-    """Write columns name -> (unit, values), shape (n,) each, beside their times."""
+    """Write columns name -> (unit, values), shape (n,) each, with a column of times."""
     count = len(next(iter(columns.values()))[1])
     write_table(path, {"time": ("s", period * np.arange(count)), **columns})

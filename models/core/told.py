@@ -17,7 +17,7 @@ Results = Mapping[str, Result]
 
 
 def lines(results: Results) -> list[str]:
-    """Lines for the screen: errors first, then broken assumptions, each once with the names of those that broke it."""
+    """Lines for the screen: errors first, then broken assumptions, each listed once with the results that broke it."""
     return [*_errors(results), *(f"  {names}: {breach.line()}" for names, breach in breaches(results))]
 
 
@@ -50,7 +50,8 @@ def _list_of_few(names: list[str]) -> str:
 
 
 def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
-    """Broken assumptions, the worst of each name over all results, with the names of the results that broke it."""
+    """Broken assumptions: for each name the worst violation over all results, and the names of the results that broke
+    it."""
     where: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
     for name, run in results.items():
@@ -62,7 +63,7 @@ def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
 
 
 def remarks(results: Results) -> list[str]:
-    """Short lines for figures: warnings of the error, and broken assumptions."""
+    """Short lines for figures: warnings about errors, and broken assumptions."""
     steps = [
         f"{name}: {error_lines(run)[0]}"
         for name, run in results.items()
@@ -72,7 +73,8 @@ def remarks(results: Results) -> list[str]:
 
 
 def gathered(joined: Result, parts: Results) -> Result:
-    """A result that joins others, with what each of them says of its error and all assumptions that any broke."""
+    """A result that joins other results, with the errors that each of them states and all assumptions that any of them
+    broke."""
     said = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
     first = next(iter(said.values()))
     channels = {
@@ -92,7 +94,8 @@ def gathered(joined: Result, parts: Results) -> Result:
 
 
 def inherited(derived: Result, results: Results, method: str) -> Result:
-    """A derived result with the errors of its source results, ``method`` they add, and the assumptions that they broke.
+    """A result derived from others, with the errors of the sources and the assumptions that they broke; ``method`` :
+    text on how errors carry over.
 
     Without estimates in the results it has none.
     """
@@ -107,7 +110,7 @@ def inherited(derived: Result, results: Results, method: str) -> Result:
 
 
 def as_json(results: Results) -> dict[str, Any]:
-    """The "errors" and "assumptions" of a summary: what each result says of itself; what is no number is None."""
+    """Entries "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
     return {
         "errors": {name: _plain(run, "error") for name, run in results.items()},
         "assumptions": {
@@ -123,7 +126,7 @@ def summarised(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _plain(run: Result, key: str) -> dict[str, Any]:
-    """An attribute without NaN and infinity, which JSON does not have."""
+    """Attribute of a result, parsed from JSON, with None in place of NaN and infinity."""
     said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
     return said
 
@@ -133,12 +136,12 @@ DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
 
 
 def attributes(results: Results) -> dict[str, dict[str, str]]:
-    """Attributes of results without their channels, for JSON; ``speaking`` reads them."""
+    """Attributes of results, without their channels, for JSON; ``speaking`` is the inverse."""
     return {name: {key: run.data.attrs[key] for key in DOUBT_ATTRIBUTES} for name, run in results.items()}
 
 
 def speaking(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
-    """Results without channels that say the same."""
+    """Results without channels that have the given attributes; inverse of ``attributes``."""
     import xarray as xr
 
     return {name: Result(xr.Dataset(attrs=said)) for name, said in attributes.items()}

@@ -7,7 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in counts.
+    """Path of a run: times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in
+    counts.
 
     enforced (m, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
     (N m, nose up); None where nothing is.
@@ -30,10 +31,11 @@ class Trajectory:
 
     @property
     def moment(self) -> np.ndarray | None:
-        """Moment (m,) in N m that the prescribed pitch takes."""
+        """Moment (m,) in N m that enforces the prescribed pitch."""
         return None if self.enforced is None else self.enforced[:, -1]
 
     @property
     def force(self) -> np.ndarray | None:
-        """Force (m,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
+        """Force (m,) in N, positive down, that enforces the prescribed heave; None where only the pitch is
+        prescribed."""
         return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]

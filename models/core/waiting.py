@@ -9,8 +9,8 @@ MARCHES: list[Callable[[], float]] = []
 
 @contextmanager
 def marching(share: Callable[[], float]) -> Iterator[None]:
-    """Context of a running march; share : function that returns the completed fraction, 0 to 1, called from another
-    thread at any time."""
+    """Context of a running simulation; share : function that returns the completed fraction, 0 to 1. Another thread may
+    call it at any time."""
     MARCHES.append(share)
     try:
         yield

@@ -15,10 +15,11 @@ DISK_FULL_ERRORS = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Path of a part file beside ``path``, which takes the name ``path`` when the block has ended without an error.
+    """Context with the path of a temporary file beside ``path``; if the block ends without error, it is renamed to
+    ``path``.
 
-    An earlier file of that name is replaced. After an error nothing of the part is left, and the error goes on; if it
-    is one of the system's, it names ``path``.
+    An earlier file of that name is replaced. After an error the temporary file is removed, and the error is raised
+    again; an OSError then names ``path``.
     """
     part = path.with_name(PARTIAL_NAME.format(path.name, os.getpid(), path.suffix))
     try:
@@ -40,7 +41,7 @@ def write_whole(path: Path, content: bytes | memoryview | str) -> None:
 
 
 def drop_parts(folder: Path) -> None:
-    """Remove from a folder, and from those within it, what killed processes left of files and folders they wrote."""
+    """Remove temporary files and folders that killed processes left in a folder and its subfolders."""
     for part in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
         number = part.name.rpartition(".part")[0].rpartition(".")[2]
         if number.isdigit() and not _at_work(int(number)):

@@ -38,7 +38,7 @@ TICKS = (0.01, 0.5, 0.9, 1.1, 2.0, 100.0)
 
 
 def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
-    """Bands of a pitch error (rad), its 5, 25, 50, 75 and 95 % quantiles (5, times), over times (s)."""
+    """Draw bands of a pitch error (rad) over times (s), from its 5, 25, 50, 75 and 95 % quantiles (5, times)."""
     low, quarter, middle, three, high = bands
     axis.fill_between(times, low, high, alpha=0.2, color=BLUE, linewidth=0, label="5 to 95 %")
     axis.fill_between(times, quarter, three, alpha=0.4, color=BLUE, linewidth=0, label="25 to 75 %")
@@ -47,7 +47,7 @@ def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
 
 
 def decision(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
-    """One line per method: damage, pitch error, artificial moment, the two verdicts and cost."""
+    """Figure with one line per method: damage, pitch error, artificial moment, both verdicts, and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (2.5, 1.25, 1.25, 1.5)
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
@@ -73,7 +73,7 @@ def decision(rows: list[Row], limits: Limits, grade: float | None, results: Resu
 
 
 def _marks(axes: Any, row: Row, line: int) -> None:
-    """The marks of one run, the grade's a little lower."""
+    """Draw the marks of one run; those of the run on a grade are slightly lower."""
     _, colour = ROADS[row["road"]]
     y = line + (0.17 if row["road"] == "grade" else -0.17)
     for channel, mark in MARKS.items():
@@ -94,7 +94,7 @@ def _panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, 
 
 
 def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
-    """Signs: with the truth and without it, per road, and the price."""
+    """Draw symbols for the verdicts with and without the true run, per road, and the cost."""
     axis.set_xlim(0, 10)
     axis.axis("off")
     columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
@@ -117,7 +117,7 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
 
 
 def _legend(figure: Any, grade: float | None) -> None:
-    """Marks and roads, below."""
+    """Draw the legend of marks and roads below the figure."""
     marks = [
         Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=NAMES[channel])
         for channel, mark in MARKS.items()
@@ -137,7 +137,8 @@ def _legend(figure: Any, grade: float | None) -> None:
 
 
 def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None) -> Any:
-    """Pitch error and worst damage ratio over stiffness, with the equivalent cut-off above, on every road.
+    """Figure of pitch error and worst damage ratio over stiffness, for every road; the equivalent cut-off is on the
+    upper axis.
 
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
     """

@@ -91,13 +91,13 @@ LETTER = 0.6
 
 
 def wrapped(text: str, inches: float, size: float) -> str:
-    """Lines of text broken where letters of a size (points) would leave a width."""
+    """Text split into lines that fit into a width (inches) at a font size (points)."""
     most = max(int(72 * inches / (LETTER * size)), 8)
     return "\n".join("\n".join(wrap(line, most, break_long_words=False)) for line in text.split("\n"))
 
 
 def heading(figure: Figure, title: str, results: Results | None = None) -> None:
-    """Title of a whole figure, above its left edge; below the figure what its results must be doubted for."""
+    """Add a title above the figure's left edge, and below the figure the warnings and doubts about its results."""
     size, wide = rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
@@ -110,8 +110,8 @@ def heading(figure: Figure, title: str, results: Results | None = None) -> None:
 
 
 def drawing(size: tuple[float, float] | None = None) -> Figure:
-    """An empty figure of so many inches, or of matplotlib's size: without pyplot, which takes longer to import than
-    most figures take to draw and keeps each until it is closed."""
+    """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
+    import and keeps every figure until it is closed."""
     figure = Figure(figsize=size)
     FigureCanvasAgg(figure)
     return figure
@@ -136,7 +136,7 @@ def subplot_mosaic(
 def panels(
     count: int, across: int, height: float, wide: float = COLUMN_WIDTH, **more: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of so many panels, ``across`` of them beside each other, each so many inches high; no place is empty.
+    """A figure of ``count`` panels without empty places, ``across`` of them side by side, each ``height`` inches high.
 
     more : as for ``subplots``; panels that share an axis show its numbers once.
     """
@@ -149,7 +149,7 @@ def panels(
 
 
 def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
-    """One legend of panels below all of them; what has the same name in several stands there once."""
+    """Add one legend for all panels below them; a name that occurs in several panels is listed once."""
     handles: dict[str, Any] = {}
     for axis in axes:
         lines, names = axis.get_legend_handles_labels()
@@ -158,14 +158,15 @@ def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
 
 
 def _lines_of_legends(figure: Figure) -> int:
-    """Number of lines that the legends below a figure's axes take, in units of a remark's line."""
+    """Height of the legends below a figure's axes, in lines of a remark."""
     tops = [legend.get_window_extent().y1 for legend in figure.legends]
     lowest = max((top for top in tops if top < figure.bbox.height / 2), default=0.0)
     return int(np.ceil(lowest / (1.2 * REMARK * figure.dpi / 72)))
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write ``path`` (.svg or .png) without a date, and return the path; drawn once, where ``savefig`` draws twice."""
+    """Write ``path`` (.svg or .png) without a date, and return the path. The figure is drawn once, while ``savefig``
+    draws it twice."""
     with whole_file(path) as part:
         if path.suffix == ".svg":
             from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -182,7 +183,8 @@ SHARP = 0.05
 
 
 def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
-    """Make an axis (x or y) show ratios, so that both 5 % and many decades are seen; ticks : the marked ratios."""
+    """Scale an axis (x or y) for ratios, so that both 5 % and several decades are visible; ticks : the ratios to be
+    marked."""
     scale = (lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u)))
     getattr(axis, f"set_{axis_name}scale")("function", functions=scale)
     getattr(axis, f"set_{axis_name}ticks")(ticks, [f"{tick:g}" for tick in ticks])
@@ -201,10 +203,10 @@ def _spans_few_decades(low: float, high: float) -> bool:
 
 
 class _Powers(LogFormatterSciNotation):
-    """Labels where matplotlib has its own: 10⁻³ or 2 × 10⁻³ in plain text, 20 on an axis of few decades."""
+    """Tick labels instead of matplotlib's: plain text such as 10⁻³ or 2 × 10⁻³, and 20 on an axis with few decades."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """The label of a mark, as matplotlib asks for it."""
+        """Label of a tick mark, called by matplotlib."""
         power = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
         if not power:
             return text
@@ -217,15 +219,15 @@ class _Powers(LogFormatterSciNotation):
 
 
 class _Between(LogLocator):
-    """Marks between powers of ten, none on an axis of many decades."""
+    """Positions of minor ticks between powers of ten; none on an axis with many decades."""
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
-        """Marks of an axis, as matplotlib asks for them."""
+        """Positions of the ticks on an axis, called by matplotlib."""
         return super().tick_values(vmin, vmax) if _spans_few_decades(vmin, vmax) else np.array([])
 
 
 class PlainLogScale(LogScale):
-    """The scale called "log" in every figure; with another base than ten it is matplotlib's."""
+    """Logarithmic scale named "log" in every figure; with a base other than ten it behaves as matplotlib's."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

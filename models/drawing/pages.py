@@ -5,7 +5,7 @@ from typing import Any
 
 
 def environment_of(folder: Path) -> Any:
-    """Jinja's environment for the templates of a folder: text is escaped, and a name that is missing is an error."""
+    """Jinja environment for the templates in a folder: text is escaped, and undefined names are errors."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(

@@ -25,7 +25,9 @@ UnitPaths = tuple[np.ndarray, np.ndarray]
 
 
 def unit_paths(samples: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
-    """Paths from ``rate`` samples in a second over ``length`` (s), the samples that the effects add to a reading.
+    """Error paths of an angle, two arrays (samples, length + 1) with a value per second: by noise and by bias of a gyro
+    of unit grade. They sum ``rate`` samples per second, the same that the effects add to a reading, over ``length``
+    (s).
 
     Every grade of gyro is a multiple of the same paths, so that grades are compared without scatter between them.
     """
@@ -45,7 +47,8 @@ def damages(result: Result, error: float) -> list[float]:
 
 
 def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
-    """Logarithm of the damage of all section forces by the true ones', over a constant error of the pitch (rad).
+    """Logarithm of the ratio of the section forces' damage to the true damage, as a function of a constant pitch error
+    (rad).
 
     Raises InputError, which names the scene's file, for a run without damage.
     """
@@ -60,7 +63,8 @@ def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
 
 
 def repeated(load: np.ndarray) -> np.ndarray:
-    """The load (n,) from its largest value round to the same: what one of many passes does (ASTM E1049-85, 5.4.5).
+    """The load (n,) rotated so that it begins and ends at its largest value, as in one of many repetitions (ASTM
+    E1049-85, 5.4.5).
 
     Cut elsewhere, the largest cycle of all would stay open and count one half.
     """

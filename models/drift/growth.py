@@ -52,11 +52,11 @@ class RigidPitch:
 
     @property
     def total(self) -> float:
-        """I + J (kg m^2)."""
+        """Total pitch inertia I + J (kg m^2)."""
         return self.inertia + self.carried
 
     def moment(self, forces: np.ndarray) -> np.ndarray:
-        """Moment (n,) in N m of wheel forces (n, 2) in N."""
+        """Pitch moment (n,) in N m from wheel forces (n, 2) in N."""
         return self.front * forces[:, 0] - self.rear * forces[:, 1]
 
     def intensity(self, deviation: float, period: float) -> float:
@@ -67,19 +67,21 @@ class RigidPitch:
         return deviation**2 * period * (self.front**2 + self.rear**2) / self.total**2
 
     def growth(self, rates: np.ndarray) -> np.ndarray:
-        """lambda^2 (1/s^2) of fast pitch rates (rad/s), value by value; forces vertical."""
+        """Squared growth rate lambda^2 (1/s^2) for each of the fast pitch rates (rad/s); the forces are vertical in
+        space."""
         return rates**2 * self.inertia / self.total
 
 
 def rigid_pitch(p: Parameters) -> RigidPitch:
-    """The rigid vehicle of a parameter set."""
+    """``RigidPitch`` of a pitch-plane parameter set."""
     mass, coupling = p.m1 + p.m2 + p.m3, p.b * p.m1 - p.a * p.m2
     carried = p.m1 * p.b**2 + p.m2 * p.a**2 - coupling**2 / mass
     return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
 
 
 def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
-    """Part of ``values`` (n,) above ``cutoff`` (Hz), without delay, by the gain x^4 / (1 + x^4) at x = f / cutoff.
+    """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
+    cutoff.
 
     That is a Butterworth filter of order 2 run forward and backward. Beyond its ends the signal goes on as its odd
     mirror image, for a period of the cut-off where it is that long.
@@ -91,7 +93,8 @@ def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np
 
 
 def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np.ndarray:
-    """Pitch rate (n,) in rad/s that wheel forces (n, 2) in N alone give, their moment integrated once: no run."""
+    """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
+    simulation."""
     rigid = rigid_pitch(p)
     moment = rigid.moment(forces)
     steps = 0.5 * (moment[1:] + moment[:-1]) * period
@@ -99,12 +102,13 @@ def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np
 
 
 def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> float:
-    """lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces vertical."""
+    """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
+    space."""
     return float(np.sqrt(rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff)).mean()))
 
 
 def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
-    """lambda (n,) in 1/s that stands in the sinh law at each time, for a motion that is not the same all along.
+    """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the
     variance q int g^2 ds depends on int lambda^2(u) w(u) du alone, with the weight w = u^2 (t - u) (3 t - u): what
@@ -153,14 +157,14 @@ def holding_stiffness(p: Parameters, rate: float) -> float:
 
 
 def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Spring to the ground of a natural frequency (Hz) of the pitch: k = (I + J) wc^2 in N m/rad, d = 2 zeta (I + J) wc
-    in N m s/rad."""
+    """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
+    d = 2 zeta (I + J) wc in N m s/rad."""
     corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
 def drift_off_time(rate: float, intensity: float, angle: float) -> float:
-    """Time (s) by which half of all runs are more than ``angle`` (rad) off, for a constant growth rate (1/s).
+    """Time (s) at which half of all runs deviate by more than ``angle`` (rad), for a constant growth rate (1/s).
 
     Raises InputError for an intensity or angle that is not above 0, and for a rate below it.
     """
@@ -182,7 +186,8 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
 
 
 def _log_gain(log_x: float) -> float:
-    """Logarithm of 6 (sinh x - x) / x^3 from that of x = 2 lambda t: neither need be a number itself."""
+    """Logarithm of 6 (sinh x - x) / x^3 from the logarithm of x = 2 lambda t; works where x or the result would
+    overflow."""
     x = math.exp(log_x)
     if x > LARGEST_EXPONENT:
         return math.log(3.0) + x - 3.0 * log_x

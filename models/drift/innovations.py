@@ -23,7 +23,8 @@ FEWEST_INNOVATIONS = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A statistic of a run with its acceptance interval, which a correct run leaves with probability LEVEL."""
+    """A statistic of a run with its acceptance interval. If the filter is right, the statistic lies outside it only
+    with probability LEVEL."""
 
     name: str
     value: float
@@ -32,7 +33,7 @@ class Figure:
 
     @property
     def inside(self) -> bool:
-        """Whether the figure is within a right filter's interval."""
+        """Whether the statistic lies within its acceptance interval."""
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:
@@ -42,17 +43,17 @@ class Figure:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Figures of a run, the mean square of all normalised innovations first."""
+    """Statistics of a run's innovations, the first one being the mean square of all normalised innovations."""
 
     figures: tuple[Figure, ...]
 
     @property
     def consistent(self) -> bool:
-        """Whether all are as a right filter's."""
+        """Whether all statistics lie within their acceptance intervals."""
         return all(figure.inside for figure in self.figures)
 
     def __str__(self) -> str:
-        """One sentence: what is wrong, with the interval of a right filter, or that nothing is."""
+        """One sentence: which statistics are outside their intervals, or that none is."""
         if self.consistent:
             return f"its innovations are as stated: {self.figures[0]}"
         wrong = "; ".join(map(str, (figure for figure in self.figures if not figure.inside)))
@@ -79,16 +80,16 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
 
 
 def _mean(name: str, column: np.ndarray, tail: float) -> Figure:
-    """Mean of the innovations in units of their standard deviation."""
+    """Statistic of the mean innovation, in units of its standard deviation."""
     known = column[np.isfinite(column)]
     wide = float(norm.isf(tail)) / math.sqrt(len(known))
     return Figure(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
 def _correlation(name: str, column: np.ndarray, tail: float) -> Figure:
-    """Root of the mean squared correlation with the next LAGS samples, of those that are LAGS or fewer apart.
+    """Statistic of serial correlation: root mean square of the correlations at lags 1 to LAGS.
 
-    Of white samples every correlation is normal, of variance one by the number of pairs (Box and Pierce).
+    For white samples each correlation is normal, with a variance of one over the number of pairs (Box and Pierce).
     """
     whole = np.where(np.isfinite(column), column, 0.0)
     there = np.isfinite(column).astype(float)

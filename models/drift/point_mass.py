@@ -40,7 +40,7 @@ def _relative(x: float) -> float:
 
 
 def _bracket(x: float) -> float:
-    """The bracket of eq. (11) by t^3 eta^2: (x + (1 - exp(-2x))/2 - 2 (1 - exp(-x))) / x^3, 1/3 at x = 0."""
+    """Ratio of the bracket of eq. (11) to t^3 eta^2: (x + (1 - exp(-2x))/2 - 2 (1 - exp(-x))) / x^3, 1/3 at x = 0."""
     if x > SERIES_LIMIT:
         return (x - math.expm1(-2 * x) / 2 + 2 * math.expm1(-x)) / x**3
     return math.fsum((2 ** (k - 1) - 2) / math.factorial(k) * (-1) ** (k + 1) * x ** (k - 3) for k in range(3, 26))
@@ -63,7 +63,7 @@ def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, dampi
 
 
 def _stable(h: float) -> float:
-    """Damping times step, which is below 2."""
+    """Product of damping and step, after a check that it is below 2."""
     if h >= 2:
         raise InputError("", "damping", None, f"times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
     return h
@@ -92,7 +92,7 @@ def _squares(h: float, n: int) -> float:
 
 
 def _check(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
-    """Deviation, damping and length are zero or more, step and mass above zero, and all finite."""
+    """Require deviation, damping and length to be zero or more, step and mass above zero, and all finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
         numbers = (

@@ -85,7 +85,7 @@ class RunFigures:
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a stabilised run against the true run.
+    """Errors of a stabilised run relative to the true run.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Verdict:
 
 
 def figures_of_run(run: Result, p: Parameters) -> RunFigures:
-    """Figures of a run with the vehicle's parameters p; raises InputError if its rows are not a uniform fine grid.
+    """Figures of a run for the vehicle's parameters p; raises InputError unless its rows are on a uniform, fine grid.
 
     The artificial moment is the mean over each step of I pitch'' less the suspension's moment, so it counts whatever
     acts on the chassis beside its springs and dampers, by whichever effect, in whichever engine.
@@ -141,7 +141,7 @@ def figures_of_run(run: Result, p: Parameters) -> RunFigures:
 
 
 def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
-    """Errors of a run beside the true one, both with rows at the same times; ``slope`` is the Woehler exponent.
+    """Errors of a run compared with the true run; both have rows at the same times; ``slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
     """
@@ -175,7 +175,7 @@ def verdict(figures: RunFigures, deviations: Errors, effects: Iterable[str], lim
 
 
 def consistent(run: Result) -> bool | None:
-    """Whether the Kalman filter of a run was as surprised by its measurement as it expected; None without one.
+    """Whether the innovations of a run's Kalman filter are as large as the filter expects; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
     CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.
@@ -190,7 +190,7 @@ def consistent(run: Result) -> bool | None:
 
 
 def uncertainty(run: Result) -> float:
-    """Uncertainty of a Kalman filter's pitch by its own statement: twice the largest standard deviation (rad); 0
+    """Uncertainty of the pitch that a Kalman filter states itself: twice its largest standard deviation (rad); 0
     without a filter."""
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
@@ -204,7 +204,7 @@ def blind_verdict(
     consistent: bool | None = None,
     uncertainty: float = 0.0,
 ) -> Verdict:
-    """The verdict of an engineer, who has no true run: by the run's own figures alone. Damage is not among them.
+    """Verdict of an engineer who has no true run, from figures of the run itself; damage is not among them.
 
     ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
     filter, where there is one, is ``consistent`` with its measurement (NIS within its band) and its own ``uncertainty``
@@ -241,7 +241,7 @@ def _free(duration: float, trusted: float | None) -> Verdict:
 
 
 def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
-    """Sentences on errors against the true run that are above their limits."""
+    """Sentences on those errors relative to the true run that exceed their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
         for name, ratio in deviations.damage.items()
@@ -253,7 +253,7 @@ def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
 
 
 def _burden(figures: RunFigures, limits: Limits) -> list[str]:
-    """Sentences on figures of the run itself that are above their limits."""
+    """Sentences on the stabiliser's share of moment and force where it exceeds the limit."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
         f"artificial {name} {share:.0%} of {whole}"
@@ -268,14 +268,14 @@ def rms(values: np.ndarray) -> float:
 
 
 def low_pass(values: np.ndarray, step: float) -> np.ndarray:
-    """Samples (n,) spaced ``step`` (s) with what lies above BAND taken out, without phase."""
+    """Samples (n,) spaced ``step`` (s), with frequencies above BAND removed without phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
     return sosfiltfilt(butter(ORDER, BAND, fs=1.0 / step, output="sos"), values)
 
 
 def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
-    """Rms of a part divided by that of the total; 0 where both are 0."""
+    """Ratio of the rms of a part to that of the total; 0 where both are 0."""
     size, all_of_it = rms(values), rms(total)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
@@ -287,7 +287,8 @@ def _step_means(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _natural_moment(run: Result, p: Parameters) -> np.ndarray:
-    """Pitch moment (n,) in N m that suspension and body-fixed wheel forces put on the chassis."""
+    """Pitch moment (n,) in N m on the chassis from suspension forces and body-fixed wheel forces, without the
+    stabiliser."""
     moment = run["suspension_moment"]
     if run.data.attrs["mode"] != "force-body":
         return moment

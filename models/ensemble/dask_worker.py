@@ -7,14 +7,14 @@ from models.ensemble.workers import keep_freed_memory
 
 
 class Plain(WorkerPlugin):
-    """Tasks see no scheduler, and a worker keeps freed memory as those of this machine do.
+    """Dask plugin: tasks do not use a scheduler, and a worker keeps freed memory as local workers do.
 
-    xarray would ask the scheduler for locks of files that lie in a worker's own memory, in vain.
+    Otherwise xarray would ask the scheduler in vain for locks on files in a worker's own memory.
     """
 
     name = "twinrig: tasks without a scheduler, memory kept"
 
     def setup(self, worker: Worker) -> None:
-        """Called on every worker, those that join later too."""
+        """Prepare a worker; Dask calls this on every worker, including those that join later."""
         dask.config.set(scheduler="synchronous")
         keep_freed_memory()

@@ -41,8 +41,8 @@ T = TypeVar("T")
 
 
 class Blocks(NamedTuple):
-    """How an ensemble's paths are cut into blocks: ``size`` paths per block, of which at most ``ahead`` are under way
-    at once."""
+    """Division of an ensemble's paths into blocks: ``size`` paths per block, at most ``ahead`` blocks computed at
+    once."""
 
     size: int = BLOCK
     ahead: int = BLOCKS_AHEAD
@@ -64,16 +64,16 @@ class PathJob(Protocol):
     """The computation that an ensemble repeats for each path; it must survive pickling to run in other processes."""
 
     def __call__(self, paths: range) -> Arrays:
-        """Named arrays of these paths, first axis len(paths)."""
+        """Named arrays with the results of these paths; their first axis runs over the paths."""
         ...
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the result depends on: numbers, text, arrays, and dictionaries of these."""
+        """All inputs that determine the result: numbers, text, arrays, and dictionaries of these."""
         ...
 
 
 class PathFailed(RuntimeError):
-    """A path that could not be computed, by its number; a job raises it, so that the message can name the path."""
+    """A path that could not be computed, with its number; jobs raise it so that the message can name the path."""
 
     def __init__(self, path: int, reason: str) -> None:
         super().__init__(path, reason)
@@ -84,7 +84,8 @@ class PathFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class EnsembleProgress:
-    """Progress of an ensemble: paths done of all, paths per second, seconds left (infinite before the first block)."""
+    """Progress of an ensemble: paths done, total number of paths, paths per second, and seconds left (infinite before
+    the first block)."""
 
     done: int
     paths: int
@@ -98,8 +99,7 @@ class EnsembleProgress:
 
 @dataclass(frozen=True)
 class _Failure:
-    """Failure that a worker returns in place of its answer: many exceptions do not survive the way between
-    processes."""
+    """Failure that a worker returns instead of an answer, since many exceptions cannot be sent between processes."""
 
     reason: str
     full: bool = False
@@ -109,7 +109,7 @@ class _Failure:
 
 @dataclass
 class _Memory:
-    """Blocks that are not saved anywhere."""
+    """Finished blocks, kept in memory only."""
 
     blocks: dict[int, Arrays] = field(default_factory=dict)
 
@@ -125,7 +125,7 @@ class _Memory:
 
 @dataclass
 class _Counted:
-    """Counts finished paths and tells the time that the others take."""
+    """Counts finished paths, and reports the time left for the others."""
 
     paths: int
     done: int
@@ -152,7 +152,8 @@ def run_paths(
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
-    """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
+    """Arrays of all paths 0 to ``paths`` - 1; bitwise the same on any executor, in any order and after any
+    interruption.
 
     The arguments are those of ``each_block``.
     """
@@ -169,7 +170,8 @@ def each_block(
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
-    """Arrays of the blocks of paths 0 to ``paths`` - 1, in their order, each as soon as those before it are there.
+    """Arrays of the blocks of paths 0 to ``paths`` - 1, in order; each is given as soon as all earlier ones are
+    finished.
 
     folder : keeps every finished block; one that holds blocks of the same job is resumed, one of another job is
     an InputError that names the difference; None keeps them in memory until they are given. executor : a process pool
@@ -208,7 +210,8 @@ def in_order(
     store: Store | None = None,
     ahead: int = BLOCKS_AHEAD,
 ) -> Generator[tuple[T, Any]]:
-    """Each of some blocks with what a function gives for it, in their order, each as soon as those before it are there.
+    """Pairs of a block and the function's value for it, in the order of the blocks, each as soon as all earlier ones
+    are finished.
 
     The blocks are read as they are needed, ``ahead`` of them at most. store : keeps what is finished, of a folder that
     the caller has claimed, and takes named arrays alone; what it has is not computed. Raises RunFailed for the first
@@ -241,7 +244,7 @@ def in_order(
 
 
 def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: Executor | None = None) -> list[Any]:
-    """What a function gives for each of a few blocks, in their order.
+    """The function's values for a few blocks, in the order of the blocks.
 
     Raises what the function raises for the first block that fails: InputError and RunFailed as they are, by whatever
     executor; any other error is a RunFailed where an executor computes.
@@ -263,7 +266,7 @@ def _next_kept(
     failed: dict[int, str],
     counted: _Counted,
 ) -> bool:
-    """Keep the next answer, or note why it failed; whether there was one."""
+    """Store the next answer, or record why it failed; returns False when there are no more answers."""
     i, block, answer = next(answers, (-1, range(0), _Failure("")))
     if i < 0:
         return False
@@ -280,7 +283,7 @@ def _next_kept(
 
 
 def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
-    """The failure that names blocks and paths."""
+    """The error that lists the failed blocks and paths."""
     told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
     kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
     more = f"; {len(failed) - NAMED_FAILURES} more blocks" if len(failed) > NAMED_FAILURES else ""
@@ -290,8 +293,8 @@ def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFa
 def _answers(
     job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
-    """Blocks and their answers, as they come: at most ``ahead`` are under way, none further before the first of them
-    than that."""
+    """Blocks and their answers in order of completion. At most ``ahead`` blocks are computed at once, and none is begun
+    more than that many after the first unfinished one."""
     if executor is None:
         yield from ((i, block, _attempt(job, block)) for i, block in missing)
         return
@@ -320,13 +323,14 @@ def _answers(
 
 
 def _may_begin(i: int, waiting: dict[Future, tuple[int, T]], alone: Collection[tuple[int, T]], ahead: int) -> bool:
-    """Whether a block may be begun beside those that wait, and before those that will be computed alone."""
+    """Whether a block may be started now: fewer than ``ahead`` are running, and it is less than ``ahead`` after the
+    first unfinished one."""
     first = min((other for other, _ in (*waiting.values(), *alone)), default=i)
     return len(waiting) < ahead and i < first + ahead
 
 
 def _error(future: Future) -> BaseException | None:
-    """What a future failed with; of a cluster that is gone it is cancelled."""
+    """Exception of a future; a future of a lost cluster counts as cancelled."""
     try:
         return future.exception()
     except CancelledError as error:
@@ -334,12 +338,12 @@ def _error(future: Future) -> BaseException | None:
 
 
 def _worker_died(error: BaseException | None) -> bool:
-    """Whether a block lost its worker; a Dask scheduler says so by an exception of its own."""
+    """Whether the error means that the block's worker died; Dask has its own exception for that."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
 def _save_block(store: Store | _Memory, block: int, arrays: Arrays) -> None:
-    """Save a block; RunFailed where the disk is full, which no other block would change."""
+    """Save a block; RunFailed if the disk is full, since every other block would fail, too."""
     try:
         store.save(block, arrays)
     except OSError as error:
@@ -359,7 +363,7 @@ def _gone(reason: str, store: Store | _Memory) -> RunFailed:
 
 
 def _submitted(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
-    """Future of a block; of a pool that has lost its workers, a failed future."""
+    """Future of a block; a failed future if the pool has lost its workers."""
     try:
         return executor.submit(_attempt, job, block)
     except BrokenExecutor as error:
@@ -369,7 +373,7 @@ def _submitted(executor: Executor, job: Callable[[T], Arrays], block: T) -> Futu
 
 
 def _attempt(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
-    """One block, in the worker."""
+    """Compute one block in the worker; a failure is returned instead of raised."""
     try:
         arrays = job(block)
     except Exception as error:

@@ -26,7 +26,7 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
 
 
 def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float]:
-    """Standard deviation and its standard error, by the second and fourth central moments of ``count`` values."""
+    """Standard deviation and its standard error, from the second and fourth central moments of ``count`` values."""
     if count < FEWEST_PATHS:
         raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST_PATHS} values or more")
     spread = math.sqrt(second * count / (count - 1))

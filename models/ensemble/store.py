@@ -30,13 +30,13 @@ LOCK = ".lock"
 
 @dataclass(frozen=True)
 class Store:
-    """Blocks in ``folder``, one file each, written whole or not at all."""
+    """Finished blocks in ``folder``, one file each; a file is either complete or absent."""
 
     folder: Path
 
     @contextmanager
     def claimed(self, facts: dict[str, Any]) -> Iterator[None]:
-        """Keep others out of the folder for as long as the block lasts.
+        """Context in which the folder is reserved for this job and process.
 
         Raises InputError if it belongs to another job, or if another process is at work in it.
         """
@@ -47,8 +47,7 @@ class Store:
             yield
 
     def _claim(self, described: dict[str, Any]) -> None:
-        """Write into the folder which job its blocks belong to; raises InputError if the folder belongs to another
-        job."""
+        """Write into the folder to which job its blocks belong; raises InputError if it belongs to another job."""
         file = self.folder / JOB
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())
@@ -64,7 +63,7 @@ class Store:
                 raise InputError(file, key, kept.get(key), allowed)
 
     def path(self, block: int) -> Path:
-        """File of a block."""
+        """Path of a block's file."""
         return self.folder / f"block {block:06d}.npz"
 
     def has(self, block: int) -> bool:
@@ -72,7 +71,7 @@ class Store:
         return self.path(block).exists()
 
     def save(self, block: int, arrays: Arrays) -> None:
-        """Keep a block: on the disk, under its name, or not there."""
+        """Save a block to disk; its file appears only when it is complete."""
         content = io.BytesIO()
         np.savez(content, allow_pickle=False, **arrays)
         write_whole(self.path(block), content.getvalue())
@@ -88,7 +87,8 @@ class Store:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Have a folder for oneself; InputError if another process has it. A process that is killed has it no longer."""
+    """Context with exclusive use of the folder; InputError if another process has it. The lock ends with its
+    process."""
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
     except ImportError:  # not a system that has such locks
@@ -135,7 +135,7 @@ def _code() -> str:
 
 
 def code(root: Path) -> str:
-    """Checksum of every file below a folder that a run can depend on: sources, parameters, tables."""
+    """Checksum of all files below a folder on which a run can depend: sources, parameters, tables."""
     digest = hashlib.sha256()
     for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
@@ -143,7 +143,7 @@ def code(root: Path) -> str:
 
 
 def named_files(value: Any, folder: Path) -> dict[str, str]:
-    """Checksum of each file by the text that names it, from ``folder`` or from where the command runs.
+    """Checksum of each file that a text names, by that text; paths start from ``folder`` or from the working folder.
 
     value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
@@ -166,7 +166,7 @@ def _collect(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[P
 
 
 def _file(text: str, folder: Path) -> Path | None:
-    """The file that a text names, if it names one."""
+    """The file that a text names, or None."""
     before, _, _ = text.rpartition(":")
     for path in (folder / text, Path(text), folder / before, Path(before)):
         if text and os.path.isfile(path):
@@ -185,7 +185,7 @@ def _of_module(name: str) -> Path | None:
 
 
 def _table(content: bytes) -> Any:
-    """Contents of a TOML file; nothing if it is none, which reading the scene says."""
+    """Contents of a TOML file; empty if it is not valid, which is reported when the scene is read."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except ValueError:

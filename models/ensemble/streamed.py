@@ -19,14 +19,15 @@ SMALLEST_MAGNITUDE, LARGEST_MAGNITUDE = 1e-15, 1e9
 
 
 class Moments:
-    """Count, mean (k,) and sums of the second to fourth powers of deviations from it, of values (n, k)."""
+    """Count, mean (k,), and sums of the second to fourth powers of deviations from the mean, for values (n, k) that
+    arrive in batches."""
 
     def __init__(self) -> None:
         self.count = 0
         self.mean = self.second = self.third = self.fourth = np.zeros(())
 
     def add(self, values: np.ndarray) -> None:
-        """Add values (n, ...)."""
+        """Include values (n, ...)."""
         n, m, total = self.count, len(values), self.count + len(values)
         mean = values.mean(axis=0)
         second, third, fourth = (((values - mean) ** power).sum(axis=0) for power in (2, 3, 4))
@@ -45,18 +46,18 @@ class Moments:
         self.mean, self.count = self.mean + d * m / total, total
 
     def deviation(self, *place: int) -> tuple[float, float]:
-        """Standard deviation of the values at a place and its standard error, as ``statistics.deviation``."""
+        """Standard deviation of the values at index ``place``, and its standard error, as ``statistics.deviation``."""
         return deviation_of(self.count, float(self.second[place]) / self.count, float(self.fourth[place]) / self.count)
 
 
 class StreamedCovariance:
-    """Mean (..., p) and covariance (..., p, p) of values (n, ..., p)."""
+    """Mean (..., p) and covariance (..., p, p) of values (n, ..., p) that arrive in batches."""
 
     def __init__(self) -> None:
         self.count, self.mean, self._sums = 0, np.zeros(()), np.zeros(())
 
     def add(self, values: np.ndarray) -> None:
-        """Add values (n, ..., p)."""
+        """Include values (n, ..., p)."""
         n, m, total = self.count, len(values), self.count + len(values)
         mean = values.mean(axis=0)
         apart, d = values - mean, mean - self.mean
@@ -66,33 +67,33 @@ class StreamedCovariance:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Sums of products of deviations by one less than the count."""
+        """Sample covariance: sums of products of deviations divided by the count less one."""
         return self._sums / max(self.count - 1, 1)
 
 
 class Tally:
-    """Counts of values on a grid, a count per grid point. No value is nan."""
+    """Counts of distinct values; they should lie on a grid, so that few of them differ. No value may be NaN."""
 
     def __init__(self) -> None:
         self._counts: Counter[float] = Counter()
 
     def add(self, values: np.ndarray) -> None:
-        """Add values (n,), some of which may be infinite."""
+        """Count values (n,), some of which may be infinite."""
         places, counts = np.unique(values, return_counts=True)
         self._counts.update(dict(zip(places.tolist(), counts.tolist(), strict=True)))
 
     @property
     def values(self) -> np.ndarray:
-        """The values (m,) that came, rising."""
+        """The distinct values (m,), ascending."""
         return np.array(sorted(self._counts))
 
     @property
     def counts(self) -> np.ndarray:
-        """How often each of ``values`` came (m,)."""
+        """Number of occurrences (m,) of each of ``values``."""
         return np.array([self._counts[value] for value in sorted(self._counts)])
 
     def quantile(self, level: float) -> tuple[float, float, float]:
-        """Quantile and the ends of its 95 % interval, exactly as ``statistics.quantile`` of all values."""
+        """Quantile and the ends of its 95 % interval, identical to ``statistics.quantile`` of all values."""
         upto = np.cumsum(self.counts)
         places = np.searchsorted(upto, np.array(ranks(int(upto[-1]), level)), side="right")
         low, high, most = (float(self.values[place]) for place in places)
@@ -100,7 +101,7 @@ class Tally:
 
 
 class Spread:
-    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the value of its rank; nan is left out."""
+    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the exact quantile; NaN is ignored."""
 
     def __init__(self) -> None:
         self._width = np.log1p(2.0 * ACCURACY / (1.0 - ACCURACY))
@@ -108,7 +109,7 @@ class Spread:
         self._counts = np.zeros((0, self._bins), dtype=np.int64)
 
     def add(self, values: np.ndarray) -> None:
-        """Add values (n, k)."""
+        """Count values (n, k)."""
         columns = values.shape[1]
         if not len(self._counts):
             self._counts = np.zeros((columns, self._bins), dtype=np.int64)
@@ -121,7 +122,7 @@ class Spread:
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
     def percentiles(self, levels: tuple[float, ...]) -> np.ndarray:
-        """Percentiles (levels, k); nan where no value was known."""
+        """Percentiles (levels, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
         wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
         place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)

@@ -30,7 +30,7 @@ KEPT_MEMORY = 1 << 28
 
 
 class Processes(Executor):
-    """A process pool that starts fresh workers where some have died, and takes them along when it ends in an error.
+    """A process pool that replaces workers that have died, and ends its workers when an error ends the pool.
 
     A pool of the standard library is lost with the first worker that is killed; and where its parent is killed, its
     workers wait for ever. These end as soon as the far end of their pipe is closed, by whatever closes it.
@@ -42,7 +42,7 @@ class Processes(Executor):
         self._pool = self._started()
 
     def _started(self) -> ProcessPoolExecutor:
-        """Workers that start at once, with Ctrl-C held back, which they inherit.
+        """Start all workers at once while Ctrl-C is blocked, a setting that they inherit.
 
         One that struck a worker while it imports would break the pool, and the process that keeps the blocks could
         wait for it for ever.
@@ -56,7 +56,7 @@ class Processes(Executor):
         return pool
 
     def submit(self, function: Callable, /, *args: Any, **options: Any) -> Future:
-        """Submit a function to the pool, as any executor does; fresh workers take it where the old ones have died."""
+        """Submit a function to the pool, as in any executor; if workers have died, new ones take it."""
         try:
             return self._pool.submit(function, *args, **options)
         except BrokenExecutor:
@@ -77,13 +77,13 @@ class Processes(Executor):
 
 
 def processes(workers: int) -> Processes:
-    """Workers that start fresh: engines and compilers keep threads that no fork survives."""
+    """A pool of freshly started processes, since threads of engines and compilers do not survive a fork."""
     return Processes(workers)
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting until the end of the block, where the system can."""
+    """Context in which Ctrl-C is delayed to the end, where the operating system allows it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -95,14 +95,14 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _prepare_worker(pipe: Connection) -> None:
-    """Leave Ctrl-C to the process that keeps the blocks, end with it, and keep freed memory."""
+    """Prepare a worker: it ignores Ctrl-C, ends with the process that keeps the blocks, and keeps freed memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with, args=(pipe,), daemon=True).start()
     keep_freed_memory()
 
 
 def keep_freed_memory() -> None:
-    """Let this process keep what it frees for its next array, where the C library can.
+    """Let this process reuse freed memory for its next arrays, where the C library allows it.
 
     It otherwise returns every array of some megabytes to the system and gets fresh pages for the next one: a third of
     the time of a path of 60,000 steps, and almost half where Dask has set it to return still smaller ones. What a
@@ -115,7 +115,7 @@ def keep_freed_memory() -> None:
 
 
 def _end_with(pipe: Connection) -> None:
-    """End this process when the pipe's other end is closed, or gone with the process that held it."""
+    """End this process when the other end of the pipe is closed, also by the death of the process that held it."""
     with suppress(EOFError, OSError):
         pipe.recv_bytes()
     os._exit(1)
@@ -131,7 +131,8 @@ SCHEDULER_TIMEOUT = "10s"
 
 @dataclass(frozen=True)
 class Crew:
-    """Who computes what repeats: ``workers`` processes of this machine, or all workers of the Dask ``cluster``."""
+    """Where repeated computations run: ``workers`` processes of this machine, or all workers of the Dask
+    ``cluster``."""
 
     workers: int
     cluster: str | None = None
@@ -164,7 +165,7 @@ class Crew:
 
 
 def places_of(scene: Any) -> tuple[Path, ...]:
-    """The folder of a scene that names files, which its workers read; none where it names none."""
+    """The folder of a scene whose files the workers read; empty if the scene names no file."""
     folder = Path(scene.folder)
     return (folder,) if named_files(scene.table(), folder) else ()
 
@@ -201,7 +202,7 @@ def cluster(address: str, *places: Path) -> Iterator[Executor]:
 
 
 class OnCluster(Executor):
-    """The executor of a Dask client, which sends a job to the cluster once, and with each block its numbers alone.
+    """Executor for a Dask client that sends a job to the cluster only once, and for each block only its path numbers.
 
     A job is the result of a task, so that the scheduler can make it again where the workers that had it are gone.
     width : workers at its beginning.
@@ -226,7 +227,7 @@ def _same(job: Any) -> Any:
 
 
 class _Seen(NamedTuple):
-    """What a worker of a cluster has: checksum of its sources, threads, places that it does not see."""
+    """State of a cluster worker: checksum of its sources, number of threads, and paths that it cannot access."""
 
     sources: str
     threads: int
@@ -234,13 +235,13 @@ class _Seen(NamedTuple):
 
 
 def _seen(places: tuple[Path, ...], dask_worker: Any = None) -> _Seen:
-    """What this worker has; Dask names the argument."""
+    """State of the worker on which this runs, for paths ``places``; Dask prescribes the argument's name."""
     missing = [str(place) for place in places if not place.exists()]
     return _Seen(code(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
 
 
 def _require_alike(client: Any, address: str, places: tuple[Path, ...]) -> None:
-    """Raise InputError where no worker is there, or one cannot compute the same."""
+    """Raise InputError if there is no worker, or if one would not compute the same results."""
     absolute = tuple(place.resolve() for place in places)
     try:
         workers = client.run(_seen, absolute)

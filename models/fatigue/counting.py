@@ -19,7 +19,7 @@ LEVELS, RANGES = 64, 64
 
 @dataclass(frozen=True)
 class Counted:
-    """One load, counted.
+    """Results of counting one load.
 
     damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
     least that range; least, greatest : the load's extremes; mean.
@@ -36,7 +36,7 @@ class Counted:
 
 
 def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Counted:
-    """Count a load (n,); raises InputError for one without a sample, or with one that is not finite."""
+    """``Counted`` of a load (n,); raises InputError for an empty load, or one that is not finite."""
     load = checked_load(load)
     turns = turning_points(load)
     spans, _, counts = cycles(turns)
@@ -56,8 +56,8 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
 
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Number of times that a load (n,), or its turning points, rises through each level (l,), in any order; raises
-    InputError for a load as ``count`` does, and for a level that is no number."""
+    """Number of upward crossings of each level (l,) by a load (n,) or its turning points; levels may be in any order.
+    InputError as in ``count``, and for a level that is no number."""
     load, given = checked_load(load), np.asarray(levels, float)
     if np.isnan(given).any():
         raise InputError("", "levels", None, "must be numbers")
@@ -70,7 +70,7 @@ def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
 
 
 def range_pairs(spans: np.ndarray, counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Number of cycles of these spans and counts (c,) have at least each range (r,)."""
+    """Number of cycles with at least each range (r,), from the ranges ``spans`` and counts of cycles (c,)."""
     order = np.argsort(spans)
     above = np.concatenate((np.cumsum(counts[order][::-1])[::-1], [0.0]))
     return above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]

@@ -21,7 +21,7 @@ REST_RANGE_SHARE = 1e-9
 
 
 def turning_points(load: np.ndarray) -> np.ndarray:
-    """The values of ``load`` (n,) at which it turns, with its first and last one: all that rainflow reads."""
+    """The values at which a load (n,) turns, with its first and last value, as rainflow counting needs."""
     load = np.asarray(load, dtype=float)
     steps = np.diff(load)
     moving = np.flatnonzero(steps)
@@ -30,7 +30,7 @@ def turning_points(load: np.ndarray) -> np.ndarray:
 
 
 def checked_load(load: np.ndarray) -> np.ndarray:
-    """The load (n,) as doubles; InputError for none, for one that is masked or not finite, for no row of them."""
+    """The load (n,) as doubles; InputError if it is empty, masked, not finite, or not one-dimensional."""
     if np.ma.is_masked(load):
         raise InputError(
             "",
@@ -49,7 +49,8 @@ def checked_load(load: np.ndarray) -> np.ndarray:
 
 
 def damage_sum(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
-    """Sum of count times range^slope of cycles (c,); InputError for a slope that is none and a sum beyond doubles."""
+    """Sum of count times range^slope over cycles (c,); InputError for an invalid slope, or a sum too large for a
+    double."""
     if not (math.isfinite(slope) and slope > 0.0):
         raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
     with np.errstate(over="ignore"):
@@ -75,7 +76,7 @@ def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
 
 
 def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
-    """Pseudo-damage of a load (n,) divided by that of the true one (m,); raises InputError if the true one never
+    """Ratio of a load's pseudo-damage (n,) to that of the true load (m,); raises InputError if the true load never
     varies."""
     whole = pseudo_damage(truth, slope)
     if whole == 0.0 or np.ptp(truth) <= REST_RANGE_SHARE * np.abs(truth).max():

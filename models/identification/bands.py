@@ -20,13 +20,13 @@ class ErrorModel:
     reach: float
 
     def half_width(self, predicted: np.ndarray) -> np.ndarray:
-        """(n,)."""
+        """Half-widths (n,) of the band around predictions (n,)."""
         return self.reach * np.sqrt(self.base**2 + (self.share * predicted) ** 2)
 
 
 def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
-    """From residuals (n,) of predictions (n,), best of stretches that took no part in the fit: their squares against
-    those of the prediction, neither part below 0."""
+    """Error model fitted to residuals (n,) of predictions (n,), preferably from stretches that were not used in the
+    fit. Squared residuals are regressed on squared predictions, with both coefficients at least 0."""
     from scipy.optimize import nnls
 
     squares = np.column_stack([np.ones(len(predicted)), predicted**2])
@@ -40,26 +40,26 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """predicted and half_width (channels, n) on the clock of ``problem``."""
+    """Predictions with error bands: predicted and half_width (channels, n), on the clock of ``problem``."""
 
     problem: Problem
     predicted: np.ndarray
     half_width: np.ndarray
 
     def inside(self) -> np.ndarray:
-        """(channels,): share of what was measured that lies inside."""
+        """Share (channels,) of the measured samples that lie inside the band."""
         return self._mean(np.abs(self._error()) <= self.half_width)
 
     def rms(self) -> np.ndarray:
-        """(channels,): root mean square of prediction less measurement."""
+        """Root mean square (channels,) of prediction less measurement."""
         return np.sqrt(self._mean(self._error() ** 2))
 
     def relative(self) -> np.ndarray:
-        """(channels,): the same by the root mean square of the measurement."""
+        """Ratio (channels,) of the rms error to the root mean square of the measurement."""
         return self.rms() / np.array([channel.size for channel in self.problem.channels])
 
     def width(self) -> np.ndarray:
-        """(channels,): mean half-width by the rms error."""
+        """Ratio (channels,) of the mean half-width to the rms error."""
         return self._mean(self.half_width) / self.rms()
 
     def _error(self) -> np.ndarray:
@@ -71,7 +71,8 @@ class Bands:
 
 
 def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
-    """Bands of a stretch: ``problem`` is that of the fit with the drive and the measurement of the stretch."""
+    """Bands for a stretch of measurement; ``problem`` is the fit's problem with the drive and the measurement of that
+    stretch."""
     values = uncertainty.fit.values
     predicted = problem.predicted(values)
     slopes = problem.jacobian(values, problem.predicted)

@@ -22,7 +22,8 @@ Told = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages; converged."""
+    """Result of a fit. values (p,) : estimates; residuals (channels, m); cost : half the sum of their squares; stages;
+    converged."""
 
     problem: Problem
     values: np.ndarray
@@ -33,7 +34,7 @@ class Fit:
 
     @property
     def at_bound(self) -> np.ndarray:
-        """(p,): which estimates lie at a bound."""
+        """Which of the estimates (p,) lie at a bound."""
         low, high = self.problem.bounds
         near = 1e-3 * self.problem.scale
         return (self.values - low < near) | (high - self.values < near)
@@ -46,7 +47,7 @@ def fit(
     first: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
-    """Estimates by scipy's least squares; InputError where the model fails at the start.
+    """Least-squares estimates by scipy; InputError where the model fails at the start values.
 
     stage_store : finished stages, the first of them block ``first``; tell : told after each stage; executor : computes
     the columns of Jacobians.
@@ -69,7 +70,7 @@ def fit(
 
 
 def _done_share(stage: int, previous_cost: float, cost: float) -> float:
-    """Which part of a fit may be done: stages grow few as the cost settles."""
+    """Estimated share of the fit that is complete, from how little a stage still reduces the cost."""
     settled = (
         0.0
         if not np.isfinite(previous_cost)
@@ -79,7 +80,7 @@ def _done_share(stage: int, previous_cost: float, cost: float) -> float:
 
 
 def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
-    """A few trials from values on."""
+    """One stage of the fit: a few iterations that start from ``values``."""
     from scipy.optimize import least_squares
 
     scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
@@ -101,7 +102,7 @@ def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> d
 
 
 def fit_with_held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
-    """The same with parameter ``k`` at a value, and the others from ``start`` (p,) on."""
+    """The fit with parameter ``k`` fixed at a value; the others start from ``start`` (p,)."""
     others = [replace(each, start=float(at)) for each, at in zip(problem.parameters, start, strict=True)]
     del others[k]
 

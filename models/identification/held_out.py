@@ -29,7 +29,8 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What one vehicle gives: the fit, errors that it makes on parts that it was not fitted on, the prediction."""
+    """Results for one vehicle: the fit, the errors on parts of the data that were not used in the fit, and the
+    prediction."""
 
     known: Uncertainty
     errors: list[ErrorModel]
@@ -63,7 +64,7 @@ def _problem(scene: Any, search: Search) -> Problem:
 
 
 def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
-    """(channels, n): prediction less measurement of each part of the stretch, by the fit on all others."""
+    """Prediction less measurement (channels, n); each part of the stretch is predicted by a fit to all other parts."""
     problem, times = solved.problem, solved.problem.clock.times
     target = np.array([channel.values for channel in problem.channels])
     answer = np.empty_like(target)

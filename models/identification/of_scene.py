@@ -25,7 +25,8 @@ SHORTER = 50.0
 
 
 def parameter(scene: Any, text: str) -> Parameter:
-    """KEY or KEY=LOW:HIGH of a scene, which holds the start; where no range is named, what the scene's table allows.
+    """Parameter from KEY or KEY=LOW:HIGH of a scene, whose value is the start; without a range, the limits of the
+    scene's table.
 
     Raises InputError for a key that is not there or holds no number, and for a range that does not hold the start.
     """
@@ -37,7 +38,7 @@ def parameter(scene: Any, text: str) -> Parameter:
 
 
 def _range(key: str, span: str) -> tuple[float, float]:
-    """LOW:HIGH as two numbers, which may be infinite."""
+    """LOW:HIGH as two numbers; either may be infinite."""
     try:
         low, high = (float(end) for end in span.split(":"))
     except ValueError:
@@ -50,7 +51,7 @@ def _range(key: str, span: str) -> tuple[float, float]:
 
 
 def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
-    """What a scene holds at a dotted key, and the least and the largest value that its table allows."""
+    """Value of a scene at a dotted key, and the least and the largest value that its table allows."""
     owner: Any = scene
     *tables, last = key.split(".")
     for table in tables:
@@ -66,7 +67,7 @@ def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
 
 
 def _limit_ends(limit: Any, *names: str) -> list[float]:
-    """Ends that a limit of a field names; what stands for "beyond all measure" is none."""
+    """Lower and upper end that a field's limit names; none for the general limit on all quantities."""
     ends = (getattr(limit, name, None) for name in names)
     return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
@@ -91,7 +92,7 @@ def _names(owner: Any) -> tuple[str, ...]:
 
 
 class SceneModel:
-    """Channels over time of a scene with other values of its keys, by an engine.
+    """Model of a scene: its channels over time as a function of the values of some keys, computed by an engine.
 
     table, file, folder : of the scene; ``channels_of`` gives name -> (unit, times, values) of a result.
     """
@@ -102,23 +103,24 @@ class SceneModel:
         self.run_of = import_module(f"{SYSTEMS[scene.system].package}.run").run
 
     def scene(self, values: np.ndarray) -> Any:
-        """The scene with these values."""
+        """The scene with the given parameter values."""
         table = copy.deepcopy(self.table)
         for key, value in zip(self.keys, values, strict=True):
             set_key(table, key, float(value))
         return of_table(table, self.file, self.folder)
 
     def result(self, values: np.ndarray) -> Result:
-        """Its run."""
+        """Result of the run of the scene with the given parameter values."""
         return self.run_of(self.scene(values), self.engine)
 
     def __call__(self, values: np.ndarray) -> dict[str, Curve]:
-        """Channels over time by their names."""
+        """Channels over time, by name, for the given parameter values."""
         return {name: (times, row) for name, (_, times, row) in over_time(self.result(values)).items()}
 
 
 def over_time(run: Result) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
-    """Unit, times and values of every channel over time, a row of an array by the names of its places."""
+    """Unit, times and values of every channel over time; each row of an array channel becomes a channel with the row's
+    label."""
     answer = dict[str, tuple[str, np.ndarray, np.ndarray]]()
     for name, channel in run.data.data_vars.items():
         if "time" not in channel.dims or channel.dtype.kind not in "fiu":
@@ -133,8 +135,8 @@ def over_time(run: Result) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
 
 
 def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
-    """InputError at once where no channel of the measurement has the name of one of the run, by a run that is shorter;
-    nothing is checked where the scene has no such run."""
+    """Raise InputError early if no channel of the measurement has the name of a channel of the run. A shorter run gives
+    the names; if the scene has none, nothing is checked."""
     source, table = open_source(measurement), scene.table()
     duration = table.get("run", {}).get("duration")
     if not isinstance(duration, int | float):
@@ -149,7 +151,7 @@ def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
 
 
 def _named(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
-    """Channels of a measurement among these names; InputError where there is none."""
+    """Channels of a measurement that have one of these names; InputError if there are none."""
     named = [channel.name for channel in source.channels if channel.name in names]
     if not named:
         theirs = [channel.name for channel in source.channels]
@@ -158,7 +160,7 @@ def _named(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str
 
 
 def curves(path: str | Path, units: Mapping[str, str]) -> dict[str, Curve]:
-    """Channels of a measurement that have the name of one of ``units``, in that unit.
+    """Channels of a measurement whose names are keys of ``units``, converted to the unit given there.
 
     Raises InputError where there is none, for a unit that does not fit, and for times that go back.
     """
@@ -190,7 +192,8 @@ def problem_of(
 
 
 def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path) -> FitClock:
-    """Times that the run and every channel of the measurement share, as close as the closest of the measurement."""
+    """Time grid in the interval shared by the run and all measured channels; its step is the shortest in the
+    measurement."""
     begin = max(float(times[0]) for times in (*ours, *theirs))
     end = min(float(times[-1]) for times in (*ours, *theirs))
     period = min(float(np.median(np.diff(times))) for times in theirs)

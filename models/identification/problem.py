@@ -69,11 +69,12 @@ class FitClock:
 
     @property
     def stride(self) -> int:
-        """Number of samples per sample that is kept: after the low-pass the signal hardly changes in between."""
+        """Interval, in samples, between the samples that residuals keep; after the low-pass, the signal hardly changes
+        in between."""
         return max(1, int(1.0 / (OVERSAMPLED * self.edge * self.period) + 1e-9)) if self.edge > 0.0 else 1
 
     def filtered(self, values: np.ndarray) -> np.ndarray:
-        """Values (n,) without what is faster than the low-pass."""
+        """Values (n,) after the low-pass filter."""
         if self.edge <= 0.0:
             return values
         return smoothed(values[:, None], self.period, self.edge, "", "--low-pass")[:, 0]
@@ -92,12 +93,12 @@ class ChannelOnClock:
 
     @cached_property
     def size(self) -> float:
-        """Root mean square of what counts: residuals are shares of it."""
+        """Root mean square of the used samples, to which residuals are related."""
         return float(np.sqrt(np.mean(self.values[self.used] ** 2)))
 
 
 def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place: str = "") -> ChannelOnClock:
-    """A channel of a file on the clock; InputError where next to nothing of it lies there, or it does not move."""
+    """A channel of a file, interpolated to the clock; InputError if it has too few samples there, or is constant."""
     times, raw = curve
     values = without_outliers(raw)
     known = np.isfinite(values)
@@ -131,12 +132,12 @@ class Problem:
 
     @property
     def start(self) -> np.ndarray:
-        """(p,)."""
+        """Start values (p,) of the parameters."""
         return np.array([each.start for each in self.parameters])
 
     @property
     def scale(self) -> np.ndarray:
-        """(p,)."""
+        """Scales (p,) of the parameters."""
         return np.array([each.scale for each in self.parameters])
 
     @property
@@ -145,7 +146,8 @@ class Problem:
         return np.array([each.low for each in self.parameters]), np.array([each.high for each in self.parameters])
 
     def predicted(self, values: np.ndarray) -> np.ndarray:
-        """Output of the model (channels, n) at all times of the clock, low-passed like the measurement; read-only."""
+        """Output of the model (channels, n) at all times of the clock, filtered by the same low-pass as the
+        measurement; read-only."""
         key, kept = values.tobytes(), self._latest_predictions
         if key not in kept:
             prediction = self._march(values)
@@ -156,11 +158,12 @@ class Problem:
 
     @cached_property
     def _latest_predictions(self) -> dict[bytes, np.ndarray]:
-        """Predictions by the bytes of their values: a stage of a fit begins with those that the last one ended with."""
+        """Cache of predictions, keyed by the bytes of the parameter values; a stage of a fit begins with the values
+        that ended the last one."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without predictions: a process that is sent the problem needs none of them."""
+        """State for pickling without cached predictions, which other processes do not need."""
         return {name: value for name, value in vars(self).items() if name != "_latest_predictions"}
 
     def _march(self, values: np.ndarray) -> np.ndarray:
@@ -175,18 +178,19 @@ class Problem:
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """(channels, m): 0 where a sample does not count."""
+        """Weights (channels, m): 0 for samples that do not count."""
         every, part = slice(None, None, self.clock.stride), self.taking_part
         rows = [channel.used & (True if part is None else part) for channel in self.channels]
         return np.array([row[every] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
     def target(self) -> np.ndarray:
-        """(channels, m): the measurement at the times that residuals have."""
+        """Measurement (channels, m) at the times of the residuals."""
         return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """(channels, m): prediction less measurement by the size of the channel; FAILED where the model fails."""
+        """Residuals (channels, m): prediction less measurement, divided by the channel's size; FAILED where the model
+        fails."""
         try:
             predicted = self.predicted(values)[:, :: self.clock.stride]
         except RunFailed:
@@ -212,8 +216,8 @@ class Problem:
         return np.stack(columns, axis=-1)
 
     def _ways(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
-        """Values (p,) with parameter ``k`` moved forward, and backward, and by how much of its scale; within its
-        bounds, the other way round near the upper one."""
+        """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
+        divided by its scale. Steps stay within the bounds; near the upper one the backward step comes first."""
         each, ways = self.parameters[k], list[tuple[np.ndarray, float]]()
         step = STEP * each.scale * (-1.0 if values[k] + STEP * each.scale > each.high else 1.0)
         for signed in (step, -step):

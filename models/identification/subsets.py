@@ -35,7 +35,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Subset:
-    """Parameters (k,) of a subset with their values and covariance (k, k), chi^2 and how many numbers were fitted.
+    """Fit of a subset of parameters (k,): their values and covariance (k, k), chi^2, and the number of fitted data.
 
     undetermined : of those that the data do not tell: names of parameters that no number depends on, or sums of them.
     """
@@ -49,26 +49,26 @@ class Subset:
 
     @property
     def named(self) -> dict[str, float]:
-        """Values by name."""
+        """Fitted values by parameter name."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @property
     def rank(self) -> int:
-        """How many parameters the data determine."""
+        """Number of parameters that the data determine."""
         return len(self.names) - len(self.undetermined)
 
     @property
     def freedoms(self) -> int:
-        """Numbers less parameters that they determine."""
+        """Number of fitted data less the number of determined parameters."""
         return self.count - self.rank
 
     def criterion(self, inflation: float) -> float:
-        """Quasi-likelihood information criterion with the correction for few numbers."""
+        """Quasi-likelihood information criterion (QAICc), with the correction for small samples."""
         k = self.rank + 1
         return self.chi2 / inflation + 2.0 * k + 2.0 * k * (k + 1) / max(self.count - k - 1, 1)
 
     def spread(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """What ``predict`` says (m,) by these values, and its variances (m,) by their covariance."""
+        """Predictions (m,) of ``predict`` at the fitted values, and their variances (m,) from the covariance."""
         here = predict(self.named)
         slopes = np.zeros((len(here), len(self.names)))
         for i, (name, value) in enumerate(self.named.items()):
@@ -95,15 +95,15 @@ class Choice:
 
     @property
     def best(self) -> Subset:
-        """The subset of the least criterion."""
+        """The subset with the lowest criterion."""
         return self.fits[0]
 
     def importance(self, name: str) -> float:
-        """Summed weight of all subsets that have the parameter."""
+        """Sum of the weights of all subsets that contain the parameter."""
         return float(sum(w for fit, w in zip(self.fits, self.weights, strict=True) if name in fit.names))
 
     def forecast(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """What all subsets predict (m,) by their weights, and its standard deviations (m,).
+        """Predictions (m,) averaged over all subsets with their weights, and their standard deviations (m,).
 
         The variance is that within the subsets and that among them (Burnham and Anderson, ch. 4.3).
         """
@@ -112,8 +112,8 @@ class Choice:
         return mean, np.sqrt(self.weights @ (self.inflation * variances + (means - mean) ** 2))
 
     def hard_to_tell_apart(self) -> list[tuple[str, str, float]]:
-        """Pairs of parameters whose estimates in the fullest subset correlate by more than HIGH_CORRELATION, and by how
-        much."""
+        """Pairs of parameters whose estimates in the fullest subset have a correlation above HIGH_CORRELATION, with
+        that correlation."""
         fullest = max(self.fits, key=lambda fit: len(fit.names))
         size = np.sqrt(np.diag(fullest.covariance))
         pairs = combinations(range(len(size)), 2)
@@ -122,7 +122,7 @@ class Choice:
 
 
 def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subset:
-    """All candidates fitted."""
+    """``Subset`` of all candidates, fitted together."""
     names = tuple(candidates)
     if not names:
         left = deviations({})
@@ -146,7 +146,8 @@ def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subs
 def chosen(
     deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
 ) -> Choice:
-    """Every subset of the candidates fitted and judged; together : sets by name that are left out as a whole, too."""
+    """Fits of every subset of the candidates, ranked; together : named sets of candidates whose joint removal is
+    tested, too."""
     everything = fit_all(deviations, candidates)
     blind = tuple(name for name in candidates if name in everything.undetermined)
     told = [name for name in candidates if name not in blind]
@@ -165,7 +166,7 @@ def chosen(
 def _calls(
     fits: list[Subset], fullest: Subset, inflation: float, together: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, float]]:
-    """F and p of leaving each parameter out of the fullest subset, and each set that it holds."""
+    """F statistic and p value for removing each parameter, and each named set, from the fullest subset."""
     by_names = {fit.names: fit for fit in fits}
     leaving: dict[str, Sequence[str]] = {name: (name,) for name in fullest.names}
     leaving |= {said: names for said, names in together.items() if {*names} <= {*fullest.names}}
@@ -178,5 +179,5 @@ def _calls(
 
 
 def _combination(names: tuple[str, ...], row: np.ndarray) -> str:
-    """A combination of parameters in words, those that take part by more than a hundredth."""
+    """Text on a combination of parameters; those with coefficients below a hundredth are left out."""
     return " with ".join(name for name, part in zip(names, row, strict=True) if abs(part) > 1e-2)

@@ -54,19 +54,22 @@ class Uncertainty:
 
     @cached_property
     def determined(self) -> np.ndarray:
-        """(p,): whether the band of 95 % is narrower than the parameter's scale, and no bound cuts it off."""
+        """For each parameter (p,): whether its 95 % interval is narrower than its scale, and is not cut off by a
+        bound."""
         with np.errstate(invalid="ignore"):
             narrow = LEVEL * self.deviations < DETERMINED * self.fit.problem.scale
         return self.free & narrow
 
     @cached_property
     def condition(self) -> float:
-        """Of the information: ratio of the largest to the least standard deviation of a combination, as it were."""
+        """Ratio of the largest to the smallest standard deviation among combinations of parameters, from the
+        information matrix."""
         values = np.linalg.eigvalsh(self.information[np.ix_(self.free, self.free)])
         return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR * values[-1] else np.inf
 
     def combinations(self) -> list[tuple[float, np.ndarray]]:
-        """Standard error and direction (p,) of uncorrelated combinations of scaled parameters, the best known first."""
+        """Uncorrelated combinations of scaled parameters: standard error and direction (p,) of each, the best
+        determined first."""
         inner = np.ix_(self.free, self.free)
         values, vectors = np.linalg.eigh(self.covariance[inner])
         answer = []
@@ -78,7 +81,7 @@ class Uncertainty:
 
 
 def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
-    """Covariance of the estimates by the fit's own residuals; executor : computes the columns of their Jacobian."""
+    """Covariance of the estimates, from the residuals of the fit; executor : computes the columns of their Jacobian."""
     problem = fit.problem
     jacobian = problem.jacobian(fit.values, executor=executor)
     free = ~fit.at_bound
@@ -102,14 +105,15 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def _untold(matrix: np.ndarray) -> np.ndarray:
-    """Variance (as good as infinite) of directions that the residuals do not depend on."""
+    """Very large variance for parameter directions that do not affect the residuals."""
     values, vectors = np.linalg.eigh(matrix)
     blind = vectors[:, values <= SINGULAR * values[-1]]
     return 1e12 * blind @ blind.T
 
 
 def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
-    """The longest lag, and for how many samples residuals stay alike (their integral scale), of the slowest channel."""
+    """Largest lag to be summed, and the integral scale of the residuals in samples, both for the most slowly varying
+    channel."""
     staying = 1.0
     for row in residuals:
         count, centred = len(row), row - row.mean()
@@ -124,7 +128,8 @@ def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
 
 
 def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
-    """Long-run covariance (p, p) of scores (m, p), summed: lags weigh linearly less (Bartlett)."""
+    """Long-run covariance (p, p) of the sum of scores (m, p), with weights that fall linearly with the lag
+    (Bartlett)."""
     total = scores.T @ scores
     for lag in range(1, lags + 1):
         product = scores[lag:].T @ scores[:-lag]
@@ -134,7 +139,8 @@ def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
 
 
 def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
-    """The same (p, p) for residuals of channels that are stationary, each alike to itself over the lags as it is."""
+    """Long-run covariance (p, p) as in ``_long_run``, for stationary residuals: from each channel's own
+    autocovariance."""
     total = np.zeros((jacobian.shape[2],) * 2)
     for rows, error in zip(jacobian, residuals, strict=True):
         for lag in range(lags + 1):
@@ -145,7 +151,8 @@ def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.nd
 
 
 def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The larger of two covariances (p, p) in every direction: scores tell where residuals are large, but scatter."""
+    """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
+    residuals are large, but scatter more."""
     values, vectors = np.linalg.eigh(second)
     values = np.maximum(values, SINGULAR * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
@@ -155,8 +162,8 @@ def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
-    """values (k,) of one parameter, and by how much the misfit rises there, the others fitted anew: (k,) in units of
-    which 3.84 is the limit of 95 %; ``parabola`` (k,) : what the standard error says."""
+    """Profile of one parameter: its values (k,), and the rise of the misfit (k,) at each after all other parameters are
+    refitted, in units in which 3.84 is the 95 % limit; ``parabola`` (k,) : the rise according to the standard error."""
 
     name: str
     values: np.ndarray
@@ -165,13 +172,14 @@ class LikelihoodProfile:
 
     @property
     def quadratic(self) -> bool:
-        """Whether both agree within a half: then the standard error tells all."""
+        """Whether profile and parabola agree to within one half; the standard error then describes the uncertainty
+        fully."""
         return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
 
 
 def profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
-    """Profile likelihood of parameter ``k``; the misfit is weighted as its covariance is, so that residuals that stay
-    alike do not count as many."""
+    """Profile likelihood of parameter ``k``. The misfit is weighted as in the covariance, so that correlated residuals
+    do not count as independent ones."""
     solved, problem = uncertainty.fit, uncertainty.fit.problem
     scale, parameter = problem.scale[k], problem.parameters[k]
     spread = uncertainty.deviations[k] if np.isfinite(uncertainty.deviations[k]) else scale

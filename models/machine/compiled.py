@@ -39,7 +39,8 @@ compiled = njit(cache=True, error_model="numpy")
 
 
 def lean(function: Callable) -> Any:
-    """``njit`` for a function that makes no array: it counts no references to those it gets, and is kept on disk.
+    """``njit`` for functions that allocate no arrays: array arguments are not reference-counted, and machine code is
+    cached on disk.
 
     Counting costs functions of a microsecond as much as their work. An array made in one is an error as it compiles;
     what it calls may make some.
@@ -48,13 +49,14 @@ def lean(function: Callable) -> Any:
 
 
 def inlined(function: Callable) -> Any:
-    """Decorator like ``lean`` that also inlines the function into its callers: an array argument costs as much as ten
+    """Like ``lean``, and the function is inlined into its callers, because passing an array costs as much as ten
     numbers."""
     return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
 
 
 def _kept_apart(compiled: Any) -> Any:
-    """The compiled function, the files of its signatures named after nobody's count and stamped with their sources."""
+    """The compiled function with changed cache files: names that do not depend on a shared counter, and stamps of the
+    sources."""
     file = getattr(compiled._cache, "_cache_file", None)  # there is none where nothing is kept
     if file is not None:
         stem = file._index_name.removesuffix(".nbi")
@@ -65,7 +67,8 @@ def _kept_apart(compiled: Any) -> Any:
 
 
 def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
-    """An index of machine code as it is read; empty where older sources wrote it, with classes that are gone since."""
+    """Wrapper of a cache index reader that returns an empty index if older sources wrote it, with classes that no
+    longer exist."""
 
     def read() -> dict:
         try:
@@ -77,14 +80,16 @@ def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
 
 
 def named_closure(function: Any, *parts: Any) -> Any:
-    """A closure under a name that no other one of its factory has, made of ``parts``; compile it after that."""
+    """The closure, renamed after ``parts`` so that its name is unique among its factory's closures; must be done before
+    compiling."""
     function.__qualname__ = function.__name__ = "_".join([function.__name__, *(str(part) for part in parts)])
     return function
 
 
 @cache
 def checksum(folder: Path) -> int:
-    """Checksum of the sources that a kernel of this folder may be made of, and of the tables beside them."""
+    """Checksum of all sources in this folder, and in those that all kernels share, of which a kernel here may consist,
+    with the tables beside them."""
     sources = (
         path for place in sorted({folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
     )
@@ -92,22 +97,22 @@ def checksum(folder: Path) -> int:
 
 
 def _files(function: Any) -> list[Path]:
-    """A function's file, and those of compiled functions that are its globals."""
+    """Source file of a function, and those of the compiled functions among its globals."""
     called = [function.__globals__.get(name) for name in function.__code__.co_names]
     functions = [function, *(each.py_func for each in called if hasattr(each, "py_func"))]
     return [Path(each.__code__.co_filename) for each in functions]
 
 
 def stamp(file: Path, *others: Path) -> int:
-    """Checksum of the sources that a kernel of this file may be made of: its folder's, and kernels of
-    those others and of what all of them import."""
+    """Checksum of all sources that a kernel in this file may contain: those of its folder, and the kernels of
+    ``others`` and of all files that these import."""
     made_of = {*others, *(path for each in (file, *others) for path in _imported(each))}
     elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
     return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))
 
 
 def _imported(file: Path) -> set[Path]:
-    """Files with kernels that a file imports, and those that they import."""
+    """Files with compiled kernels that a file imports, directly or through such files."""
     imported, left = set[Path](), [file]
     while left:
         new = _kernels(left.pop()) - imported
@@ -118,7 +123,8 @@ def _imported(file: Path) -> set[Path]:
 
 @cache
 def _kernels(file: Path) -> frozenset[Path]:
-    """Files with kernels that a file names in its imports, be it they or what is in them; read and not imported."""
+    """Files with compiled kernels that a file's import statements name, as modules or through names in them; read
+    without importing."""
     if not file.is_file():
         return frozenset()
     places = [

@@ -14,7 +14,7 @@ SEEKER = "xarray"
 
 
 def leave_out(*names: str) -> None:
-    """Make libraries count as not installed in this process, until they are let in.
+    """Make optional libraries appear as not installed in this process, until ``let_in`` is called.
 
     Those that are imported already stay, and all stay where xarray is: it may count on them.
     """
@@ -25,7 +25,7 @@ def leave_out(*names: str) -> None:
 
 
 def let_in(*names: str) -> None:
-    """Undo ``leave_out``: who imports one of these libraries calls this before, as it may have been left out."""
+    """Undo ``leave_out``. Code that needs one of these libraries must call this before it imports it."""
     modules: dict[str, Any] = sys.modules
     for name in names:
         if name in modules and modules[name] is None:

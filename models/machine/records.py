@@ -19,7 +19,7 @@ _intrinsic: Any = intrinsic
 
 
 def record(*names: str) -> np.dtype:
-    """Type of a record with one double for each name, which it has as attributes in Python as well."""
+    """Type of a record with one double per name; in Python the doubles are attributes, too."""
     return np.dtype((np.record, np.dtype([(name, np.float64) for name in names], align=True)))
 
 
@@ -41,7 +41,8 @@ def records(typing_context, pointer, count, kind):
 
 @_intrinsic(prefer_literal=True)
 def stacked(typing_context, count, kind):
-    """An array (count,) of records of a type that lasts until the function returns, and holds anything at first.
+    """Array (count,) of records on the stack, valid until the calling function returns; its initial contents are
+    arbitrary.
 
     As ``stack.doubles``: ask for a number that is not written out outside of loops.
     """
@@ -62,7 +63,7 @@ def stacked(typing_context, count, kind):
 
 
 def _array(context: Any, builder: Any, made: Any, pointer: Any, count: Any) -> Any:
-    """An array of records that begin at a pointer."""
+    """Array of records that starts at a pointer."""
     array, size = make_array(made)(context, builder), context.get_constant(types.intp, made.dtype.size)
     place = builder.bitcast(pointer, array.data.type)
     populate_array(array, place, [count], [size], size, None, None)

@@ -14,7 +14,7 @@ def duration(seconds: float) -> str:
 
 
 def cost(seconds: Sequence[float] | np.ndarray) -> str:
-    """Text that states the seconds of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
+    """Text on the times of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
     values = np.asarray(seconds, float)
     middle = duration(float(np.median(values)))
     if values.size == 1:

@@ -18,10 +18,11 @@ array = get_cfarray_intrinsic("C", None)
 
 @_intrinsic(prefer_literal=True)
 def doubles(typing_context, count):
-    """Pointer to ``count`` doubles; they last until the function returns, and hold anything at first. A vector register
-    may begin there.
+    """Pointer to ``count`` doubles on the stack, aligned for vector registers; they are valid until the function
+    returns, and their initial contents are arbitrary.
 
-    A number written out takes its room once. Ask for any other outside of loops: every asking takes more of the stack.
+    A literal ``count`` reserves its room once per call. Request any other count outside of loops, because every request
+    takes more of the stack.
     """
 
     def generate(context, builder, signature, arguments):
@@ -47,7 +48,7 @@ def beyond(typing_context, pointer, count):
 
 @_intrinsic
 def row(typing_context, pointer, size, i):
-    """The i-th of rows of ``size`` doubles that begin at a pointer, as an array (size,)."""
+    """Row i, as an array (size,), of a table with rows of ``size`` doubles that starts at a pointer."""
     kind = types.Array(types.float64, 1, "C")
 
     def generate(context, builder, signature, arguments):
@@ -82,7 +83,7 @@ def start(typing_context, array):
 
 @_intrinsic
 def at(typing_context, address):
-    """Pointer to the double at an address, a whole number."""
+    """Pointer to doubles from an address given as a whole number."""
 
     def generate(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], context.get_value_type(DOUBLES))
@@ -92,7 +93,8 @@ def at(typing_context, address):
 
 @_intrinsic
 def ask(typing_context, address, inputs, table, outputs):
-    """Result of the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address, a whole number."""
+    """Result of calling the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address, given as a whole
+    number."""
 
     def generate(context, builder, signature, arguments):
         pointer = context.get_value_type(DOUBLES)

@@ -53,8 +53,8 @@ def interleave(
 
 
 def _repeats(job: Callable[[], Any], minimum_seconds: float, clock: Clock) -> int:
-    """Number of repeats of a job that fill one timed turn: measured on the warm-up, or after it where that was
-    short."""
+    """Number of repeats of a job that last ``minimum_seconds`` together, from the warm-up run, or from one more run if
+    that was short."""
     if _timed(job, 1, clock) >= minimum_seconds:
         return 1
     return max(1, math.ceil(0.9 * minimum_seconds / max(_timed(job, 1, clock), 1e-9)))
@@ -68,7 +68,7 @@ def _timed(job: Callable[[], Any], repeats: int, clock: Clock) -> float:
 
 
 def describe(seconds: Sequence[float]) -> dict[str, float]:
-    """Median, median absolute deviation and minimum (s)."""
+    """Median, median absolute deviation and minimum of timed samples (s)."""
     values = np.asarray(seconds)
     middle = float(np.median(values))
     return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}
@@ -93,13 +93,13 @@ def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
 
 
 def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
-    """A median with its interval as tables have it: "12.3 (11.9 to 12.8)"."""
+    """Text of a median with its interval, as used in tables: "12.3 (11.9 to 12.8)"."""
     middle, low, high = (f"{scale * value:.3g}" for value in median(samples))
     return f"{middle} ({low} to {high})"
 
 
 def paired_ratio(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Ratio a / b as the median of the paired log ratios, with its bootstrap 95 % interval."""
+    """Ratio a / b: the median over the rounds of the paired log ratios, with its bootstrap 95 % interval."""
     logs = np.log(np.asarray(a) / np.asarray(b))
     _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
     return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)

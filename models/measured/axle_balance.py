@@ -63,12 +63,12 @@ class AxleForces:
 
     @cached_property
     def rigid(self) -> RigidPitch:
-        """The vehicle as one body."""
+        """The vehicle as one rigid body in the pitch plane."""
         return rigid_pitch(self.parameters)
 
     @cached_property
     def loads(self) -> np.ndarray:
-        """Static loads (2,) in N; those of 9.81 m/s^2 where nothing weighs."""
+        """Static axle loads (2,) in N; computed with 9.81 m/s^2 if the vehicle has no gravity."""
         return _loads(self.parameters) * (self.parameters.g or GRAVITY)
 
     @cached_property
@@ -78,7 +78,8 @@ class AxleForces:
 
     @property
     def empty(self) -> np.ndarray:
-        """Which axles (2,) have a mean force that is negligible beside their load and their variation."""
+        """Which axles (2,) have a mean force that is negligible compared with their static load and with their
+        variation."""
         return (np.abs(self.means) < EMPTY * self.loads) & (np.abs(self.means) <= self.forces.std(axis=0))
 
     @property
@@ -93,15 +94,17 @@ class AxleForces:
 
     @cached_property
     def arms(self) -> np.ndarray:
-        """Accelerations (2, 2), of heave (upwards) and pitch (nose up), that 1 N at the front and at the rear make."""
+        """Accelerations (2, 2) per 1 N at the front and at the rear axle: heave (upwards), then pitch (nose up)."""
         body = self.rigid
         return np.array([[1 / body.mass, 1 / body.mass], [body.front / body.total, -body.rear / body.total]])
 
     @cached_property
     def pitch(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rate (n,) and pitch (n,), rad/s and rad nose up, that the forces give by themselves from rest.
+        """Pitch rate (n,) in rad/s and pitch angle (n,) in rad, nose up, from integrating the forces alone, starting at
+        rest.
 
-        The arms of vertical forces shorten by the cosine of the pitch: put in by a few turns as long as it is small.
+        The lever arms of vertical forces shorten with the cosine of the pitch. A few iterations account for this while
+        the pitch is small.
         """
         moments = self.forces @ self.arms[1]
         rate = self._summed(moments)
@@ -115,26 +118,26 @@ class AxleForces:
 
     @cached_property
     def rise(self) -> np.ndarray:
-        """Rate (n,) of the centre of mass from rest, m/s upwards."""
+        """Vertical speed (n,) of the centre of mass in m/s, upwards, from integrating the forces, starting at rest."""
         pitch = self.pitch[1]
         upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEPEST_GRADE else 1.0
         return self._summed(self.forces @ self.arms[0] * upright - self.parameters.g)
 
     def _summed(self, values: np.ndarray) -> np.ndarray:
-        """Integral (n,) of samples (n,) from the first one on."""
+        """Time integral (n,) of samples (n,), starting at the first one."""
         return np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * self.period)))
 
 
 def axle_signals(recording: Recording, axle: str) -> list[Signal]:
-    """Vertical forces of an axle: those of the axle, or of both its wheels."""
+    """Signals of the vertical force of an axle: its own signal, or those of both its wheels."""
     vertical = [s for at in AXLES[axle] for s in recording.find("force", at, "z") if not s.check]
     whole = [signal for signal in vertical if signal.at == axle]
     return whole or vertical
 
 
 def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
-    """Vertical forces of both axles as the checks read them, short and long gaps bridged straight; None where one
-    lacks a wheel."""
+    """Vertical forces of both axles for the checks, short and long gaps bridged by straight lines; None where one axle
+    lacks a wheel's signal."""
     signals = tuple(tuple(axle_signals(recording, axle)) for axle in AXLES)
     if not all(
         side and len(side) == (1 if side[0].at == axle else 2) for axle, side in zip(AXLES, signals, strict=True)
@@ -153,15 +156,16 @@ def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
 
 
 def _straight(values: np.ndarray) -> np.ndarray:
-    """Samples (n,) with straight lines where nothing was measured; 0 where nothing was at all."""
+    """Samples (n,) with straight lines across gaps; all 0 if nothing was measured."""
     known = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), known, values[known]) if len(known) else np.zeros(len(values))
 
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady accelerations (2,) that no motion explains, m/s^2 upwards and rad/s^2 nose up, and how well each is
-    known (2,): smaller ones say nothing. units (2,) : of a whole load: gravity, and the moment of one axle's load."""
+    """Residual: steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up.
+    known (2,) : their uncertainties; smaller accelerations mean nothing. units (2,) : accelerations by a whole load:
+    gravity, and the pitch acceleration by one axle's load."""
 
     accelerations: np.ndarray
     known: np.ndarray
@@ -169,7 +173,7 @@ class Steady:
 
     @property
     def shares(self) -> np.ndarray:
-        """Accelerations (2,) divided by those of a whole load."""
+        """Ratios (2,) of the unexplained accelerations to those that a whole load would cause."""
         return self.accelerations / self.units
 
     @property
@@ -179,9 +183,10 @@ class Steady:
 
 
 def equilibrium_residual(axles: AxleForces) -> Steady:
-    """Residual of the equilibrium over the whole record.
+    """Residual of the vertical and the pitch equilibrium over the whole record.
 
-    A rise counts only as far as neither a level road nor a climb with the pitch that the forces give explains it.
+    Vertical motion is compared with two explanations: a level road, and a climb with the pitch that the forces give.
+    The residual is that of the better explanation.
     """
     rate, pitch = axles.pitch
     times = _blocks(axles.lasted * np.linspace(-0.5, 0.5, len(axles.forces)))
@@ -201,12 +206,12 @@ def equilibrium_residual(axles: AxleForces) -> Steady:
 
 
 def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
-    """A slope, and how well it is known, from the scatter about it."""
+    """A slope, and its uncertainty from the scatter of the values about the fitted line."""
     return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + SCATTER * estimate[1]) / lasted
 
 
 def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
-    """Slope of values (n,) over times (n,) in least squares, and the scatter about it.
+    """Least-squares slope of values (n,) over times (n,), and the scatter of the values about the line.
 
     What a vehicle climbs with its pitch (n,), at a speed between 0 and the fastest, is fitted beside it; the scatter
     grows where a pitch that rises steadily can hardly be told from it.
@@ -224,11 +229,11 @@ def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = Non
 
 
 def _blocks(values: np.ndarray) -> np.ndarray:
-    """Means of equal parts of values (n, ...) along the first axis."""
+    """Means of values (n, ...) over blocks of equal length along the first axis."""
     parts = np.array_split(values, min(BLOCKS, max(len(values) // 2, 2)))
     return np.array([part.mean(axis=0) for part in parts])
 
 
 def _loads(p: Parameters) -> np.ndarray:
-    """Mass (2,) in kg that rests on either axle."""
+    """Mass (2,) in kg carried by each axle."""
     return np.array([p.m3 * p.a / (p.a + p.b) + p.m1, p.m3 * p.b / (p.a + p.b) + p.m2])

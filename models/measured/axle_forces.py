@@ -47,7 +47,7 @@ IN_FILE: dict[Wrong, str] = {
 
 
 def check(axles: AxleForces) -> list[Finding]:
-    """Findings on the forces of the axles; a fault that one finding explains is not named by another."""
+    """Findings on the axles' forces. If one finding explains a fault, no other finding names it."""
     largest = float(np.abs(axles.forces).max())
     if largest > IMPOSSIBLE * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
@@ -60,7 +60,7 @@ def check(axles: AxleForces) -> list[Finding]:
 
 
 def _sparse(axles: AxleForces) -> list[Finding]:
-    """A long record of which a run takes next to nothing, too sparse for a wheel."""
+    """Finding on a long record of which a run uses very little; its sampling is too coarse for wheel motion."""
     text = sparse(len(axles.forces), axles.period, axles.duration)
     if not text:
         return []
@@ -68,7 +68,7 @@ def _sparse(axles: AxleForces) -> list[Finding]:
 
 
 def _explained(axles: AxleForces) -> list[Finding]:
-    """Findings on a common mistake that explains the imbalance to a few per cent, at both axles."""
+    """Findings on one common mistake that explains the imbalance at both axles to within a few per cent."""
     p = axles.parameters
     if p.g == 0:
         return []
@@ -103,7 +103,7 @@ def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
 
 
 def _exchanged(axles: AxleForces) -> list[Finding]:
-    """Axles whose loads fit crosswise, and not as they are named."""
+    """Finding that the two axles' forces fit the static loads only if they are exchanged."""
     as_is, crossed = (np.abs(each / axles.loads - 1).max() for each in (axles.means, axles.means[::-1]))
     if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).seen[1]:
         return []
@@ -116,7 +116,8 @@ def _exchanged(axles: AxleForces) -> list[Finding]:
 
 
 def _wrong_means(axles: AxleForces) -> list[Finding]:
-    """Axles whose mean says by itself that sign or unit is wrong, or that moves the vehicle beyond all roads."""
+    """Findings on axles whose mean force alone shows a wrong sign or unit, or would move the vehicle farther than any
+    road does."""
     findings, far = [], _travels_too_far(axles, equilibrium_residual(axles)).any()
     for axle, mean, load in zip(axles.signals, axles.means, axles.loads if axles.parameters.g else (), strict=False):
         for_axle = f"the {load:.5g} N that rest on it on average"
@@ -129,7 +130,7 @@ def _wrong_means(axles: AxleForces) -> list[Finding]:
 
 
 def _balance(axles: AxleForces) -> list[Finding]:
-    """Accelerations that a vehicle cannot keep up: its fall, and its turn."""
+    """Findings on accelerations that a vehicle cannot sustain: steady heave, and steady pitch."""
     motion = equilibrium_residual(axles)
     if not motion.seen.any():
         return []
@@ -153,7 +154,8 @@ def _balance(axles: AxleForces) -> list[Finding]:
 
 
 def _travels_too_far(axles: AxleForces, motion: Steady) -> np.ndarray:
-    """Which of the two steady accelerations (2,) moves the vehicle further in the run than a road does."""
+    """Which of the two steady accelerations (2,), heave and pitch, moves the vehicle farther during the run than a road
+    does."""
     return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEPEST_GRADE])
 
 
@@ -162,7 +164,7 @@ def _excess_text(name: str, excess: float, share: float) -> str:
 
 
 def _motion(axles: AxleForces, motion: Steady) -> str:
-    """Where the steady accelerations take the vehicle in the run."""
+    """Text on how far the steady accelerations move the vehicle during the run."""
     risen, turned = motion.accelerations * axles.duration**2 / 2
     parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.seen[0] else []
     parts += [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"] if motion.seen[1] else []
@@ -170,7 +172,7 @@ def _motion(axles: AxleForces, motion: Steady) -> str:
 
 
 def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
-    """Forces that begin in the middle of a motion, while the run begins at rest."""
+    """Finding on forces that begin while the vehicle moves, although the run begins at rest."""
     first = axles.forces[0] / axles.loads - 1
     last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
     if (
@@ -190,16 +192,17 @@ def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
 
 
 def _noise(axles: AxleForces) -> float:
-    """Four standard deviations (rad) of the pitch that white noise of the samples makes by the end of the run.
+    """Four standard deviations (rad) of the pitch that the samples' white noise causes by the end of the run.
 
-    The noise is at most what the third differences of the forces have: a smooth signal has less of them.
+    The noise is estimated, as an upper bound, from the third differences of the forces, which are small for smooth
+    signals.
     """
     rough = float(np.diff(axles.forces, 3, axis=0).std()) / 20**0.5
     return 4 * (axles.rigid.intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
 def _constant_axle(axles: AxleForces) -> list[Finding]:
-    """An axle that never changes, beside one that does."""
+    """Finding on an axle whose force never changes while the other one's does."""
     still = np.ptp(axles.forces, axis=0) == 0
     if still.all() or not still.any():
         return []
@@ -209,7 +212,7 @@ def _constant_axle(axles: AxleForces) -> list[Finding]:
 
 
 def _copied(axles: AxleForces) -> list[Finding]:
-    """An axle that has the other one's samples, times a factor."""
+    """Finding on an axle whose samples equal the other axle's, times a factor."""
     off = axles.forces - axles.means
     size = np.sqrt(np.mean(off**2, axis=0))
     if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED:
@@ -222,7 +225,7 @@ def _copied(axles: AxleForces) -> list[Finding]:
 
 
 def _order(axles: AxleForces) -> list[Finding]:
-    """Axles that feel the road in the wrong order."""
+    """Finding on axles that meet the road's unevenness in the wrong order."""
     late, alike, other = _delay(axles)
     if alike < REPEATED_CORRELATION or late > 0 or alike < 1.5 * other:
         return []
@@ -234,8 +237,8 @@ def _order(axles: AxleForces) -> list[Finding]:
 
 
 def _delay(axles: AxleForces) -> tuple[float, float, float]:
-    """Time (s) by which the rear axle repeats the front one, their correlation then, and the best with the other
-    sign; 0 where nothing can be said."""
+    """Time (s) by which the rear axle's force repeats the front one's, the correlation at that delay, and the best
+    correlation with opposite sign; 0 if the forces do not show any of this."""
     n = len(axles.forces)
     frequencies = np.fft.rfftfreq(2 * n, axles.period)
     band = (frequencies > BAND[0]) & (frequencies < BAND[1])
@@ -253,8 +256,8 @@ def _delay(axles: AxleForces) -> tuple[float, float, float]:
 
 
 def unchecked(axles: AxleForces) -> str:
-    """Sentence on why these forces alone do not show the delay from axle to axle, and what would; "" for constant
-    forces."""
+    """Sentence on why these forces alone do not show the delay between the axles, and what would show it; "" for
+    constant forces."""
     if not np.ptp(axles.forces, axis=0).any():
         return ""
     late, alike, _ = _delay(axles)

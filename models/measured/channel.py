@@ -17,12 +17,7 @@ BLOCK = 60_000
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel, in the file's own words.
-
-    group : channels of one group share their sampling times. count : samples. period : s as the file says, None where
-    it lists times instead. resolution : what values are rounded to, in ``unit``; 0 where they are floating point.
-    family : name of the group that the file has the channel in, a wheel's say; empty where it has none.
-    """
+    """One channel, with names and units as the file gives them."""
 
     name: str
     unit: str
@@ -48,23 +43,23 @@ class SampleBlock:
 
 
 class Source(Protocol):
-    """One file, opened; each format has one in ``models.measured.formats``."""
+    """An open measurement file; each format in ``models.measured.formats`` has its own implementation."""
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """All channels of numbers over time; their names differ."""
+        """All channels that hold numbers over time; no two have the same name."""
 
     @property
     def start(self) -> datetime | None:
-        """Date and time at time 0, with its zone; None where the file does not give it."""
+        """Date and time at time 0, with time zone; None where the file does not give them."""
 
     @property
     def comment(self) -> str:
-        """Comment of the file, lines parted by line ends."""
+        """Comment in the file; its lines are separated by line ends."""
 
     @property
     def noticed(self) -> tuple[Finding, ...]:

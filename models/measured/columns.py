@@ -18,7 +18,7 @@ ITEM = np.dtype("<f8")
 
 
 class Readable(ABC):
-    """Samples of signals that can be read one by one."""
+    """Samples of several signals, each of which can be read by its name."""
 
     @abstractmethod
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
@@ -30,10 +30,11 @@ class Readable(ABC):
 
 
 class Columns(Readable):
-    """Samples (signals, count) of doubles in one file; NaN is no measurement."""
+    """Samples (signals, count) as doubles in one file; NaN marks missing measurements."""
 
     def __init__(self, path: Path, names: tuple[str, ...], count: int) -> None:
-        """Open what was begun with the same names and count, or begin anew; InputError where another was begun."""
+        """Continue the file that was begun with the same names and count, or begin a new one; InputError where the file
+        belongs to other names or another count."""
         self.path, self.names, self.count = path, names, count
         self._journal = path.with_suffix(".json")
         described = {"names": list(names), "count": count}
@@ -48,13 +49,13 @@ class Columns(Readable):
             self.close(0)
 
     def close(self, completed: int) -> None:
-        """Say that the first ``completed`` samples of every signal are complete."""
+        """Record in the journal that the first ``completed`` samples of every signal are complete."""
         self.done = completed
         text = json.dumps({"names": list(self.names), "count": self.count, "done": completed})
         write_whole(self._journal, text)
 
     def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:
-        """Samples (n, names) of some signals from sample ``first`` on; the journal does not count them."""
+        """Store samples (n, names) of some signals from sample ``first`` on, without recording them as complete."""
         with self.path.open("r+b") as file:
             for name, column in zip(names, np.asarray(values, ITEM).T, strict=True):
                 file.seek((self.names.index(name) * self.count + first) * ITEM.itemsize)
@@ -63,7 +64,8 @@ class Columns(Readable):
             os.fsync(file.fileno())
 
     def write(self, first: int, values: np.ndarray) -> None:
-        """Samples (n, signals) from sample ``first`` on; they count as complete up to their end."""
+        """Store samples (n, signals) of all signals from sample ``first`` on, and record all samples up to their end as
+        complete."""
         self.put(self.names, first, values)
         self.close(first + len(values))
 

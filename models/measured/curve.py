@@ -9,7 +9,7 @@ from models.measured.units import factor_between
 
 
 def curve(source: Source, name: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s, strictly rising, and values (n,) of a channel in ``unit``, NaN where nothing was measured.
+    """Times (n,) in s, strictly ascending, and values (n,) of a channel in ``unit``, NaN where nothing was measured.
 
     Raises InputError where the file has no such channel, for a unit that is missing or does not fit, and for times
     that go back.

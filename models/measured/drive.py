@@ -20,8 +20,8 @@ FEWEST_SAMPLES = 16
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDrive:
-    """times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : samples of each channel that were spikes or
-    not measured, and are bridged by a straight line."""
+    """A measured drive. times (n,) : s, even; steer (n,) rad; speed (n,) m/s; left_out : number of samples of each
+    channel that were spikes or not measured, and are replaced by straight lines."""
 
     times: np.ndarray
     steer: np.ndarray
@@ -30,7 +30,7 @@ class MeasuredDrive:
 
 
 def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
-    """The drive of a file, or of a stretch (s, s) of its time; InputError for what is no drive."""
+    """The drive recorded in a file, or in a time interval (s, s) of it; InputError if the file holds no drive."""
     return _read_drive(path, stretch, path.stat().st_mtime_ns)
 
 
@@ -59,7 +59,8 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
 
 
 def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
-    """Values (n,) on an even grid, straight across spikes and gaps, and how many samples were left out for that."""
+    """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left out
+    for that."""
     kept = without_outliers(values)
     known = np.isfinite(kept)
     if known.sum() < FEWEST_SAMPLES:

@@ -50,8 +50,8 @@ class Faults(Strict):
 
 
 def amount(amounts: Amounts, signal: Signal) -> float:
-    """Amount of a fault that a scene gives for a signal: by its channel before its transducer before its quantity; 0 if
-    nothing is."""
+    """Amount of a fault for a signal in a scene: the value for its channel, else for its transducer, else for its
+    quantity, else 0."""
     return next((amounts[name] for name in _names(signal) if name in amounts), 0.0)
 
 
@@ -75,7 +75,8 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
 def measured(
     faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
 ) -> np.ndarray:
-    """Samples (m, signals) of every ``stride``-th row of the truth (n, signals), ``step`` (s) apart; NaN: no sample.
+    """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), ``step`` (s) apart, with
+    all faults; NaN where a sample is lost.
 
     seed and path name the noise: the same ones give the same samples, whoever asks.
     """
@@ -96,7 +97,8 @@ def measured(
 
 
 def quantised(values: np.ndarray, bits: int) -> np.ndarray:
-    """Values (n,) rounded to the steps of a converter of so many bits with some room above the largest one."""
+    """Values (n,) rounded to the steps of a converter with so many bits, whose range is a little larger than the
+    largest value."""
     largest = float(np.abs(values).max())
     if largest == 0.0:
         return values
@@ -116,7 +118,7 @@ def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period
 
 
 def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -> np.ndarray:
-    """Every ``stride``-th sample as it was ``delay`` (s) before; what was before the start stood still."""
+    """Every ``stride``-th sample, delayed by ``delay`` (s); before the start, the value stays at the first sample."""
     if delay == 0.0:
         return true[::stride].copy()
     at = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
@@ -126,7 +128,7 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
 
 
 def _stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
-    """Normal samples (count,) that belong to a name."""
+    """Normal random samples (count,) that depend only on seed, path, source and the name."""
     return normal(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
 
 

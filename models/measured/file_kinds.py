@@ -38,7 +38,8 @@ UNPACK = "unpack it, and name the file inside"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that cannot be read: what it is, what a user can do, a pattern of its first bytes, extensions."""
+    """A kind of file that cannot be read here: its description, advice to the user, pattern of its first bytes,
+    extensions."""
 
     name: str
     remedy: str
@@ -122,7 +123,7 @@ WORKBOOK, ARRAYS = KINDS[0], next(kind for kind in KINDS if ".npz" in kind.exten
 
 
 def format_of(path: Path, first_bytes: bytes) -> str:
-    """Format of a file by its first bytes; raises InputError that names what cannot be read, with what to do."""
+    """Format of a file, from its first bytes; raises InputError with the kind of an unreadable file and advice."""
     form = next((form for magic, form in READABLE.items() if first_bytes.startswith(magic)), "")
     if form:
         return form
@@ -142,20 +143,20 @@ def format_of(path: Path, first_bytes: bytes) -> str:
 
 
 def is_text(first_bytes: bytes) -> bool:
-    """Whether the first bytes of a file can be text: UTF-16 has its mark, all else no zero byte."""
+    """Whether the first bytes may be text: UTF-16 begins with its byte-order mark, other text has no zero byte."""
     return first_bytes.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" not in first_bytes
 
 
 def usual_of(suffix: str, format_name: str) -> str:
-    """Text on what files of an extension usually are; ``format_name``, the kind of this file, where tables have that
-    extension, too."""
+    """Text on what files with an extension usually are; ``format_name``, this file's own format, for an unknown
+    extension or .asc."""
     if suffix in EXTENSIONS or suffix == ".asc":
         return EXTENSIONS.get(suffix, format_name)
     return next((kind.name for kind in KINDS if suffix in kind.extensions), format_name)
 
 
 def by_extension(path: Path) -> str:
-    """Phrase on what files of this extension usually are; empty where nothing is known."""
+    """Phrase on what files with this extension usually are; empty if the extension is unknown."""
     suffix = path.suffix.lower()
     kind = next((kind for kind in KINDS if suffix in kind.extensions), None)
     if kind is not None:
@@ -167,7 +168,7 @@ def by_extension(path: Path) -> str:
 
 
 def is_measurement(path: Path) -> bool:
-    """Whether a file is a measurement, or what measurements come as, by its extension or by being no text."""
+    """Whether a file may be a measurement: its extension is one of measurement files, or it is no text."""
     if path.suffix.lower() in (*EXTENSIONS, *(each for kind in KINDS for each in kind.extensions)):
         return True
     if path.suffix.lower() in ("", ".toml") or not path.is_file():
@@ -177,7 +178,7 @@ def is_measurement(path: Path) -> bool:
 
 
 def _of_archive(path: Path) -> Kind | None:
-    """The kind of data in a zip archive: a workbook or arrays."""
+    """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()

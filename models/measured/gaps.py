@@ -43,8 +43,8 @@ MARK = 1e30
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples from ``first`` to before ``end``; ``doubt`` (in the channel's unit) is the largest deviation of what was
-    filled in, NaN where nothing was, for the gap is too long or has no neighbours."""
+    """A gap: samples from ``first`` to before ``end``. ``doubt`` (in the channel's unit) is the largest standard
+    deviation of the filled values, NaN if the gap is not filled because it is too long or has no neighbours."""
 
     first: int
     end: int
@@ -52,7 +52,7 @@ class Gap:
 
 
 def true_runs(holds: np.ndarray) -> np.ndarray:
-    """First index and end (r, 2) of every run of true values of (n,)."""
+    """First index and end index (r, 2) of each run of true values in an array (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
     return edges.reshape(-1, 2)
 
@@ -80,8 +80,8 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
 
 
 def bridged(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
-    """All samples (n,) of a signal with its short gaps filled, the gaps, and what to say of them; InputError where one
-    is too long."""
+    """All samples (n,) of a signal with short gaps filled, the gaps, and findings on them; InputError where a gap is
+    too long."""
     period = recording.period
     values, gaps = filled(recording.samples(signal), period, BRIDGED)
     for gap in (gap for gap in gaps if np.isnan(gap.doubt)):
@@ -103,7 +103,8 @@ def bridged(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap]
 
 
 def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
-    """Autocovariance (lags,) of values (n,) of mean 0, NaN counting as nothing; positive as a law must be."""
+    """Autocovariance (lags,) of values (n,) with mean 0, NaN counting as 0. It is positive definite, as interpolation
+    needs."""
     there = np.nan_to_num(values)
     size = 1 << (2 * len(there) - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(there, size)) ** 2
@@ -112,7 +113,8 @@ def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
 
 
 def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int) -> np.ndarray:
-    """Indices of measured samples around a gap: all of the closest ones, every so many of those farther away."""
+    """Indices of measured samples around a gap: all of the nearest ones, and every ``every``-th of those farther
+    away."""
     near = np.arange(1, span + 1)
     near = near[(near <= 2 * (end - first) + 8) | (near % every == 0)]
     around = np.concatenate((first - near[::-1], end - 1 + near))
@@ -123,7 +125,8 @@ def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int)
 def _conditional_mean(
     law: np.ndarray, known_samples: np.ndarray, lost: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Mean (m,) of the lost samples given the known ones, and the largest standard deviation."""
+    """Expected values (m,) of the lost samples given the known ones, and the largest standard deviation of the
+    estimate."""
     among = law[np.abs(known_samples[:, None] - known_samples)]
     among[np.diag_indices(len(known_samples))] *= 1 + 1e-9
     between = law[np.abs(lost[:, None] - known_samples)]
@@ -133,7 +136,8 @@ def _conditional_mean(
 
 
 def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, Finding | None]:
-    """Values (n,) in SI with NaN for what cannot have been measured, and the finding that says so; times (n,) in s.
+    """Values (n,) in SI with NaN in place of values that cannot be measurements, and a finding on them; times (n,) in
+    s.
 
     A sample is absurd if it is a mark, or beyond LIMITS and FAR_RATIO times farther from the median than half of all.
     """

@@ -9,7 +9,7 @@ FAR_RATIO, USUAL_SHARE = 3.0, 0.99
 
 
 def without_outliers(values: np.ndarray) -> np.ndarray:
-    """Values (n,) with NaN where they are farther from the running median than noise goes; NaN stays NaN."""
+    """Values (n,) with NaN in place of those farther from the running median than noise explains; NaN stays NaN."""
     known = np.flatnonzero(np.isfinite(values))
     kept = values.astype(float, copy=True)
     if len(known) <= MEDIAN_SAMPLES:

@@ -26,9 +26,10 @@ Wrong = Literal["sign", "unit", "gain", "size"]
 
 
 def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
-    """Recorded by true value -> what is wrong, and where it is the unit which one was taken for which.
+    """Probable mistake behind a ratio of recorded to true value, and, for a unit, which unit was taken for which.
 
-    "size" is what no two usual units explain. Of several pairs, one with the unit of the map is preferred.
+    "size" means that no two usual units explain the ratio. Of several pairs of units, one that contains the map's unit
+    is preferred.
     """
     if ratio < 0:
         return "sign", ""
@@ -72,7 +73,7 @@ def sentence(
 
 
 def counted_from_load(name: str, mean: float, load: float) -> str:
-    """A sentence on a vertical force whose mean (N) is nothing beside the static load (N)."""
+    """Sentence on a vertical force whose mean (N) is negligible compared with the static load (N)."""
     return (
         f"{name} reads {mean:.4g} N on average, less than it varies: it counts from the static load; add {load:.5g} N."
     )

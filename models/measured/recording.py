@@ -17,7 +17,7 @@ Progress = Callable[[str, float], None]
 
 
 def no_progress(*told: Any) -> None:
-    """Progress function that reports nothing."""
+    """A progress function that does nothing."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Recording:
 
     @property
     def count(self) -> int:
-        """Samples of every signal."""
+        """Number of samples of every signal."""
         return self.columns.count
 
     @property
@@ -47,7 +47,7 @@ class Recording:
         return self.period * (self.count - 1)
 
     def find(self, quantity: str, location: str = "", component: str = "") -> tuple[Signal, ...]:
-        """Signals of a quantity, of one place or component if named, in the order of the map."""
+        """Signals of a quantity, limited to a location or component if given, in the order of the channel map."""
         return tuple(
             s
             for s in self.signals
@@ -55,7 +55,7 @@ class Recording:
         )
 
     def samples(self, signal: Signal) -> np.ndarray:
-        """All samples (count,) of one signal, SI; NaN where nothing was measured."""
+        """All samples (count,) of one signal in SI units; NaN where nothing was measured."""
         return self.columns.read(signal.name)
 
     def blocks(self, signals: tuple[Signal, ...], length: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:
@@ -65,8 +65,9 @@ class Recording:
             yield first, self.columns.block(names, first, length)
 
     def changed(self, change: Callable[[Signal, np.ndarray], np.ndarray]) -> "Recording":
-        """A copy of the recording with other samples: ``change`` gives those (count,) of a signal by its own, SI, NaN
-        where nothing was measured. They lie in a new file beside the old one, so that nothing is changed twice."""
+        """A copy of the recording with changed samples. ``change`` returns a signal's new samples (count,), in SI
+        units, from its present ones, NaN where nothing was measured. The copy is stored in a new file beside the old
+        one."""
         assert isinstance(self.columns, Columns)
         path = self.columns.path.with_stem(f"{self.columns.path.stem}_changed")
         path.with_suffix(".json").unlink(missing_ok=True)

@@ -11,7 +11,7 @@ EQUAL_RATES = 1e-6
 
 
 def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
-    """Values (n,) at the times of an even grid (n,), s.
+    """Values (n,) resampled to the times of an even grid (n,), s.
 
     times (m,) : s, strictly rising, mostly ``source_period`` apart; values (m,) : NaN where nothing was measured. NaN
     wherever two samples more than 1.5 periods apart lie around a point, and outside.
@@ -30,7 +30,7 @@ def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, gri
 
 
 def _unknown(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
-    """Points (n,) that lie in a gap or outside, but for what rounding puts there."""
+    """Which points (n,) of the grid lie in a gap or outside the measurement, with a tolerance for rounding."""
     right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
     near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN_CLOCK_SHARE * source_period
     wide = times[right] - times[right - 1] > GAP * source_period
@@ -38,7 +38,8 @@ def _unknown(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.nd
 
 
 def _decimated(times: np.ndarray, values: np.ndarray, source_period: float, new: float, grid: np.ndarray) -> np.ndarray:
-    """Low-pass by a symmetric kernel, which has no phase, then a cubic spline, which at that rate is exact enough."""
+    """Values filtered by a symmetric low-pass kernel, which adds no phase, then interpolated by a cubic spline, which
+    is accurate enough at that sampling rate."""
     from scipy.interpolate import CubicSpline
     from scipy.signal import firwin, kaiserord, oaconvolve
 

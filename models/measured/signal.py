@@ -52,7 +52,7 @@ class Signal:
 
 
 class TransducerPlace(NamedTuple):
-    """Where a transducer sits: the body that carries it, and its position (m) in the vehicle's design axes."""
+    """Position of a transducer: the body that carries it, and its coordinates (m) in the vehicle's design axes."""
 
     body: str
     position: tuple[float, float, float]
@@ -60,7 +60,8 @@ class TransducerPlace(NamedTuple):
 
 @dataclass(frozen=True)
 class Places:
-    """Names of a vehicle that a channel can be at: hubs, bodies, connectors (springs, mounts, bars), sensors."""
+    """Names in a vehicle at which a channel can be measured: hubs, bodies, connectors (springs, mounts, bars),
+    sensors."""
 
     hubs: tuple[str, ...]
     bodies: tuple[str, ...]
@@ -68,7 +69,8 @@ class Places:
     sensors: tuple[str, ...] = ()
 
     def of(self, quantity: Quantity) -> Mapping[str, tuple[str, ...]]:
-        """Kinds of places at which a quantity is measured, with their names; none if anywhere."""
+        """Kinds of places at which a quantity can be measured, with their names; empty if it can be measured
+        anywhere."""
         connectors = {"springs, mounts and bars": self.connectors}
         if quantity in ("force", "moment"):
             return {"hubs": self.hubs, **connectors}

@@ -17,8 +17,8 @@ SHIFT_RESOLUTION = 1e-4
 
 @dataclass(frozen=True)
 class ChannelPair:
-    """One channel of a run and of a measurement: times (n,) and values (n,) of the one, times (m,) and values (m,) of
-    the other, NaN where nothing was measured; s, and the same unit."""
+    """The same channel in a run and in a measurement: times (n,) and values (n,) of the run, times (m,) and values (m,)
+    of the measurement, NaN where nothing was measured; times in s, values in the same unit."""
 
     run_times: np.ndarray
     run: np.ndarray
@@ -28,15 +28,16 @@ class ChannelPair:
 
 @dataclass(frozen=True)
 class Shift:
-    """seconds : what the measurement's clock shows at the run's time 0; correlation : of both then, the mean over the
-    channels that move, 1 at best, NaN where none moves and the shift is 0."""
+    """Time shift between run and measurement. seconds : time on the measurement's clock at the run's time 0;
+    correlation : mean at this shift over the channels that move, at best 1, NaN where none moves and the shift is 0."""
 
     seconds: float
     correlation: float
 
 
 def time_shift(pairs: Sequence[ChannelPair]) -> Shift:
-    """The shift at which channels correlate best, means and scales aside, to a fraction of a sample."""
+    """Time shift at which the channels correlate best, with a resolution finer than a sample. Means and scales do not
+    matter."""
     moving = [pair for pair in pairs if _varies(pair.run) and _varies(pair.values)]
     if not moving:
         return Shift(0.0, np.nan)
@@ -51,7 +52,7 @@ def _varies(values: np.ndarray) -> bool:
 
 
 def _search_step(pairs: Sequence[ChannelPair]) -> float:
-    """Step (s) of the search: that of the finer clock, unless the grid would be too long."""
+    """Step (s) of the search grid: that of the finer clock, unless the grid would become too long."""
     clocks = [times for pair in pairs for times in (pair.run_times, pair.times)]
     finest = min(float(np.median(np.diff(times))) for times in clocks)
     longest = max(float(times[-1] - times[0]) for times in clocks)
@@ -59,7 +60,8 @@ def _search_step(pairs: Sequence[ChannelPair]) -> float:
 
 
 def _coarse_shift(pairs: Sequence[ChannelPair], step: float) -> float:
-    """The shift (s), a whole number of steps beside the two starts, at which the mean correlation is largest."""
+    """Shift (s) with the largest mean correlation, among those that differ from the two starts' difference by whole
+    steps."""
     first = min(float(pair.run_times[0]) for pair in pairs)
     begin = min(float(pair.times[0]) for pair in pairs)
     scores = [_correlations(*_on_grid(pair, first, begin, step)) for pair in pairs]
@@ -75,7 +77,8 @@ def _grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
 def _on_grid(
     channel_pair: ChannelPair, first: float, begin: float, step: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run (n,), measurement (m,) and whether it was measured (m,), on even times from two starts (s)."""
+    """The run's values (n,), the measurement's values (m,), and whether they were measured (m,), on even time grids
+    that begin at the two starts (s)."""
     grid, ours, measured = (
         _grid(channel_pair.times, begin, step),
         _grid(channel_pair.run_times, first, step),
@@ -87,7 +90,8 @@ def _on_grid(
 
 
 def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Correlation (n + m - 1,) at every lag of the measurement, from 1 - n on; -1 where too little overlaps."""
+    """Correlation (n + m - 1,) of run and measurement at every lag, the first being 1 - n; -1 where they overlap too
+    little."""
     from scipy.signal import correlate
 
     def over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -105,7 +109,7 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
 
 
 def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> Shift:
-    """The shift within a step of a coarse one at which the mean correlation is largest, the run read by splines."""
+    """Shift with the largest mean correlation within one step of a coarse shift; the run is interpolated by splines."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
 
@@ -124,7 +128,7 @@ def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> 
 def _correlation_at_shift(
     channel_pair: ChannelPair, curve: Callable[[np.ndarray], np.ndarray], seconds: float
 ) -> float:
-    """Correlation of a channel at a shift (s)."""
+    """Correlation of one channel of run and measurement at a shift (s)."""
     times = channel_pair.times - seconds
     inside = (
         np.isfinite(channel_pair.values) & (times >= channel_pair.run_times[0]) & (times <= channel_pair.run_times[-1])

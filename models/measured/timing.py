@@ -48,7 +48,7 @@ class Timing:
 
     @property
     def rate(self) -> float:
-        """Hz."""
+        """Sampling rate, Hz."""
         return 1.0 / self.period
 
     @property
@@ -58,7 +58,8 @@ class Timing:
 
 
 def timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
-    """Timing of samples (n,) in the order of the file ``place``; InputError for fewer than two different times."""
+    """Times of samples (n,) given in the order of the file at ``place``; InputError where fewer than two times
+    differ."""
     wrong = _no_times(times)
     if wrong.any():
         kept, first = timing(times[~wrong], place, signal_names), int(np.argmax(wrong))
@@ -73,7 +74,7 @@ def timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) ->
 
 
 def _no_times(times: np.ndarray) -> np.ndarray:
-    """Whether each of these (n,) cannot be a time (s): no number, or far beyond all others."""
+    """Which of these values (n,) cannot be a time (s): not finite, or far beyond all others."""
     finite = np.isfinite(times)
     if np.count_nonzero(finite) < 3:
         return ~finite
@@ -84,7 +85,7 @@ def _no_times(times: np.ndarray) -> np.ndarray:
 
 
 def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
-    """The timing of values that can be times."""
+    """``Timing`` from values that can be times."""
     findings, whole = list[Finding](), len(times)
 
     def say(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
@@ -163,8 +164,8 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
 def _step(times: np.ndarray, rising: np.ndarray) -> float:
     """Median of the rising steps (s) of times (n,).
 
-    Steps of times so large that double precision rounds them, such as seconds since 1970, are counted, and their mean
-    is taken: half of them are alike, and all of these off by the same.
+    Large times, such as seconds since 1970, are rounded in double precision. Then many steps share the same rounding
+    error, and the mean step is taken instead: their sum divided by the number of whole steps in it.
     """
     middle = float(np.median(rising))
     if np.spacing(np.abs(times).max()) < ROUNDING_SHARE * middle:
@@ -174,11 +175,11 @@ def _step(times: np.ndarray, rising: np.ndarray) -> float:
 
 
 def rounded(times: np.ndarray) -> tuple[float, float] | None:
-    """Start and period (s) of an even clock whose times (n,) were rounded so coarsely that some repeat themselves, or
-    that the clock seems to jitter; None where rounding is fine, or where no even clock explains the times.
+    """Start and period (s) of an even clock whose times (n,) were rounded coarsely, so that some repeat or the clock
+    seems to jitter; None if the rounding is fine, or no even clock explains the times.
 
-    Rounding, up or down or to the nearest, moves a time by less than the spacing of rounded ones. So all times less
-    those of the clock lie in a band that wide, which few clocks fit: with the fewest digits of its rate it is taken.
+    Rounding moves a time by less than the spacing of rounded times. The differences from the right clock therefore lie
+    in a band of that width, and few clocks satisfy this. The one whose rate has the fewest digits is taken.
     """
     width, count = _spacing(times), np.arange(len(times))
     if width is None:
@@ -192,7 +193,8 @@ def rounded(times: np.ndarray) -> tuple[float, float] | None:
 
 
 def _spacing(times: np.ndarray) -> float | None:
-    """Spacing (s) of times (n,) that are rounded coarsely: that of the different ones, or a power of ten."""
+    """Spacing (s) to which times (n,) are coarsely rounded: the step between different times, or a power of ten; None
+    if not."""
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps < 0).any():
         return None

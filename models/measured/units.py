@@ -52,7 +52,7 @@ EXAMPLES: dict[Quantity, tuple[str, ...]] = {
 
 
 def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float:
-    """Factor of a unit: value in SI = value * factor.
+    """Factor that converts a unit to SI: value in SI = value * factor.
 
     Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
     """
@@ -82,7 +82,7 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
 
 
 def factor_between(unit: str, target_unit: str, file: object, place: str) -> float:
-    """Factor of a unit to another one: value in ``target_unit`` = value * factor.
+    """Factor that converts a unit to another one: value in ``target_unit`` = value * factor.
 
     Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
     number.
@@ -97,12 +97,12 @@ def factor_between(unit: str, target_unit: str, file: object, place: str) -> flo
 
 
 def _has_angle(unit: Any) -> bool:
-    """Whether there is an angle in a unit of pint's."""
+    """Whether an angle occurs in a unit of pint."""
     return bool(TURNS & set(re.split(r"[^a-z_]+", str(unit))))
 
 
 def quantities(unit: str) -> tuple[Quantity, ...]:
-    """Quantities of which this can be the unit; none for no unit, which says nothing."""
+    """Quantities that can have this unit; empty for no unit, which gives no information."""
     kinds = list[Quantity]()
     for kind in UNITS if unit.strip() else ():
         try:
@@ -126,7 +126,7 @@ def _si(quantity: Quantity) -> Any:
 
 
 def _parsed(unit: str, quantity: Quantity) -> Any:
-    """A unit of pint's, None where it knows none such."""
+    """The unit as a pint unit; None if pint does not know it."""
     text = unit.strip().strip("[]").strip()
     if quantity == "acceleration" and text in GRAVITY:
         text = "standard_gravity"
@@ -139,7 +139,7 @@ def _parsed(unit: str, quantity: Quantity) -> Any:
 
 
 def _kind_of_quantity(unit: Any) -> str:
-    """The kind of quantity that a unit measures, in an engineer's words."""
+    """The kind of quantity that a unit measures, as an engineer calls it."""
     if "volt" in str(unit) or "ampere" in str(unit):
         return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
     same = [name for name in UNITS if unit.is_compatible_with(_si(name))]

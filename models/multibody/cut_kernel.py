@@ -104,7 +104,8 @@ class ForceReport(NamedTuple):
 
 @lean
 def _element(e, numbers, motion, chassis, row):
-    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis."""
+    """Force of an element. ``row`` (n,) receives the derivative of its travel with respect to the joints behind the
+    chassis."""
     joints, m = motion.joints, motion.m
     axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
@@ -132,8 +133,8 @@ def _element(e, numbers, motion, chassis, row):
 
 @lean
 def _read_inputs(head, inputs, t, row):
-    """Fill ``row`` with the inputs at a time (s): those of the nearest half step, or of the parabola through the three
-    rows of a step, for methods that pick their own steps."""
+    """Fill ``row`` with the inputs at a time (s): those of the nearest half step; for methods with variable steps, of a
+    parabola through the three rows of a step."""
     last, place = len(inputs) - 1, t * head[PER_TIME]
     if head[ANY_TIME] == 0.0:
         nearest = min(max(int(np.rint(place)), 0), last)
@@ -158,7 +159,8 @@ def ends_apart(e, m):
 
 @lean
 def _turn_axis(e, motion, chassis, axis, row):
-    """Add to ``row`` what an axis that turns beside the chassis changes of the travel; the rate of that."""
+    """Add to ``row`` the change of an element's travel by the rotation of its axis relative to the chassis; returns the
+    rate of this change."""
     joints, m = motion.joints, motion.m
     moved, rate, j = cross(axis, ends_apart(e, m)), 0.0, int(e[AXIS_JOINT])
     while j > chassis:
@@ -171,7 +173,7 @@ def _turn_axis(e, motion, chassis, axis, row):
 
 @lean
 def _tyre(hub, motion, place, road, speed):
-    """Force and moment (space) at the hub, at ``place``, by a tyre on a road of a height (m) and rate (m/s) under it.
+    """Force and moment (in space) on the hub, at ``place``, from a tyre on a road with height (m) and rate (m/s).
 
     The side force of a tyre that only pushes goes with its load: in the air it has none.
     """
@@ -194,13 +196,13 @@ def _tyre(hub, motion, place, road, speed):
 
 @lean
 def frame(head, hub):
-    """Row of ``m`` in whose axes a hub's wrench is given."""
+    """Index of the row of ``m`` whose axes are used for a hub's wrench."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
 
 
 @lean
 def _enforce(head, wanted, bodies, motion, out, moments):
-    """Write the moments (roll, pitch), N m, that give both the accelerations that are wanted."""
+    """Write the moments (roll, pitch), N m, that produce the wanted angular accelerations in both."""
     n, w, q, v = len(motion.joints), head[HOLDING], motion.q, motion.v
     mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
     sides[:] = 0.0
@@ -218,7 +220,7 @@ def _enforce(head, wanted, bodies, motion, out, moments):
 
 @njit(cache=True, error_model="numpy")
 def parts(numbers):
-    """Views of the table: head, joints, bodies, elements, hubs, inputs."""
+    """Views of the parts of the table: head, joints, bodies, elements, hubs, inputs."""
     head = numbers[:HEADER]
     n, b, e, h = int(head[JOINTS]), int(head[BODIES]), int(head[ELEMENTS]), int(head[HUBS])
     joints_end = HEADER + PER_JOINT * n
@@ -237,7 +239,8 @@ def parts(numbers):
 
 @njit(cache=True, error_model="numpy")
 def forces(numbers, t, q, v, m, out, told):
-    """Add all joint forces to ``out`` (n,) at a time (s), coordinates and rates (n,).
+    """Add the forces of all elements and hubs to the joint forces ``out`` (n,) at a time (s), coordinates and rates
+    (n,).
 
     Also fills ``m`` and the ``ForceReport``.
     """
@@ -277,7 +280,7 @@ def forces(numbers, t, q, v, m, out, told):
 
 @njit(cache=True, error_model="numpy")
 def report(numbers, times, states, inside, wrenches, moments):
-    """Fill what ``forces`` tells of states (m, 2 n) at times (m,): a row of each for every one."""
+    """Fill the quantities of ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
     n = states.shape[1] // 2
     m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
     for i in range(len(times)):
@@ -301,7 +304,7 @@ def accelerate(numbers, t, q, v, out):
 
 @njit(cache=True, error_model="numpy")
 def march(numbers, states, step):
-    """The classical Runge-Kutta method by steps (s) from the first of states (m, 2 n), which fills the others."""
+    """Fill the states (m, 2 n) from the first row on, by the classical Runge-Kutta method with steps (s)."""
     size = states.shape[1]
     n = size // 2
     rate, total, here = array(doubles(size), (size,)), array(doubles(size), (size,)), array(doubles(size), (size,))
@@ -321,7 +324,7 @@ def march(numbers, states, step):
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the joints' forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
     m = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
@@ -331,7 +334,8 @@ def joint_forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
+    then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

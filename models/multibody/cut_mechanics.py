@@ -30,7 +30,7 @@ def turned(matrix, vector):
 
 @lean
 def move(joints, q, v, m):
-    """Fill ``m`` (n + 1, PER_MOTION) from coordinates and rates (n,)."""
+    """Fill ``m`` (n + 1, PER_MOTION) with the motion behind each joint, from coordinates and rates (n,)."""
     m[0, :] = 0.0
     m[0, TURNED] = m[0, TURNED + 4] = m[0, TURNED + 8] = 1.0
     for j in range(len(joints)):
@@ -59,7 +59,8 @@ def move(joints, q, v, m):
 
 @lean
 def _turn(link, below, k, angle, rate):
-    """Turn a row of ``m`` about axis k of the row below by an angle (rad), at a rate (rad/s, a vector)."""
+    """Rotate the row ``link`` of ``m`` about axis k of the row ``below`` by an angle (rad); add the angular velocity
+    ``rate`` (rad/s, a vector)."""
     c, s, a, b = math.cos(angle), math.sin(angle), (k + 1) % 3, (k + 2) % 3
     add(link, OMEGA, rate)
     for i in range(0, 9, 3):
@@ -69,7 +70,7 @@ def _turn(link, below, k, angle, rate):
 
 @lean
 def locate(link, arms, i):
-    """Where a point is that lies at an arm from the origin of a row of ``m``, in its axes."""
+    """Position in space of a point given by its arm from the origin of a row of ``m``, in that row's axes."""
     return plus(turned(link, three(arms, i)), three(link, PLACE))
 
 
@@ -84,7 +85,8 @@ def column(turns, link, place):
 
 @lean
 def add_wrench(joints, m, last, place, force, moment, out):
-    """Add a force (N) at ``place`` and a moment (N m) on what a joint carries to the joint forces ``out`` (n,)."""
+    """Add to the joint forces ``out`` (n,) a force (N) at ``place`` and a moment (N m) that act on the body behind
+    joint ``last``."""
     j = last
     while j >= 0:
         link, turns = m[j + 1], joints[j, TURNS]
@@ -96,14 +98,16 @@ def add_wrench(joints, m, last, place, force, moment, out):
 
 @lean
 def accelerated(link, arm, gravity):
-    """Acceleration without q'' of a point at an arm from the origin of a row of ``m``, less free fall."""
+    """Acceleration without the q'' terms of a point, less that of free fall; ``arm`` : from the origin of a row of
+    ``m``."""
     omega, rest = three(link, OMEGA), (link[REST], link[REST + 1], link[REST + 2] + gravity)
     return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(link, TURN_REST), arm))
 
 
 @lean
 def resting(link, body, gravity, tensor):
-    """A body's arm in space, its acceleration and moment of momentum's rate without q''; writes its inertia there."""
+    """A body's arm in space, and its acceleration and rate of angular momentum without the q'' terms; its inertia in
+    space is written to ``tensor``."""
     for i in range(3):
         for j in range(3):
             tensor[3 * i + j] = 0.0  # R T R^T
@@ -116,7 +120,7 @@ def resting(link, body, gravity, tensor):
 
 @lean
 def inertia(joints, bodies, m, gravity, mass, force):
-    """Write the mass matrix (n, n), and add weights and inertia forces without q'' to ``force`` (n,)."""
+    """Write the mass matrix (n, n), and add weights and inertia forces without the q'' terms to ``force`` (n,)."""
     n = len(joints)
     mass[:] = 0.0
     chain, rows, tensor = array(doubles(n), (n,)), array(doubles(9 * n), (n, 9)), array(doubles(9), (9,))
@@ -145,7 +149,8 @@ def inertia(joints, bodies, m, gravity, mass, force):
 
 @lean
 def solve(matrix, sides):
-    """Solve for the rows of ``sides`` (k, n) in place; the matrix, positive, becomes its root (Cholesky)."""
+    """Solve the linear system for each row of ``sides`` (k, n) in place; the positive definite matrix is replaced by
+    its Cholesky factor."""
     n = len(matrix)
     for i in range(n):
         for j in range(i + 1):

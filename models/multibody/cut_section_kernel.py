@@ -57,7 +57,8 @@ JOINT, POINT_ARM, WEIGHT, PER_POINT = 0, 1, 4, 5
 
 
 class FeltPlaces(NamedTuple):
-    """Where something is felt inside a vehicle of b bodies, h hubs and e elements.
+    """Places inside a vehicle of b bodies, h hubs and e elements at which section forces or accelerations are
+    evaluated.
 
     guides (g,) : last joint of each guided body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both
     ends and the frame of elements acts behind it; points (p, PER_POINT).
@@ -70,7 +71,8 @@ class FeltPlaces(NamedTuple):
 
 @lean
 def _accelerate(joints, m, last, qdd, place, a):
-    """Acceleration of a point at ``place``, carried by joint ``last``, that without q'' is ``a``, and its turning's."""
+    """Acceleration of a point at ``place``, carried by joint ``last``, and the angular acceleration there. ``a`` is its
+    acceleration without the q'' terms."""
     j, turning = last, (0.0, 0.0, 0.0)
     while j >= 0:
         link, turns = m[j + 1], joints[j, TURNS]
@@ -82,9 +84,9 @@ def _accelerate(joints, m, last, qdd, place, a):
 
 @lean
 def _move_bodies(joints, bodies, m, gravity, qdd, acting):
-    """Write, for each body, the resultant that gives its acceleration and carries its weight (9 numbers).
+    """Write, for each body, the force and moment (9 numbers in all) that accelerate it and carry its weight.
 
-    These are its point of action, its force, and its moment about that point.
+    These are the point of action, the force, and the moment about that point.
     """
     tensor = array(doubles(9), (9,))
     for b in range(len(bodies)):
@@ -99,7 +101,7 @@ def _move_bodies(joints, bodies, m, gravity, qdd, acting):
 
 @lean
 def _load_hubs(head, hubs, m, wrenches, acting):
-    """Write place, force and moment of every hub, negative: they act from outside."""
+    """Write position, force and moment of each hub's load, with negative sign because it acts from outside."""
     for i in range(len(hubs)):
         hub, row, body_frame = hubs[i], acting[i], m[frame(head, hubs[i])]
         put(row, 0, locate(m[int(hub[LAST]) + 1], hub, ARM))
@@ -109,7 +111,8 @@ def _load_hubs(head, hubs, m, wrenches, acting):
 
 @lean
 def _load_elements(elements, m, inside, acting, travels):
-    """Write places and forces at both ends of every element and the couple on its frame, negative, and its travel."""
+    """Write for every element the positions and forces at both ends, and the couple on the body of its axis, with
+    negative sign; also its travel."""
     for i in range(len(elements)):
         e = elements[i]
         axis = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
@@ -129,7 +132,7 @@ def _load_elements(elements, m, inside, acting, travels):
 
 @lean
 def _sum_up(acting, carried, point):
-    """Force and moment about a point of all that acts on what is carried."""
+    """Resultant force, and moment about a point, of all loads on the carried bodies."""
     force = moment = 0.0, 0.0, 0.0
     for i in range(len(acting)):
         if carried[i] != 0.0:
@@ -142,7 +145,7 @@ def _sum_up(acting, carried, point):
 
 @lean
 def _feel_point(joints, m, point, gravity, qdd):
-    """Acceleration of a point in the axes of what carries it."""
+    """Acceleration of a point, in the axes of the body that carries it."""
     last = int(point[JOINT])
     link = m[last + 1]
     arm = turned(link, three(point, POINT_ARM))
@@ -194,7 +197,7 @@ def section_answers(numbers, every, states, places, own_axes, out):
 
 @lean
 def _written(frame, force, moment, row, at):
-    """Write force and moment of space in the axes of a row of ``m``; where the next ones go."""
+    """Write force and moment, given in space, in the axes of a row of ``m``; returns the index for the next values."""
     put(row, at, into(frame, force, 0))
     put(row, at + 3, into(frame, moment, 0))
     return at + WRENCH

@@ -40,25 +40,26 @@ class HubInputs:
 
     @property
     def rows(self) -> np.ndarray:
-        """(m, 6 h or 2 h, and 6 with a guide): inputs as the kernel reads them."""
+        """Inputs in the form that the kernel reads: (m, 6 h or 2 h), with 6 more columns if there is a guide."""
         return self.hubs if self.guide is None else np.hstack([self.hubs, self.guide])
 
     def spans(self) -> list[tuple[int, int]]:
-        """First and last step of every span over which the hubs' forces are held, one after another."""
+        """First and last step of each time span in which the hubs' forces are constant, in order."""
         begins = self.hubs[:-1:2]
         changes = np.flatnonzero((begins[1:] != begins[:-1]).any(axis=1)) + 1
         ends = [0, *changes.tolist(), len(begins)]
         return list(itertools.pairwise(ends))
 
     def during(self, first: int, last_step: int) -> "HubInputs":
-        """The hub inputs of one span of steps, whose time begins with it."""
+        """The hub inputs of one span of steps; its time starts at 0."""
         hubs = np.repeat(self.hubs[2 * first : 2 * first + 1], 2 * (last_step - first) + 1, axis=0)
         return replace(self, hubs=hubs, guide=None if self.guide is None else self.guide[2 * first : 2 * last_step + 1])
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Where the bodies of a cut vehicle are joined, as numbers; ``last`` joint and its place (m) of every body."""
+    """Table of the joints of a cut vehicle, and for every body the index of its ``last`` joint and the position (m) of
+    that joint."""
 
     rows: np.ndarray
     last: dict[str, int]
@@ -66,7 +67,7 @@ class Joints:
 
 
 def joints(vehicle: CutVehicle) -> Joints:
-    """Joints in the order of the coordinates; those of one body share the place of the first."""
+    """Joints in the order of the coordinates; all joints of a body have the same position, that of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
     anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
@@ -75,7 +76,7 @@ def joints(vehicle: CutVehicle) -> Joints:
 
 
 def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray:
-    """All numbers for a run at a step (s)."""
+    """Table of all numbers for a run with a step (s)."""
     joined = joints(vehicle)
     bodies = []
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
@@ -106,7 +107,7 @@ def table(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> np.ndarray
 
 
 def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all curves, and into the rows of their elements where they are, of which the first is at ``first``."""
+    """Numbers of all curves. The position of each, counted from ``first``, is also written into its element's row."""
     placed = list[float]()
     for row, element in zip(rows, vehicle.elements, strict=True):
         for column, curve in ((kernel.ON_TRAVEL, element.travel_force), (kernel.ON_RATE, element.rate_force)):
@@ -126,7 +127,7 @@ def _element(e: Element, joined: Joints) -> list[float]:
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
-    """A hub, with the tyre that was there."""
+    """Numbers of a hub, including its former tyre."""
     tyre = vehicle.uncut.tyres[i]
     side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)
     law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)

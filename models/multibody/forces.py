@@ -118,7 +118,8 @@ force of its load, velocity of its centre (3 each)."""
 
 @lean
 def control(numbers, first, which, count, t):
-    """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
+    """Value and rate of a control at a time (s). Its rate is 0 at every knot; between knots it follows the smoothest
+    polynomial of degree 5."""
     knots = numbers[first + 2 * which * count :]
     if t <= knots[0]:
         return knots[count], 0.0
@@ -147,7 +148,7 @@ def height(waves, count, x, y):
 
 @lean
 def _axle(steer, inclined):
-    """Axis of a wheel that is steered and leans, to its left."""
+    """Unit vector along the axle, to the left, of a wheel that is steered and inclined."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
     if steer != 0.0:
         cosine, sine = math.cos(steer), math.sin(steer)
@@ -158,7 +159,7 @@ def _axle(steer, inclined):
 
 @lean
 def _turned_to(link, axle):
-    """An axle beside the heading of a link's x axis in the road's plane as one beside the carrier's heading."""
+    """Rotate an axle in the road's plane, from the carrier's heading to the heading of a link's x axis."""
     x, y, _ = three(link, TURNED)
     level = math.sqrt(x * x + y * y)
     return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
@@ -166,7 +167,7 @@ def _turned_to(link, axle):
 
 @lean
 def _road_under(waves, count, frame, place):
-    """Height (m) of the road under a place (m) of the carrier's axes, and the vector (-dz/dx, -dz/dy, 1) there."""
+    """Height (m) of the road, and the vector (-dz/dx, -dz/dy, 1), at a position (m) given in the carrier's axes."""
     x, y = in_space(frame, place)
     zeta, dx, dy = height(waves, count, x, y)
     return zeta, (-(frame.cosine * dx + frame.sine * dy), frame.sine * dx - frame.cosine * dy, 1.0)
@@ -174,7 +175,8 @@ def _road_under(waves, count, frame, place):
 
 @lean
 def _load(tyre, deflection, rising, ledger):
-    """Load (N) of a tyre pressed in by more (m) than at rest, which rises (m/s); its energy goes into the ledger."""
+    """Load (N) of a tyre whose deflection (m) counts from rest, and which rises (m/s); its energy is added to the
+    ledger."""
     elastic = max(tyre[STATIC] + tyre[VERTICAL] * deflection, 0.0)
     load = max(elastic - tyre[VISCOUS] * rising, 0.0) if elastic > 0.0 else 0.0
     ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[VERTICAL]
@@ -184,7 +186,8 @@ def _load(tyre, deflection, rising, ledger):
 
 @lean
 def touch(tyre, waves, count, steer, steering, vehicle, wheel):
-    """Load, place and sliding velocity of a tyre on a road of ``count`` waves: fills the ``WheelContact``.
+    """Contact of a tyre with a road of ``count`` waves: fills load, position and sliding velocity of the
+    ``WheelContact``.
 
     steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
     """
@@ -229,7 +232,7 @@ def touch(tyre, waves, count, steer, steering, vehicle, wheel):
 
 @lean
 def creep(tyre, creeping, vehicle, wheel):
-    """A tyre's creep forces and moment (3,) and its load onto its wheel; the moment about the axle onto the spin."""
+    """Add a tyre's load, creep forces and moment (3,) to its wheel; the moment about the axle accelerates the spin."""
     way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
     knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
     force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
@@ -248,7 +251,7 @@ def creep(tyre, creeping, vehicle, wheel):
 
 @lean
 def turn_wheel(tyre, braking, driving, vehicle, wheel):
-    """Torque (N m) of brake and drive on one wheel, and against it on what carries it."""
+    """Torque (N m) of brake and drive on one wheel; the opposite torque acts on the body that carries the wheel."""
     rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (braking == 0.0 and driving == 0.0):
@@ -266,20 +269,21 @@ def turn_wheel(tyre, braking, driving, vehicle, wheel):
 
 @lean
 def _hold(torque, axle, link, carrying):
-    """A torque about the axle from the link of a wheel's knuckle to that of what carries the wheel."""
+    """Transfer a torque about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
     add(link, TWISTED, times(axle, -torque))
     add(carrying, TWISTED, times(axle, torque))
 
 
 @lean
 def room(head):
-    """Number of doubles in the workspace of a vehicle's tree."""
+    """Number of doubles that the workspace for a vehicle's tree needs."""
     return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
 
 
 @lean
 def enter(numbers, q, v, f, room, ledger):
-    """Add the forces of all parts to ``f`` or to the tree. Returns the ``MovingVehicle``, its tree in the ``room``.
+    """Add the forces of all springs, dampers and bars to ``f`` or to the tree. Returns the ``MovingVehicle``, whose
+    tree lies in ``room``.
 
     numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; room : pointer to as many doubles as needed.
     """
@@ -300,7 +304,8 @@ def enter(numbers, q, v, f, room, ledger):
 
 @lean
 def leave(numbers, vehicle):
-    """Drag, and all that was gathered in the tree, added to the vehicle's forces and ledger."""
+    """Add drag, and all forces gathered in the tree, to the vehicle's generalised forces; the power of drag goes into
+    the ledger."""
     table, frame, f = start(numbers), vehicle.frame, vehicle.forces
     if numbers[DRAG] != 0.0:
         _drag(numbers, vehicle)
@@ -320,7 +325,7 @@ def leave(numbers, vehicle):
 
 @lean
 def _drag(numbers, vehicle):
-    """Drag at the chassis' centre, against its motion along the vehicle."""
+    """Add aerodynamic drag at the chassis' centre, opposite to its motion along the vehicle."""
     chassis, frame = vehicle.chassis, vehicle.frame
     place = plus(three(chassis, PLACE), out(chassis, numbers, DRAG_X))
     speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
@@ -332,7 +337,7 @@ def _drag(numbers, vehicle):
 
 @lean
 def _push_from_outside(numbers, t, vehicle):
-    """Pushes, which keep to where the vehicle heads."""
+    """Add the pushes, whose directions turn with the vehicle's heading."""
     controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
     count = int(numbers[controls - 1])
     for i in range(count):
@@ -349,7 +354,7 @@ def _push_from_outside(numbers, t, vehicle):
 
 @lean
 def all_forces(numbers, t, q, v, f, report, ledger):
-    """Add the forces (N, N m) on all coordinates to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
+    """Add the generalised forces (N, N m) to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
 
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
@@ -377,7 +382,7 @@ def all_forces(numbers, t, q, v, f, report, ledger):
 
 @lean
 def forces(numbers, t, q, v, f):
-    """Add the forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    """Add the vehicle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
     report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
@@ -386,7 +391,8 @@ def forces(numbers, t, q, v, f):
 
 @lean
 def set_forces(block, t, n):
-    """``forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``forces``. All data are in one block of doubles at an address: f, q and v (n,), then
+    the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

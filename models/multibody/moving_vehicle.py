@@ -68,13 +68,13 @@ def carrier_frame(q, v):
 
 @lean
 def carried_velocity(frame, place):
-    """Velocity (m/s) that the carrier gives a point at a place (m), both in its axes."""
+    """Velocity (m/s), by the carrier's motion, of a point at a position (m), both in the carrier's axes."""
     return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
 
 
 @lean
 def in_space(frame, place):
-    """Where a point at a place (m) in the carrier's axes lies on the ground of space."""
+    """Position x, y on the ground of a point at a position (m) in the carrier's axes."""
     return (
         frame.x + frame.cosine * place[0] - frame.sine * place[1],
         frame.y + frame.sine * place[0] + frame.cosine * place[1],

@@ -56,8 +56,8 @@ class Controls:
 
 @dataclass(frozen=True)
 class Push:
-    """A force from outside, as of wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up as the
-    vehicle heads, however it leans; at ``point`` (m) of a body, in the design position."""
+    """An external force, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up. The
+    axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
 
     body: str
     point: Vector
@@ -99,20 +99,20 @@ class Handling:
 
     @property
     def gravity(self) -> np.ndarray:
-        """(3,) m/s^2 in the axes of the road."""
+        """Vector of gravity (3,) in m/s^2, in the axes of the road."""
         return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
 
     def tyre_numbers(self, i: int) -> np.ndarray:
-        """Numbers (PER_TYRE,) of a tyre in the table: what is written there holds from then on."""
+        """View of the numbers (PER_TYRE,) of a tyre in the table; changes to it take effect at once."""
         first = int(self.numbers[at.OF_TYRES]) + at.PER_TYRE * i
         return self.numbers[first : first + at.PER_TYRE]
 
     def changed(self, **changes: object) -> "Handling":
-        """A copy of the car with other values in some fields."""
+        """A copy with other values in some fields."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and rates (n,) of rolling straight ahead at a speed (m/s) at rest in all else."""
+        """Positions and rates (n,) of straight rolling at a speed (m/s), with all other coordinates at rest."""
         places = self.vehicle.coordinates()
         v = np.zeros(len(places))
         v[0] = speed
@@ -123,7 +123,7 @@ class Handling:
 
 
 def table(handling: Handling) -> np.ndarray:
-    """All numbers, in the order that ``forces`` names."""
+    """All numbers for the compiled forces, in the order described in ``forces``."""
     free, chassis, of, points = (
         handling.vehicle,
         chassis_of(handling.given),
@@ -167,13 +167,13 @@ def table(handling: Handling) -> np.ndarray:
 
 
 class _Points:
-    """Points where something acts, each once: rows of ``tree``."""
+    """Points at which forces act, without duplicates; their rows are in the form that ``tree`` reads."""
 
     def __init__(self, vehicle: SpatialVehicle) -> None:
         self.vehicle, self.rows = vehicle, list[tuple[float, ...]]()
 
     def number(self, body: str, point: Vector) -> int:
-        """Number of a point on a body, in the design position."""
+        """Index of a point on a body, given by its position in the design position."""
         joint, place = _place(self.vehicle, body, point)
         row = (float(joint), *place.tolist())
         if row not in self.rows:
@@ -182,8 +182,8 @@ class _Points:
 
 
 def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
-    """Table rows of all coordinates, with their number within the body; a rotation of a body that carries nothing else
-    is marked loose.
+    """Table rows of all coordinates, each with the number of coordinates of its body. The rotation of a body that
+    carries nothing is marked as loose.
 
     held : coordinates that are the last to move a point where something acts.
     """
@@ -195,7 +195,7 @@ def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
 
 
 def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
-    """The coordinate that moves a point last, and where the point is from its joint."""
+    """Index of the last coordinate that moves a point, and the point's position relative to that joint."""
     joint, origin = anchor(vehicle, body)
     return joint, np.subtract(point, origin)
 
@@ -230,7 +230,7 @@ def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
 
 
 def _frame(vehicle: SpatialVehicle, place: str, frame: str | None) -> float:
-    """Last coordinate of the body in which a part's axis is fixed; 0 for the carrier."""
+    """Last coordinate of the body in which the axis of a spring or bar is fixed; 0 for the carrier."""
     if frame == CARRIER:
         return 0.0
     if frame not in vehicle.towed:
@@ -240,7 +240,8 @@ def _frame(vehicle: SpatialVehicle, place: str, frame: str | None) -> float:
 
 
 def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
-    """Numbers of all curves, and into the rows of their parts where they are, of which the first is at ``first``."""
+    """Numbers of all curves. The position of each, counted from ``first``, is also written into the row of the part
+    that has it."""
     laid_curves = np.empty(0)
     for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
@@ -251,7 +252,8 @@ def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
 
 
 def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
-    """One tyre; its bristles are those with which it has the ride vehicle's cornering stiffness at its static load."""
+    """Numbers of one tyre. Its bristle stiffness is chosen such that, at static load, it has the ride vehicle's
+    cornering stiffness."""
     free, of = handling.vehicle, handling.tyres
     tyre, places = free.tyres[i], free.coordinates()
     joint, _ = _place(free, tyre.body, tyre.point)
@@ -294,7 +296,7 @@ def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
 
 
 def _pushes(handling: Handling) -> np.ndarray:
-    """A row of each push, and how many there are."""
+    """A row of numbers for each push, and the number of pushes."""
     names = tuple(body.name for body in handling.vehicle.bodies)
     for push in handling.pushes:
         if push.body not in names:
@@ -308,7 +310,7 @@ def _pushes(handling: Handling) -> np.ndarray:
 
 
 def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
-    """(3 + pushes, 2, k): times and values of steer, brake, drive and pushes, filled up with the last knot."""
+    """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded with the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))
     filled = [

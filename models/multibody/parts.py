@@ -52,7 +52,8 @@ the last coordinate of the body in which its axis is fixed (0: the carrier)."""
 
 @lean
 def press(numbers, first, count, links, spots, q, v, f):
-    """Forces of all parts into spots, and into ``f`` of their own coordinates; their energy (J) and power (W).
+    """Add the forces of all springs, bars and other parts to the spots, or to ``f`` for their own coordinates; returns
+    their energy (J) and power (W).
 
     numbers : pointer to the table; first, count : of the parts there. What keeps a part's axis takes up the couple of
     its two forces: a towed body by its link.
@@ -96,7 +97,8 @@ def press(numbers, first, count, links, spots, q, v, f):
 
 @lean
 def on_curve(numbers, argument):
-    """Force on a curve at a pointer: count of numbers, offset, slope, then corners and bends in turn."""
+    """Force of a piecewise linear curve. A pointer leads to its numbers: count, offset, slope, then corners and changes
+    of slope."""
     head = row(numbers, 3, 0)
     hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
     for i in range(3, len(hinges), 2):
@@ -105,7 +107,7 @@ def on_curve(numbers, argument):
 
 
 def curve_numbers(curve: Curve) -> np.ndarray:
-    """Numbers of a curve, as ``on_curve`` reads them."""
+    """Numbers of a curve, in the order in which ``on_curve`` reads them."""
     offset, slope, corners, bends = curve.hinges()
     pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
     return np.array([3 + len(pairs), offset, slope, *pairs])

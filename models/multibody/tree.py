@@ -29,25 +29,25 @@ AHEAD, ASIDE, TURN, GROUND = 0, 1, 2, 3
 
 @lean
 def three(numbers, first):
-    """Three of an array, as a tuple."""
+    """Three successive numbers of an array as a tuple."""
     return numbers[first], numbers[first + 1], numbers[first + 2]
 
 
 @lean
 def dot(a, b):
-    """a . b of tuples."""
+    """Scalar product a . b of tuples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @lean
 def cross(a, b):
-    """a x b of tuples."""
+    """Vector product a x b of tuples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @lean
 def times(a, factor):
-    """A tuple by a number."""
+    """Product of a tuple and a number."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
@@ -59,13 +59,13 @@ def plus(a, b):
 
 @lean
 def put(numbers, first, a):
-    """Write a tuple into an array."""
+    """Write a tuple into an array from index ``first`` on."""
     numbers[first], numbers[first + 1], numbers[first + 2] = a
 
 
 @lean
 def add(numbers, first, a):
-    """Add a tuple to three of an array."""
+    """Add a tuple to three numbers of an array from index ``first`` on."""
     numbers[first] += a[0]
     numbers[first + 1] += a[1]
     numbers[first + 2] += a[2]
@@ -73,7 +73,8 @@ def add(numbers, first, a):
 
 @lean
 def outwards(joints, n, q, v, links):
-    """Fill the links of ``joints``, the table's rows at a pointer, body by body; no forces yet."""
+    """Fill the links (motion of the bodies) from the table rows ``joints`` at a pointer, body by body; forces are set
+    to zero."""
     carrier = row(links, PER_LINK, 2)
     for k in range(PER_LINK):
         carrier[k] = 0.0
@@ -89,7 +90,7 @@ def outwards(joints, n, q, v, links):
 
 @lean
 def _follow(joints, first, end, below, q, v, links):
-    """A body's link, from that below it, and the axes of its coordinates, of which slides come first."""
+    """Fill a body's link from the link below it, and the axes of its coordinates, translations first."""
     x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
     place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
     turning = three(below, TURNING)
@@ -116,7 +117,7 @@ def _follow(joints, first, end, below, q, v, links):
 
 @lean
 def _turned(along, x, y, z, cosine, sine):
-    """Three axes, turned about one of them."""
+    """Three axes, rotated about one of them."""
     if along == 0.0:
         return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))
     if along == 1.0:
@@ -126,7 +127,7 @@ def _turned(along, x, y, z, cosine, sine):
 
 @lean
 def out(link, local, first):
-    """Three numbers along a link's axes as a vector of the carrier's."""
+    """Vector in the carrier's axes of three components along a link's axes."""
     return plus(
         plus(times(three(link, TURNED), local[first]), times(three(link, TURNED + 3), local[first + 1])),
         times(three(link, TURNED + 6), local[first + 2]),
@@ -135,7 +136,7 @@ def out(link, local, first):
 
 @lean
 def locate(points, count, links, spots):
-    """Fill all spots of ``points``, the table's rows at a pointer; no forces yet."""
+    """Fill all spots (positions of points) from the table rows ``points`` at a pointer; forces are set to zero."""
     for i in range(count):
         of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
         link = row(links, PER_LINK, int(of[JOINT]))
@@ -147,7 +148,7 @@ def locate(points, count, links, spots):
 
 @lean
 def push(link, ground, force, place):
-    """A force from outside at a place on the body behind a link."""
+    """Add an external force at a position to the body of a link."""
     twist(link, ground, cross(place, force))
     add(link, PUSHED, force)
     ground[AHEAD] += force[0]
@@ -156,14 +157,15 @@ def push(link, ground, force, place):
 
 @lean
 def twist(link, ground, moment):
-    """A moment from outside on the body behind a link."""
+    """Add an external moment to the body of a link."""
     add(link, TWISTED, moment)
     ground[TURN] += moment[2]
 
 
 @lean
 def inwards(joints, n, points, count, tree, f):
-    """Forces at spots and on links, from the leaves to the carrier: each coordinate adds its share to ``f``.
+    """Transfer forces at spots and on links from the leaves to the carrier; each coordinate adds its generalised force
+    to ``f``.
 
     What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
     """

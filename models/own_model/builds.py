@@ -21,7 +21,7 @@ SOFT = "mujoco"
 
 
 class Moved(NamedTuple):
-    """At one state: mass matrix (n, n), forces (n,), accelerations (n,)."""
+    """Mass matrix (n, n), forces (n,) and accelerations (n,) at one state."""
 
     mass: np.ndarray
     force: np.ndarray
@@ -37,7 +37,8 @@ Equations = Callable[[np.ndarray, np.ndarray], Moved]
 
 
 def equations(twin: TwinModel, build: str) -> Equations:
-    """The description in "exudyn", "mujoco" or "plain"; constraints are rigid but in MuJoCo."""
+    """Equations of motion of the description as "exudyn", "mujoco" or "plain" builds it; constraints are soft in
+    MuJoCo, else rigid."""
     built: Any = plain_tree(twin) if build == PLAIN else free_model(build, twin.driven)
     rigid = twin.driven.tied and build != SOFT
     asked = _asked(twin, built.ties if build != PLAIN else None) if rigid else None
@@ -52,8 +53,8 @@ def equations(twin: TwinModel, build: str) -> Equations:
 
 
 def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
-    """How far states are at the most from satisfying a build's own constraints, m or rad: rigid bodies that lie wrong
-    to each other have the same accelerations."""
+    """Largest violation, m or rad, of a build's own constraints at the states. Comparing accelerations would not show
+    it: bodies in wrong relative positions can have the same accelerations."""
     if not twin.driven.tied:
         return 0.0
     if build == PLAIN:
@@ -64,7 +65,8 @@ def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
 
 
 def _asked(twin: TwinModel, rows_at: Rows | None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """Rows J (c, n) of constraints and J' q' (c,) at a state: from plain equations, or from an engine's J."""
+    """Function that gives the constraint rows J (c, n) and J' q' (c,) at a state, from plain equations, or by
+    differences of an engine's J."""
     if rows_at is None:
         return plain_constraints(twin).asked
     if twin.driven.connections:
@@ -78,7 +80,7 @@ def _asked(twin: TwinModel, rows_at: Rows | None) -> Callable[[np.ndarray, np.nd
 
 
 def plain_tree(twin: TwinModel) -> PlainTree:
-    """The plain equations of the description."""
+    """The model's equations of motion in plain numpy."""
     loads = [(spring.body, spring.point, spring.load) for spring in twin.driven.ground_springs]
     lines = [(line.ends, line.stiffness, line.damping, line.length) for line in twin.driven.line_springs]
     frictions = [(friction.coordinate, friction.force, SLIDES) for friction in twin.driven.frictions]
@@ -88,7 +90,8 @@ def plain_tree(twin: TwinModel) -> PlainTree:
 
 
 def expected(twin: TwinModel, build: str) -> Equations:
-    """What a build must do: the file's own model, with rigid constraints unless the build is MuJoCo's."""
+    """The motion with which a build must agree: the file's own model, with rigid constraints unless the build is
+    MuJoCo's."""
     return as_parsed(twin) if build == SOFT or not twin.driven.tied else rigid(twin)
 
 
@@ -122,7 +125,7 @@ def rigid(twin: TwinModel) -> Equations:
 
 
 def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
-    """(c, n): derivatives of the file's equality constraints by the coordinates of the description."""
+    """Jacobian (c, n) of the file's equality constraints with respect to the coordinates of the description."""
     state = forward(twin, data, q, np.zeros(twin.size))
     ties, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty((twin.size, data.nefc))
     for row, unit in zip(rows, np.eye(twin.size), strict=True):
@@ -150,7 +153,7 @@ def _of_file(
 
 
 def sliding(twin: TwinModel, states: Sequence[State]) -> list[State]:
-    """The states at which every joint with dry friction slides: there it has its whole force in every build.
+    """Those of the states at which every joint with dry friction slides, so that its full friction acts in every build.
 
     MuJoCo's is a soft constraint, whose force is less where a joint sticks.
     """

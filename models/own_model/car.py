@@ -46,7 +46,7 @@ DIFFERS = 0.01
 
 
 def car(path: Path) -> SpatialVehicle:
-    """The vehicle of an MJCF file, unloaded; InputError for what no vehicle of a scene can have."""
+    """The vehicle of an MJCF file, unloaded; InputError for features that vehicles of a scene cannot have."""
     document = guarded(path)
     if document.kind != "MJCF":
         raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
@@ -57,7 +57,7 @@ def car(path: Path) -> SpatialVehicle:
 
 @dataclass
 class _Reader:
-    """The parts of one file."""
+    """Reader of one file: collects the parts of the vehicle."""
 
     model: mujoco.MjModel
     document: Document
@@ -97,7 +97,7 @@ class _Reader:
         raise InputError(self.document.path.name, place, value, said)
 
     def _leave_out(self, roles: Roles) -> None:
-        """Forget what twinrig has in another way; refuse what else has no equal."""
+        """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
         acted = forget(self.model, roles)
         joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
         for row in contents(self.model, self.document):
@@ -117,7 +117,7 @@ class _Reader:
             self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
 
     def _check_gravity(self) -> None:
-        """Refuse gravity along another direction than down; tell another one than that of scenes."""
+        """Refuse gravity that does not act downwards; add a note if it differs from that of scenes."""
         gravity, name = np.array(self.model.opt.gravity), "option gravity"
         if np.any(gravity[:2]) or gravity[2] > 0.0:
             self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")
@@ -128,7 +128,7 @@ class _Reader:
                 self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
 
     def _elements(self, parts: CarBodies) -> Iterator[JointElement]:
-        """What acts along coordinates of the suspension, with the signs of their axes."""
+        """Springs, dampers and rotors along the suspension's coordinates, with the signs of their axes."""
         joints = {place_of(self.model, j)[0]: j for j in range(self.model.njnt)}
         for element in joint_elements(self.model):
             numbers = [joints[body] for body, _ in element.coordinates]
@@ -141,7 +141,7 @@ class _Reader:
             yield replace(element, coordinates=tuple(at for at, _ in moved), factors=factors)
 
     def _ranges(self, parts: CarBodies) -> Iterator[tuple]:
-        """Stops of the suspension in its coordinates."""
+        """Limits of the suspension joints, in the suspension's coordinates."""
         model = self.model
         for j, (at, sign) in parts.coordinates.items():
             if model.jnt_limited[j]:
@@ -149,7 +149,7 @@ class _Reader:
                 yield at, float(low), float(high)
 
     def _points(self, design: mujoco.MjData, parts: CarBodies, wheels: tuple[WheelSite, ...]) -> Iterator[PointOutput]:
-        """Vertical acceleration of every other site that has a name."""
+        """Outputs of vertical acceleration at every named site that is not a wheel."""
         taken = {wheel.site for wheel in wheels}
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
@@ -157,7 +157,8 @@ class _Reader:
                 yield PointOutput(name, "acceleration", parts.of[body], _vector(design.site_xpos[s]), (0.0, 0.0, 1.0))
 
     def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
-        """The vehicle, whose springs bear what holds it at rest; the file's own preloads are told where they differ."""
+        """The vehicle without preloads, since its springs will get those that hold it at rest. A note lists where the
+        file's preloads differ."""
         held = preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
             f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"
@@ -172,7 +173,7 @@ class _Reader:
 
 
 def _reserved(wheels: tuple[WheelSite, ...]) -> set[str]:
-    """Names of the bodies that a system adds to a car."""
+    """Names of bodies that a system adds to a car, so that the file's bodies cannot have them."""
     return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
 
 

@@ -25,7 +25,8 @@ ROUNDING = 1e-12
 
 
 class Mass(NamedTuple):
-    """mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in the vehicle's axes (kg m^2)."""
+    """Mass properties of a rigid body: mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in
+    the vehicle's axes (kg m^2)."""
 
     mass: float
     centre: np.ndarray
@@ -34,9 +35,9 @@ class Mass(NamedTuple):
 
 @dataclass(frozen=True)
 class CarBodies:
-    """bodies : parents before their riders; chassis : its name; of : name of the body that a body of the file is one
-    with; coordinates : of the suspension's joints, with the sign of their axes; spin : of every wheel that spins, by
-    the name of its tyre, kg m^2 about its axle."""
+    """Bodies of the car. bodies : parents before children; chassis : its name; of : for each body of the file, the name
+    of the body that contains it; coordinates : of the suspension's joints, with the sign of their axes; spin : inertia
+    about the axle (kg m^2) of every spinning wheel, by the name of its tyre."""
 
     bodies: tuple[Body, ...]
     chassis: str
@@ -47,21 +48,21 @@ class CarBodies:
 
 @dataclass
 class _Segment:
-    """Freedoms that a body has in their order; anchor : of the hinges among them."""
+    """Consecutive freedoms of a body that one joint can have; anchor : common point of the hinges among them."""
 
     freedoms: list[Freedom] = field(default_factory=list)
     joints: list[tuple[int, Freedom, float]] = field(default_factory=list)
     anchor: np.ndarray | None = None
 
     def takes(self, freedom: Freedom, anchor: np.ndarray) -> bool:
-        """Whether the next joint of a body can be one of it."""
+        """Whether the body's next joint can belong to this segment."""
         order = FREEDOMS.index
         if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
             return False
         return freedom[0] != "r" or self.anchor is None or bool(np.abs(anchor - self.anchor).max() <= ROUNDING)
 
     def add(self, joint: int, freedom: Freedom, sign: float, anchor: np.ndarray) -> None:
-        """Take a joint."""
+        """Add a joint to the segment."""
         self.freedoms.append(freedom)
         self.joints.append((joint, freedom, sign))
         if freedom[0] == "r":
@@ -71,7 +72,7 @@ class _Segment:
 def car_bodies(
     model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
 ) -> CarBodies:
-    """The bodies; InputError for joints that are oblique, and for wheels that are out of balance.
+    """Bodies of the car; InputError for joints with oblique axes, and for wheels with imbalance.
 
     design : data of the model in the design position, with kinematics computed; reserved : names for other bodies.
     """
@@ -79,7 +80,7 @@ def car_bodies(
 
 
 class _Builder:
-    """Joins the bodies of one file to those of the description."""
+    """Combines bodies of one file into those of the description."""
 
     def __init__(
         self, model: mujoco.MjModel, design: mujoco.MjData, roles: Roles, document: Document, reserved: Collection[str]
@@ -113,12 +114,12 @@ class _Builder:
         return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin)
 
     def _kept(self, body: int) -> list[int]:
-        """Joints of the suspension that a body has."""
+        """Joints of a body that belong to the suspension."""
         left_out = {*self.roles.spin, *self.roles.steer}
         return [j for j in joints_of(self.model, body) if j not in left_out] if body not in self.roles.chassis else []
 
     def _name(self, leader: int) -> str:
-        """That of its body; of the chassis, that of the heaviest of its bodies."""
+        """Name of the combined body: that of its leading body, or for the chassis that of its heaviest body."""
         body = max(self.roles.chassis if leader in self.roles.chassis else (leader,), key=self.model.body_mass.item)
         name: str = self.model.body(body).name or f"body {body}"
         return f"{name} of the file" if name in self.reserved else name
@@ -129,7 +130,8 @@ class _Builder:
         return Mass(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
 
     def _spinning(self) -> set[int]:
-        """Bodies that spin with wheels; their masses without the inertia about the axle, which goes to the spin."""
+        """Bodies that spin with the wheels. Their inertia about the axle is removed from the masses, because it counts
+        as the wheel's spin inertia."""
         spinning = set[int]()
         for joint, wheel in self.roles.spin.items():
             body = int(self.model.jnt_bodyid[joint])
@@ -153,7 +155,7 @@ class _Builder:
         return body == on
 
     def _check_round(self, whole: Mass, wheel: WheelSite, joint: int) -> None:
-        """Refuse a wheel that shakes as it spins."""
+        """Refuse a wheel with imbalance, which would shake as it spins."""
         inertia, beside = whole.inertia, np.abs((whole.centre - wheel.point)[[0, 2]]).max()
         uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
         if (whole.mass and (beside > SAME or uneven > ROUND * np.trace(inertia))) or not inertia[1, 1] > 0.0:
@@ -178,7 +180,7 @@ class _Builder:
 
 
 def combined(masses: list[Mass]) -> Mass:
-    """All of them as one rigid body."""
+    """One rigid body that has the mass, centre and inertia of all the given ones."""
     if len(masses) == 1:
         return masses[0]
     total = sum(each.mass for each in masses)
@@ -195,7 +197,8 @@ def _links(
     whole: Mass,
     coordinates: dict[int, tuple[tuple[str, Freedom], float]],
 ) -> Iterator[Body]:
-    """A body on its joints; where they are goes into ``coordinates``."""
+    """Bodies of the description for one body of the file and its joints; fills ``coordinates`` with the joints' new
+    names."""
     for number, segment in enumerate(segments):
         last, at = number == len(segments) - 1, segment.anchor
         itself = last and (at is None or np.abs(at - whole.centre).max() <= ROUNDING)

@@ -25,7 +25,8 @@ SPECK = 1e-6
 
 @dataclass(frozen=True)
 class Roles:
-    """chassis : numbers of its bodies; spin, steer : joints that spin or steer the wheel of a site."""
+    """Roles of the joints: chassis : numbers of its bodies; spin, steer : for each joint that spins or steers a wheel,
+    the site of that wheel."""
 
     chassis: tuple[int, ...]
     spin: dict[int, WheelSite]
@@ -39,7 +40,8 @@ def joints_of(model: mujoco.MjModel, body: int) -> range:
 
 
 def freedom_of(model: mujoco.MjModel, design: mujoco.MjData, joint: int) -> tuple[Freedom, float] | None:
-    """A hinge or slide as a freedom in the vehicle's axes, and the sign of its axis; None where it is oblique."""
+    """A hinge or slide as a freedom in the vehicle's axes, and the sign of its axis; None where its axis is not
+    parallel to one of these."""
     axis, kind = design.xaxis[joint], int(model.jnt_type[joint])
     along = int(np.abs(axis).argmax())
     if kind in (FREE, BALL) or np.abs(np.delete(axis, along)).max() > PARALLEL:
@@ -48,7 +50,8 @@ def freedom_of(model: mujoco.MjModel, design: mujoco.MjData, joint: int) -> tupl
 
 
 def roles_of(model: mujoco.MjModel, design: mujoco.MjData, wheels: tuple[WheelSite, ...], document: Document) -> Roles:
-    """The part of every joint; InputError where there is no free chassis, or a wheel turns as no wheel does here."""
+    """The role of every joint; InputError where no chassis is free, or a wheel turns in a way that twinrig does not
+    have."""
     chassis = _chassis(model, design, document)
     spin, steer = dict[int, WheelSite](), dict[int, WheelSite]()
     for wheel in wheels:
@@ -62,13 +65,13 @@ def roles_of(model: mujoco.MjModel, design: mujoco.MjData, wheels: tuple[WheelSi
 
 
 def told(model: mujoco.MjModel, document: Document, joint: int) -> str:
-    """How messages call a joint."""
+    """Text by which messages name a joint."""
     line = document.line(("joint", "freejoint"), model.joint(joint).name)
     return label(model, "joint", joint) + (f" ({line})" if line else "")
 
 
 def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[int, ...]:
-    """Bodies from the ground to the one that has all six freedoms; those before it have next to no mass."""
+    """Bodies from the ground to the one that completes all six freedoms; those before it are almost massless."""
     numbers, name = moving(model), document.path.name
     roots = [b for b in numbers if int(model.body_parentid[b]) not in numbers]
     if len(roots) > 1:
@@ -95,7 +98,7 @@ def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -
 
 
 def _behind(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]) -> list[int]:
-    """Joints between the chassis and a body, the body's own with them."""
+    """Joints on the path from the chassis to a body, including the body's own."""
     joints = list[int]()
     while body not in chassis and body:
         joints += joints_of(model, body)
@@ -104,7 +107,8 @@ def _behind(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]) -> list[
 
 
 def _spin(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, document: Document) -> int | None:
-    """The hinge about y through a wheel's centre, on its body or on what that carries; None where it has none."""
+    """The hinge about y through a wheel's centre, on the wheel's body or on one that this body carries; None if there
+    is none."""
     bodies = [wheel.body, *(b for b in range(1, model.nbody) if int(model.body_parentid[b]) == wheel.body)]
     spins = []
     for joint in (j for b in bodies for j in joints_of(model, b)):
@@ -119,7 +123,7 @@ def _spin(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, docume
 
 
 def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of: str) -> None:
-    """Refuse springs, dampers, rotors and dry friction along coordinates that twinrig has in another way."""
+    """Refuse springs, dampers, rotors and dry friction on joints that twinrig models in another way."""
     for joint in joints:
         first = int(model.jnt_dofadr[joint])
         freedoms = slice(first, first + (6 if model.jnt_type[joint] == FREE else 1))
@@ -149,7 +153,7 @@ def _check_steering(
 
 
 def forget(model: mujoco.MjModel, roles: Roles) -> list[str]:
-    """Take all that acts on joints that spin or steer wheels out of the model; names of what there was."""
+    """Remove all elements that act on the joints for spin or steering from the model; returns their names."""
     moved, names = {*roles.spin, *roles.steer}, list[str]()
     for joint in roles.steer:
         first = int(model.jnt_dofadr[joint])
@@ -169,7 +173,7 @@ def forget(model: mujoco.MjModel, roles: Roles) -> list[str]:
 
 
 def _forget_actuators(model: mujoco.MjModel, joints: set[int], tendons: set[int]) -> list[str]:
-    """Names of those along these joints and tendons, which push no more."""
+    """Switch off the actuators on these joints and tendons; returns their names."""
     names = list[str]()
     for i in range(model.nu):
         kind, target = int(model.actuator_trntype[i]), int(model.actuator_trnid[i, 0])
@@ -183,7 +187,7 @@ def _forget_actuators(model: mujoco.MjModel, joints: set[int], tendons: set[int]
 
 
 def _forget_equalities(model: mujoco.MjModel, joints: set[int], tendons: set[int]) -> list[str]:
-    """Names of those that couple these joints or tendons alone, which hold no more."""
+    """Switch off the constraints that couple only these joints or tendons; returns their names."""
     names, kinds = list[str](), mujoco.mjtEq
     for e in np.flatnonzero(model.eq_active0).tolist():
         pair = {int(model.eq_obj1id[e]), int(model.eq_obj2id[e])} - {-1}

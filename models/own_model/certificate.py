@@ -50,8 +50,8 @@ Told = Callable[[float], object]
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What others are held to: names of coordinates (n,), the slice of coordinates that are judged with each (n,), what
-    it does at some states, and how sensitive that is to rounding."""
+    """The file's own model as reference for the builds: names of coordinates (n,), for each the slice of coordinates
+    that are judged together with it (n,), its motion at some states, and the sensitivity of this motion to rounding."""
 
     names: tuple[str, ...]
     together: tuple[slice, ...]
@@ -61,7 +61,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of one build with the file's own model: largest relative differences of mass, force and acceleration.
+    """Agreement of one build with the file's own model: largest relative differences of mass, force and acceleration.
 
     worst : the coordinate whose acceleration differs most; difference, size : of its accelerations there, in m/s^2 or
     rad/s^2; bound : share of the largest acceleration of a coordinate that moves which may be rounding, 1e-10 or more;
@@ -80,7 +80,8 @@ class Agreement:
 
     @property
     def same_motion(self) -> bool:
-        """Whether accelerations are the same, and the mass matrix: what no force moves now may be pushed one day."""
+        """Whether accelerations and the mass matrix agree. The matrix counts too, because a force may later act where
+        none acts now."""
         return max(self.acceleration, self.mass) <= ALIKE
 
     @property
@@ -90,7 +91,8 @@ class Agreement:
 
 
 def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
-    """Every build of the description beside the file's own model; RunFailed where dry friction sticks at all states."""
+    """Agreement of every build of the description with the file's own model; RunFailed where dry friction sticks at all
+    states."""
     states, rows = states_of(twin, count), list[Agreement]()
     soft = reference(twin, states, SOFT)
     rigid = reference(twin, states, PLAIN) if twin.driven.tied else soft
@@ -102,7 +104,7 @@ def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: 
 
 
 def states_of(twin: TwinModel, count: int) -> list[State]:
-    """Random states; where dry friction sticks with rates that are faster, and left out where it sticks all the same.
+    """Random states. Where dry friction sticks, the rates are increased; a state is left out if it sticks all the same.
 
     RunFailed where none is left.
     """
@@ -117,22 +119,22 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
 
 
 def softness(twin: TwinModel, count: int) -> float:
-    """Largest relative difference of accelerations of the file's own model with MuJoCo's soft constraints from those
-    with rigid ones, at states that satisfy them."""
+    """Largest relative difference of the file's accelerations with MuJoCo's soft constraints from those with rigid
+    constraints, at states that satisfy the constraints."""
     states = states_of(twin, count)
     return agreement("", reference(twin, states, PLAIN), moved_at(expected(twin, SOFT), states)).acceleration
 
 
 def reference(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
-    """The file's own model at some states, as a build must move; RunFailed as of ``moved_at``."""
+    """``Reference`` for a build from the file's own model at some states; RunFailed as in ``moved_at``."""
     law = partial(expected, build=build)
     moved = moved_at(law(twin), states)
     return Reference(twin.names, several_at_once(twin.model), moved, sensitivities(twin, law, states, moved))
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
-    """Mass, forces and accelerations at all states; RunFailed where a mass matrix cannot be solved for any, or an
-    acceleration is not finite."""
+    """Mass matrix, forces and accelerations at all states; RunFailed where a mass matrix is singular or an acceleration
+    is not finite."""
     try:
         moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
@@ -143,7 +145,7 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
 
 
 def agreement(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
-    """Largest differences over all states of a model."""
+    """Largest differences between a build and the reference over all states."""
     rows = [_scales(expected, i) for i in range(len(seen))]
     own, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
     apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired(seen, expected.moved)))
@@ -158,8 +160,8 @@ def agreement(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreeme
 
 
 def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
-    """Share of a coordinate's largest acceleration that may be rounding (s, n), 1e-10 or more; without coordinates
-    that hardly move."""
+    """Largest ratio of the rounding (s, n) to the largest acceleration of a coordinate, 1e-10 or more; coordinates that
+    hardly move are left out."""
     largest, allowed = own.acceleration.max(axis=0), rounding.max(axis=0)
     weighted = largest * np.sqrt(np.diagonal(own.mass, axis1=1, axis2=2).max(axis=0))
     moves = weighted > HARDLY * weighted.max()
@@ -167,7 +169,7 @@ def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
 
 
 def _paired(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:
-    """Of all states: both masses, both forces, both accelerations."""
+    """Pairs of seen and expected values over all states: mass matrices, forces, accelerations."""
     return zip(zip(*seen, strict=True), zip(*expected, strict=True), strict=True)
 
 
@@ -176,9 +178,9 @@ def _largest(shares: np.ndarray) -> float:
 
 
 def _scales(expected: Reference, state: int) -> tuple[Moved, Moved]:
-    """At one state: sizes of masses, forces and accelerations, and how much of each may be rounding.
+    """Reference magnitudes of masses, forces and accelerations at one state, and the rounding error allowed in each.
 
-    It does not grow any more where a mass matrix is near a singular one.
+    The allowed error does not grow further where a mass matrix is nearly singular.
     """
     moved, sensitive = expected.moved[state], expected.sensitive[state]
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
@@ -190,6 +192,6 @@ def _scales(expected: Reference, state: int) -> tuple[Moved, Moved]:
 
 
 def _condition(mass: np.ndarray) -> float:
-    """Of a mass matrix scaled to a unit diagonal."""
+    """Condition number of a mass matrix after scaling to a unit diagonal."""
     scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), np.finfo(float).tiny))
     return float(np.linalg.cond(mass * np.outer(scale, scale)))

@@ -30,8 +30,8 @@ def plain_constraints(twin: TwinModel) -> PlainConstraints:
 
 
 def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Forces (n,) with those of rigid constraints rows q'' + rest = 0, (c, n) and (c,), some of which may repeat
-    others."""
+    """Forces (n,) including constraint forces, for rigid constraints rows q'' + rest = 0 with rows (c, n) and rest
+    (c,); rows may be linearly dependent."""
     turned, sizes, rows = np.linalg.svd(rows, full_matrices=False)
     kept = sizes > REDUNDANT * sizes[0]
     rows, rest = rows[kept], (rest @ turned)[kept] / sizes[kept]
@@ -41,7 +41,7 @@ def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray
 
 
 def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """J (c, n), and J' q' (c,) by its differences along the motion, at coordinates and rates (n,)."""
+    """Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates (n,)."""
     stride = STRIDE / max(float(np.abs(v).sum()), 1e-9)
     steps = [k * stride * v for k in range(1, len(SLOPES) + 1)]
     rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
@@ -51,8 +51,8 @@ def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
 
 
 def satisfying(constraints: PlainConstraints, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """The nearest coordinates, and the nearest rates (n,), that satisfy constraints, by Newton's method; None where it
-    does not get there."""
+    """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
+    converge."""
     for _ in range(TRIES):
         gap = constraints.gap(q)
         inverse = np.linalg.pinv(gap.rows, REDUNDANT)

@@ -37,25 +37,26 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class Content:
-    """kind : as ``--without`` names it; names : of what it is, with "FILE:LINE" where known; why : no equal."""
+    """Content of a file that needs attention. kind : its name for ``--without``; names : of the elements concerned,
+    with "FILE:LINE" where known; why : reason why other builds cannot represent it."""
 
     kind: str
     names: tuple[str, ...]
     why: str
 
     def line(self) -> str:
-        """One line on it."""
+        """One line of text with kind, names and reason."""
         more = f" and {len(self.names) - SHOWN} more" if len(self.names) > SHOWN else ""
         return f"{self.kind}: {', '.join(self.names[:SHOWN])}{more}: {self.why}"
 
 
 def contents(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """All that is no part of a tree with linear laws, a row for each kind that the model has."""
+    """All parts of the model beyond a tree with linear laws, one entry for each kind that occurs."""
     return _rows(model, document, lambda kind, what, number: True)
 
 
 def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """Of ``contents``, what has no equal in the other builds."""
+    """The entries of ``contents`` that other builds cannot represent."""
     return _rows(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
 
 
@@ -68,8 +69,8 @@ def _rows(model: mujoco.MjModel, document: Document, wanted: Callable[[str, str,
 
 
 def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool:
-    """Whether a ball joint has no rotor, dry friction is that of a hinge or slide, and an equality constraint is
-    between bodies, or a coupling of two hinges or slides."""
+    """Whether other builds can represent it: a ball joint without rotor, dry friction of a hinge or slide, or an
+    equality constraint between bodies or of one or two hinges or slides."""
     if kind == "friction_loss":
         return what == "joint" and rubs(model, number)
     if kind == "turning_law":
@@ -78,7 +79,8 @@ def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
-    """Change the model so that it has none of ``without``; what was left out. InputError for what else has no equal."""
+    """Remove the parts named in ``without`` from the model, and return what was removed. InputError where another part
+    cannot be represented."""
     for kind in without:
         if kind not in KINDS:
             raise InputError("--without", "", kind, "no such content", tuple(KINDS))
@@ -116,7 +118,7 @@ NAMELESS = -1
 
 
 def _touching(model: mujoco.MjModel) -> Listed:
-    """Geoms that could touch another one, and pairs."""
+    """Geoms that could come into contact with another one, and explicit contact pairs."""
     if disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
@@ -147,7 +149,7 @@ def _equalities(model: mujoco.MjModel) -> Listed:
 
 
 def _odd_actuators(model: mujoco.MjModel) -> Listed:
-    """Those with a state, along a way through space, or that are no affine law."""
+    """Actuators that have a state, act along a spatial tendon, or follow a law that is not affine."""
     for i in range(model.nu):
         target = int(model.actuator_trnid[i, 0])
         kind = int(model.actuator_trntype[i])
@@ -182,7 +184,7 @@ def _spatial_tendons(model: mujoco.MjModel) -> Listed:
 
 
 def _turning_laws(model: mujoco.MjModel) -> Listed:
-    """Springs, dampers and rotors about all axes at once."""
+    """Joints with springs, dampers or rotors that act about all three axes at once."""
     for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
         first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
         if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
@@ -234,7 +236,7 @@ def _forget_equalities(model: mujoco.MjModel) -> None:
 
 
 def _forget_actuators(model: mujoco.MjModel) -> None:
-    """The odd ones push no more; a delayed or stateful one, too, has neither gain nor bias."""
+    """Switch off the force of the actuators from ``_odd_actuators``, by setting gain and bias to zero."""
     for i in [i for _, i in _odd_actuators(model)]:
         model.actuator_gaintype[i], model.actuator_biastype[i] = GAIN.mjGAIN_FIXED, BIAS.mjBIAS_NONE
         model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0

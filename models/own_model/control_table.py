@@ -23,7 +23,8 @@ ON_STEP = 1e-6
 
 
 class Leg(NamedTuple):
-    """So many steps of a path under constant controls (nu,): ``twin`` has them among the constants of its actuators."""
+    """A section of a path with constant controls (nu,), ``steps`` long; ``twin`` contains their forces as constants of
+    its actuators."""
 
     twin: TwinModel
     steps: int
@@ -39,7 +40,8 @@ class ControlTable:
     values: np.ndarray
 
     def legs(self, twin: TwinModel, steps: int, step: float) -> list[Leg]:
-        """Those of a path of so many steps of so many seconds; InputError where a row lies between two steps."""
+        """Sections of a path of ``steps`` steps of ``step`` seconds; InputError where a row's time lies between two
+        steps."""
         first = self.times / step
         off = np.flatnonzero(abs(first - np.round(first)) > ON_STEP)
         if len(off):
@@ -51,12 +53,13 @@ class ControlTable:
 
 
 def constant_leg(twin: TwinModel, steps: int) -> list[Leg]:
-    """The whole path under the constant controls of the model."""
+    """The whole path as one section with the model's constant controls."""
     return [Leg(twin, steps, controls(twin.model))]
 
 
 def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
-    """Read a CSV with columns ``time [s]`` and one for each actuator, by name (``actuator 3`` where it has none).
+    """Read a CSV file with columns ``time [s]`` and one per actuator, called by its name (``actuator 3`` if it has
+    none).
 
     Raises InputError for what ``read_table`` refuses, a first time that is not 0, and a control out of its range.
     """
@@ -78,7 +81,7 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
 
 
 def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
-    """The model whose actuators do, at any control, what the given ones do at constant controls (nu,)."""
+    """A model whose actuators ignore their control and act as with the constant controls (nu,)."""
     model = copy.copy(twin.model)
     for i in range(model.nu):
         model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(constant[i]))

@@ -16,7 +16,8 @@ SLIDE, BALL, FREE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in 
 
 
 class MujocoState(NamedTuple):
-    """qpos (nq,), qvel (n,), J (n, n) and J' v (n,) at one state."""
+    """MuJoCo's state qpos (nq,), qvel (n,), the Jacobian J (n, n) from the coordinates' rates to qvel, and J' v
+    (n,)."""
 
     qpos: np.ndarray
     qvel: np.ndarray
@@ -26,8 +27,9 @@ class MujocoState(NamedTuple):
 
 @dataclass(frozen=True)
 class Turning:
-    """Three angles: their first coordinate, the quaternion's place in qpos, the axes (3, 3) of the body's frame in the
-    design position as columns, and whether the quaternion says how the body lies in space (free) or turned (ball)."""
+    """Three angles in place of a quaternion: index of their first coordinate, index of the quaternion in qpos, axes (3,
+    3) of the body's frame in the design position as columns, and whether the quaternion is the attitude in space (free
+    joint) or relative (ball joint)."""
 
     first: int
     place: int
@@ -36,7 +38,7 @@ class Turning:
 
 
 class Coordinates:
-    """Those of one model; the order is MuJoCo's of its degrees of freedom."""
+    """Coordinates of one model, in the order of MuJoCo's degrees of freedom, and their conversion to MuJoCo's state."""
 
     def __init__(self, model: mujoco.MjModel, design: mujoco.MjData) -> None:
         """design : data of the model in the design position, with kinematics computed."""
@@ -56,7 +58,7 @@ class Coordinates:
                 self._plain.append((first, place))
 
     def positions(self, states: np.ndarray) -> np.ndarray:
-        """Coordinates (m, n) of MuJoCo's states (m, nq + n); what turns without limit is not a number."""
+        """Coordinates (m, n) of MuJoCo's states (m, nq + n); NaN for rotations without limits."""
         out = np.full((len(states), self.size), np.nan)
         for coordinate, place in self._plain:
             out[:, coordinate] = states[:, place] - self._zero[place]
@@ -77,7 +79,8 @@ class Coordinates:
 
 
 def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
-    """For every coordinate (n,), those of its joint that turn or shift a body along three axes at once with it."""
+    """For every coordinate (n,), the slice of its joint's coordinates that together turn or shift a body along three
+    axes."""
     groups = list[slice]()
     for j in range(model.njnt):
         first = int(model.jnt_dofadr[j])
@@ -87,7 +90,8 @@ def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
 
 
 def turned(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """R = Rx Ry Rz (3, 3), G (3, 3) of the angular velocity G rates in turned axes, and G' rates (3,)."""
+    """Rotation matrix R = Rx Ry Rz (3, 3), G (3, 3) with the angular velocity G rates in the rotated axes, and G' rates
+    (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)
     first = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     second = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))

@@ -35,7 +35,7 @@ def _word(text: str) -> np.ndarray:
 
 
 def _refused(what: str) -> Writer:
-    """A writer of what is another tree."""
+    """A writer that raises ValueError, for properties that belong to the structure of the tree."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
         raise ValueError(f"{what} cannot be changed in a compiled model")
@@ -44,7 +44,7 @@ def _refused(what: str) -> Writer:
 
 
 def _numbered(model: mujoco.MjModel, sort: str, owner: str) -> int:
-    """The number of a thing by what ``label`` calls it; ValueError where there is none."""
+    """Index of the joint, body or tendon with the name that ``label`` gives; ValueError if there is none."""
     count = {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon}[sort]
     for number in range(count):
         if label(model, sort, number) == owner:
@@ -53,7 +53,7 @@ def _numbered(model: mujoco.MjModel, sort: str, owner: str) -> int:
 
 
 def _switch(flag: str) -> tuple[Reader, Writer]:
-    """Whether a part of MuJoCo is switched off in a file."""
+    """Reader and writer of a switch by which a file turns off a feature of MuJoCo."""
     bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
 
     def write(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
@@ -64,7 +64,7 @@ def _switch(flag: str) -> tuple[Reader, Writer]:
 
 
 def _read_acts(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """Whether an actuator is in a group that is switched off."""
+    """Whether an actuator acts, or belongs to a group that is switched off."""
     return _word("on" if acts(model, i) else OFF)
 
 
@@ -90,7 +90,7 @@ def _write_type(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 
 
 def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """The joint before a joint, on the way from the world."""
+    """The joint before a joint on the path from the world."""
     body = int(model.jnt_bodyid[j])
     if j > model.body_jntadr[body]:
         return _word(label(model, "joint", j - 1))
@@ -98,7 +98,7 @@ def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
 
 
 def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """The last joint on the way from the world to a body."""
+    """The last joint on the path from the world to a body."""
     while body and not model.body_jntnum[body]:
         body = int(model.body_parentid[body])
     last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
@@ -106,7 +106,7 @@ def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
 
 
 def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
-    """Joints of a fixed tendon, bodies at both ends of a straight one."""
+    """Joints of a fixed tendon, or bodies at both ends of a straight one."""
     if is_fixed(model, t):
         return _word(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
     if is_line(model, t):
@@ -145,7 +145,7 @@ def _write_target(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 def _read_between(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Joints that a constraint couples, bodies that it holds together."""
+    """Joints or bodies that an equality constraint connects."""
     things = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
     if is_tie(model, e):
         return _word(" and ".join(label(model, "joint", j) for j in things if j >= 0))

@@ -35,17 +35,17 @@ class Element:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What it is."""
+        """Identification of the element: its kind and its owner."""
         return self.kind, self.owner
 
     @property
     def says(self) -> bool:
-        """Whether it is more than zeros."""
+        """Whether the value is not zero."""
         return says(self.value)
 
     @property
     def text(self) -> str:
-        """Its value with its unit."""
+        """The value with its unit as text."""
         return shown(self.value, self.unit)
 
     def same(self, other: "Element") -> bool:
@@ -59,17 +59,17 @@ class Element:
 
 
 def is_word(value: np.ndarray) -> bool:
-    """Whether a value is a word, and no numbers."""
+    """Whether a value is a word, not numbers."""
     return value.dtype.kind == "U"
 
 
 def says(value: np.ndarray) -> bool:
-    """Whether a value is more than zeros."""
+    """Whether a value is a word or contains a number other than zero."""
     return is_word(value) or bool(value.any())
 
 
 def shown(value: np.ndarray, unit: str = "", digits: int = DIGITS) -> str:
-    """A value with its unit, "none" for zeros or nothing."""
+    """A value with its unit as text; "none" for zeros or an empty value."""
     if not says(value):
         return "none"
     if is_word(value):
@@ -80,7 +80,7 @@ def shown(value: np.ndarray, unit: str = "", digits: int = DIGITS) -> str:
 
 
 def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
-    """Two values that differ, in as few digits as show it."""
+    """Two different values as text, with as few digits as show the difference."""
     texts = shown(first, unit), shown(second, unit)
     for digits in range(DIGITS + 1, EXACT + 1):
         if texts[0] != texts[1]:
@@ -90,13 +90,13 @@ def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, s
 
 
 def short(number: float) -> str:
-    """A relative difference in two digits, "0" for none at all."""
+    """A relative difference as text with two digits; "0" for zero."""
     return f"{number:.1e}" if number else "0"
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A property of all things of one sort: how it is read and written."""
+    """One kind of property, for all parts of a sort: how it is read and written."""
 
     sort: str
     kind: str
@@ -111,8 +111,8 @@ def elements(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write an element's value into a model for ``described``; KeyError where it has no such element, ValueError where
-    this one cannot have that value."""
+    """Write a value of an element into a model for ``described``; KeyError if the model has no such element, ValueError
+    if the element cannot have this value."""
     kind, number = _place(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")
@@ -121,7 +121,7 @@ def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
 
 
 def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
-    """Take an element out of a model where it can be without; whether it could."""
+    """Set an element to zero in a model, if its kind allows this; returns whether it does."""
     kind, number = _place(model, key)
     if kind.kind not in DROPPED:
         return False
@@ -156,7 +156,7 @@ def _owner(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
 
 
 def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
-    """Units of turning where two are given, of shifting on a slide."""
+    """The unit for this part, where one exists for rotation and one for translation."""
     turning, _, shifting = kind.unit.partition(" | ")
     slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE, FREE)
     return shifting if shifting and slides else turning
@@ -181,7 +181,7 @@ def _of_joint(field: str) -> tuple[Callable, Callable]:
 
 
 def _of_freedoms(field: str) -> tuple[Callable, Callable]:
-    """Numbers of the first freedoms of a joint, which are the same for all of a kind."""
+    """Reader and writer of a field's numbers for all degrees of freedom of a joint: 6, 3 or 1."""
 
     def places(model: mujoco.MjModel, j: int) -> slice:
         first = int(model.jnt_dofadr[j])
@@ -191,7 +191,7 @@ def _of_freedoms(field: str) -> tuple[Callable, Callable]:
 
 
 def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """Where a joint's spring is at rest, from the design position; nothing where there is no spring."""
+    """Rest position of a joint's spring relative to the design position; empty if there is no spring."""
     at = int(model.jnt_qposadr[j])
     several = int(model.jnt_type[j]) in (BALL, FREE)
     return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]
@@ -204,7 +204,7 @@ def _write_spring(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 
 
 def _read_zero(model: mujoco.MjModel, j: int) -> np.ndarray:
-    """What the file calls the design position of a hinge or slide."""
+    """The joint coordinate that the file assigns to the design position of a hinge or slide."""
     at = int(model.jnt_qposadr[j])
     return np.zeros(0) if int(model.jnt_type[j]) in (BALL, FREE) else model.qpos0[at : at + 1].copy()
 
@@ -229,7 +229,7 @@ def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
 
 
 def tensor_of(entries: np.ndarray) -> np.ndarray:
-    """(3, 3) of the six entries of an inertia."""
+    """Inertia tensor (3, 3) from its six entries."""
     xx, yy, zz, xy, xz, yz = entries
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
@@ -251,7 +251,7 @@ def _write_gravity(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
 
 
 def _read_gear(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """What an actuator's force is multiplied by: six numbers on a site, one elsewhere."""
+    """Factors that multiply an actuator's force: six numbers on a site, one elsewhere."""
     return model.actuator_gear[i, : 6 if pushes_site(model, i) else 1].copy()
 
 
@@ -260,7 +260,7 @@ def _write_gear(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 def _within(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
-    """Reader and writer of a range, which is zeros where nothing is limited."""
+    """Reader and writer of a range, given as zeros where the range is not limited."""
     read, write = _field(range_field, lambda model, i: i)
 
     def read_limited(model: mujoco.MjModel, i: int) -> np.ndarray:
@@ -274,8 +274,8 @@ def _within(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
 
 
 def _law(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
-    """Reader and writer of an actuator's three numbers of gain or bias, of which an affine law alone has those from the
-    ``first`` on."""
+    """Reader and writer of an actuator's three numbers of gain or bias. Numbers from index ``first`` on count only for
+    an affine law."""
 
     def read(model: mujoco.MjModel, i: int) -> np.ndarray:
         law = np.array(getattr(model, numbers)[i, :3])
@@ -297,7 +297,7 @@ def _coefficients() -> tuple[Callable, Callable]:
 
 
 def _read_ends(model: mujoco.MjModel, t: int) -> np.ndarray:
-    """Places of both sites of a tendon that is a line, in the axes of their bodies."""
+    """Positions of both sites of a straight tendon, in the axes of their bodies."""
     return model.site_pos[sites_of(model, t)].ravel() if is_line(model, t) else np.zeros(0)
 
 
@@ -307,7 +307,7 @@ def _write_ends(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
 
 
 def _read_tie(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Whether a coupling acts (1), its offset and ratio; zeros where it does not."""
+    """Numbers of a coupling: 1 if it is active, its offset and ratio; zeros if it is not."""
     return np.array([1.0, *model.eq_data[e, :2]]) * model.eq_active0[e] if is_tie(model, e) else np.zeros(0)
 
 
@@ -316,7 +316,7 @@ def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 
 def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
-    """Whether a constraint between bodies acts (1), and where both ends are; zeros where it does not."""
+    """Numbers of a constraint between bodies: 1 if it is active, and the positions of both ends; zeros if it is not."""
     if not joins(model, e):
         return np.zeros(0)
     if by_sites(model, e):
@@ -350,7 +350,7 @@ def _write_softness(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 
 def _read_site(model: mujoco.MjModel, i: int) -> np.ndarray:
-    """Place and orientation of the site that an actuator pushes, in the axes of its body."""
+    """Position and orientation of the site on which an actuator acts, in the axes of its body."""
     site = int(model.actuator_trnid[i, 0])
     return np.concatenate((model.site_pos[site], model.site_quat[site])) if pushes_site(model, i) else np.zeros(0)
 

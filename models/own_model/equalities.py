@@ -13,7 +13,7 @@ CONNECT, WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
 
 def is_tie(model: mujoco.MjModel, equality: int) -> bool:
-    """Whether an equality constraint makes a hinge or slide follow another one in proportion, or stay where it is."""
+    """Whether an equality constraint couples a hinge or slide linearly to another one, or fixes it."""
     if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
         return False
     joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
@@ -21,7 +21,7 @@ def is_tie(model: mujoco.MjModel, equality: int) -> bool:
 
 
 def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
-    """Equality constraints of two joints, or of one, that act."""
+    """Active equality constraints of one or two joints."""
     if disabled(model, "EQUALITY"):
         return
     for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
@@ -33,10 +33,7 @@ def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
 
 
 def _softness(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """solref, as stiffness and damping whatever the step, and solimp.
-
-    MuJoCo takes a time constant shorter than two steps for two steps, unless ``refsafe`` is off.
-    """
+    """MuJoCo's solref, converted to stiffness and damping so that it does not depend on the step, and solimp."""
     time, ratio = model.eq_solref[equality].tolist()
     if time > 0.0 and ratio > 0.0:
         time = time if disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
@@ -45,17 +42,17 @@ def _softness(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], 
 
 
 def joins(model: mujoco.MjModel, equality: int) -> bool:
-    """Whether an equality constraint keeps points of bodies together, or bodies as they lie to each other."""
+    """Whether an equality constraint connects points of two bodies, or fixes the bodies to each other."""
     return int(model.eq_type[equality]) in (CONNECT, WELD)
 
 
 def by_sites(model: mujoco.MjModel, equality: int) -> bool:
-    """Whether an equality constraint is between two sites, and not between bodies."""
+    """Whether an equality constraint is defined by two sites instead of bodies."""
     return bool(model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE)
 
 
 def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
-    """Equality constraints between points of two bodies, or with their axes, that act."""
+    """Active equality constraints between points of two bodies, or between points and axes."""
     if disabled(model, "EQUALITY"):
         return
     numbers = moving(model)
@@ -74,9 +71,10 @@ def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connec
 
 
 def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Points (3,) and axes (3, 3) of both ends of a constraint in the design position: they lie alike where it is met.
+    """Points (3,) and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
+    constraint is satisfied.
 
-    A weld between bodies has its point of the second one first.
+    A weld between bodies gives its point on the second body first.
     """
     things, data = (model.eq_obj1id[equality], model.eq_obj2id[equality]), model.eq_data[equality]
     if by_sites(model, equality):
@@ -90,7 +88,7 @@ def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list
 
 
 def tie_rows(ties: Sequence[Coupling], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """(c, n) and (c,): rows q = offsets is what couplings ask of n coordinates."""
+    """Linear equations rows q = offsets that couplings impose on n coordinates: rows (c, n) and offsets (c,)."""
     rows = np.zeros((len(ties), size))
     for row, coupling in zip(rows, ties, strict=True):
         row[coupling.driven] = 1.0

@@ -47,11 +47,11 @@ class Difference:
 
     @property
     def key(self) -> Key:
-        """What differs."""
+        """Identification of the element that differs: its kind and owner."""
         return self.kind, self.owner
 
     def sentence(self, files: Sequence[str]) -> str:
-        """ "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
+        """Text such as "armature of joint 'hip': 0.02 kg m^2 in a.xml, none in b.urdf"."""
         values = [np.zeros(0) if value is None else value for value in (self.first, self.second)]
         first, second = told_apart(values[0], values[1], self.unit)
         return f"{self.said or self.kind} of {self.owner}: {first} in {files[0]}, {second} in {files[1]}"
@@ -59,8 +59,8 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two files: how far their accelerations are apart, elements that differ with the most influential first, how far
-    they are apart when all of these are taken over, and what has no partner in the other file."""
+    """Comparison of two files: agreement of their accelerations; different elements, the most influential first; the
+    remaining disagreement when all of these are taken over; and coordinates that only one file has."""
 
     apart: Agreement | None
     differences: tuple[Difference, ...]
@@ -74,22 +74,23 @@ class Comparison:
 
     @property
     def influential(self) -> tuple[Difference, ...]:
-        """Differences that change accelerations or the mass matrix, or could not be tried."""
+        """Differences that change accelerations or the mass matrix, and those whose influence could not be
+        determined."""
         tried = (each for each in self.differences if not each.off)
         return tuple(each for each in tried if each.influence is None or each.influence > STILL)
 
     @property
     def not_compared(self) -> tuple[Difference, ...]:
-        """Differences in what is off in both files."""
+        """Differences in features that are switched off in both files."""
         return tuple(each for each in self.differences if each.off)
 
     @property
     def silent(self) -> tuple[Difference, ...]:
-        """Differences that change neither."""
+        """Differences that change neither accelerations nor the mass matrix."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
     def rest(self) -> str:
-        """What is left when all elements are taken over that can be."""
+        """Text on the disagreement that remains when all possible elements are taken over."""
         if self.unexplained <= ALIKE:
             return f"with these taken over, both move alike: {short(self.unexplained)} is left"
         untried = any(each.influence is None for each in self.influential)
@@ -100,7 +101,7 @@ class Comparison:
 
 
 def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Comparison:
-    """Two files at states within the ranges of the first."""
+    """Comparison of two files, at random states within the ranges of the first file."""
     unmatched = _unmatched(first, second)
     if unmatched:
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
@@ -121,21 +122,21 @@ def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Compari
 
 
 def _importance(difference: Difference) -> float:
-    """Sorts the most influential first, and before them what could not be tried."""
+    """Sort key: differences with unknown influence first, then the most influential."""
     return -np.inf if difference.influence is None else -difference.influence
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """The first file with elements as the second has them."""
+    """The first file, changed so that some elements have the second file's values."""
 
     twin: TwinModel
     states: States
     base: Reference
 
     def influence(self, model: mujoco.MjModel) -> float | None:
-        """Largest relative change by a changed model: of accelerations, or of the mass matrix where these stay; None
-        where it cannot be built."""
+        """Largest relative change that a changed model causes in accelerations, or in the mass matrix if these do not
+        change; None if it cannot be built."""
         try:
             change = agreement("", self.base, self.moved(model))
             return change.acceleration if change.acceleration > STILL else change.mass
@@ -145,7 +146,8 @@ class _Trial:
     def with_all(
         self, values: dict[Key, Element], differences: Sequence[Difference]
     ) -> tuple[mujoco.MjModel, list[Key]]:
-        """The file with all elements that can be as the other has them, and which these are."""
+        """The file with all elements changed to the other file's values where possible, and the elements that were
+        changed."""
         model, taken = copy(self.twin.model), list[Key]()
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
             value = values[each.key].value if each.key in values else np.zeros_like(each.first)
@@ -155,42 +157,42 @@ class _Trial:
         return model, taken
 
     def with_one(self, key: Key, value: np.ndarray) -> mujoco.MjModel:
-        """The file with another value of one element."""
+        """The file with one element set to another value."""
         model = copy(self.twin.model)
         put(model, key, value)
         return model
 
     def without(self, keys: Sequence[Key]) -> mujoco.MjModel:
-        """The file without those elements that it can be without."""
+        """The file without those of the elements that it can do without."""
         model = copy(self.twin.model)
         for key in keys:
             drop(model, key)
         return model
 
     def moved(self, model: mujoco.MjModel) -> list[Moved]:
-        """What a changed model does at the states."""
+        """Motion of a changed model at the states."""
         return moved_at(equations(described(model, self.twin.name), PLAIN), self.states)
 
 
 def _in_order(states: States, order: list[int]) -> States:
-    """States of the first file as coordinates of the second."""
+    """States of the first file, reordered to the coordinates of the second."""
     places = np.argsort(order)
     return [(q[places], v[places]) for q, v in states]
 
 
 def _permuted(moved: Sequence[Moved], order: list[int]) -> list[Moved]:
-    """What the second file does, in the order of the first."""
+    """Motion of the second file, reordered to the coordinates of the first."""
     return [Moved(each.mass[np.ix_(order, order)], each.force[order], each.acceleration[order]) for each in moved]
 
 
 def _rounded_as_both(here: Reference, there: Reference, order: list[int]) -> Reference:
-    """The first file, with the rounding of that one of both that has more."""
+    """The first file's reference, with the larger rounding sensitivity of the two files."""
     pairs = zip(here.sensitive, _permuted(there.sensitive, order), strict=True)
     return replace(here, sensitive=[Moved(*map(np.maximum, first, second)) for first, second in pairs])
 
 
 def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
-    """Coordinates of one file that the other does not have."""
+    """Coordinates of one file that do not exist in the other."""
     names = [(twin.name, twin.names) for twin in (first, second)]
     rows = list[str]()
     for (file, listed), (_, others) in (names, names[::-1]):
@@ -199,7 +201,8 @@ def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
 
 
 def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
-    """Elements that differ; trials : of the first and of the second file, None where there are no common states."""
+    """Elements that differ between the files; trials : one for the first and one for the second file, None if they have
+    no common states."""
     rows, listed, others = list[Difference](), elements(first.model), elements(second.model)
     rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
@@ -218,8 +221,8 @@ def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Tri
 
 
 def _influence(trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None) -> float | None:
-    """By taking the other's value over, or by leaving the element out of the second file, which alone has it; None
-    where the first cannot have that value."""
+    """Influence of one difference: the first file takes over the other's value, or the second file loses an element
+    that only it has. None if the first file cannot have that value."""
     first, second = trials
     if element is None:
         return second.influence(second.without([key]))
@@ -231,7 +234,7 @@ def _influence(trials: tuple[_Trial, _Trial], key: Key, element: Element | None,
 
 
 def _only_turned(kind: str, element: Element | None, other: Element | None) -> bool:
-    """Whether two inertias have the same principal moments."""
+    """Whether two inertias have the same principal moments and differ only in orientation."""
     if kind != "inertia" or element is None or other is None:
         return False
     first, second = (np.linalg.eigvalsh(tensor_of(each.value)) for each in (element, other))
@@ -239,12 +242,12 @@ def _only_turned(kind: str, element: Element | None, other: Element | None) -> b
 
 
 def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
-    """Whether an element that one file lacks is zero in the other, or one word, which other elements of it tell."""
+    """Whether an element that only one file has is insignificant: zero, or a word that repeats other elements."""
     return (element is None or other is None) and (is_word(there.value) or not there.says)
 
 
 def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
-    """Elements without which a build moves as the file's own model does, when both are built without each of them.
+    """Elements whose removal makes a build agree with the file's own model; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """

@@ -52,7 +52,7 @@ def read(path: Path, without: Collection[str] = ()) -> ModelFile:
 
 
 def compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
-    """By MuJoCo's own parser; InputError with its words, and notes."""
+    """The document compiled by MuJoCo's own parser, and notes; InputError with the parser's message."""
     path, notes = document.path, list[str]()
     try:
         with without_warnings():
@@ -68,7 +68,7 @@ def compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
 
 
 def _without_shapes(path: Path) -> tuple[str, int]:
-    """Text of a URDF, without the shapes that nothing but contact would need: their files are often elsewhere."""
+    """Text of a URDF without its shapes, which only contact would need and whose files are often missing."""
     root, dropped = ElementTree.fromstring(path.read_bytes()), 0
     for link in root.iter("link"):
         massive = link.find("inertial") is not None
@@ -79,7 +79,7 @@ def _without_shapes(path: Path) -> tuple[str, int]:
 
 
 def check_sane(model: mujoco.MjModel, name: str) -> None:
-    """InputError where nothing moves, or a number that moves something is not finite."""
+    """InputError if nothing can move, or if a number that affects motion is not finite."""
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
     for numbers in FINITE:

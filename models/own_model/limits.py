@@ -22,7 +22,8 @@ KINDS = {
 
 
 def limits_struck(twin: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
-    """Function of coordinates (n,): joints and tendons whose limits act there in the file's own model."""
+    """Function of coordinates (n,) that returns the joints and tendons whose limits act there in the file's own
+    model."""
     model = copy(twin.model)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data, still = mujoco.MjData(model), np.zeros(twin.size)

@@ -13,13 +13,13 @@ CONSTRAINTS = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
-    """Name of a joint, body, tendon or actuator of a file; its number where it has none."""
+    """Name of a joint, body, tendon or actuator of a file; its number if it has no name."""
     name: str = getattr(model, kind)(number).name
     return f"{kind} {name!r}" if name else f"{kind} {number}"
 
 
 def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Of every coordinate: its joint, and which freedom of it where it has several."""
+    """Name of every coordinate: its joint and, where the joint has several freedoms, which freedom."""
     names = list[str]()
     for j in range(model.njnt):
         of = OF_KIND.get(int(model.jnt_type[j]), ())
@@ -28,12 +28,12 @@ def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
-    """The coordinate of a hinge or slide."""
+    """Index of the coordinate of a hinge or slide."""
     return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE else "rx"
 
 
 def moving(model: mujoco.MjModel) -> dict[int, None]:
-    """Numbers of the bodies that a joint moves, their own or one further down, in their order."""
+    """Indices, in order, of the bodies that move: they or a body before them in the tree have a joint."""
     numbers = dict[int, None]()
     for b in range(1, model.nbody):
         if model.body_jntnum[b] or int(model.body_parentid[b]) in numbers:
@@ -52,35 +52,36 @@ def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def disabled(model: mujoco.MjModel, what: str) -> bool:
-    """Whether a file switches something off, as "GRAVITY"; all constraints at once, too."""
+    """Whether a file switches off a feature, such as "GRAVITY", or all constraints at once."""
     kinds = (what, "CONSTRAINT") if what in CONSTRAINTS else (what,)
     return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
 def moved_by(joint: int) -> str:
-    """Name of the body without mass of a joint; numbers, since names of files need not be there."""
+    """Name of the massless body that a joint moves. It contains the joint's number, because joints in a file may have
+    no names."""
     return f"joint {joint}"
 
 
 def massive(body: int) -> str:
-    """Name of the body with the mass of a file's body, behind all of its joints."""
+    """Name of the body that has the mass of a file's body and follows its last joint."""
     return f"body {body}"
 
 
 def vector(numbers: np.ndarray) -> Vector:
-    """Three numbers as a description has them."""
+    """Three numbers as a tuple, the form used in descriptions."""
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z
 
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """(3, 3) as a description has it."""
+    """Matrix (3, 3) as a tuple of rows, the form used in descriptions."""
     x, y, z = map(vector, matrix)
     return x, y, z
 
 
 def rotation_of(quaternion: np.ndarray) -> np.ndarray:
-    """(3, 3) of a quaternion."""
+    """Rotation matrix (3, 3) of a quaternion."""
     numbers = np.empty(9)
     mujoco.mju_quat2Mat(numbers, quaternion)
     return numbers.reshape(3, 3)

@@ -59,13 +59,13 @@ class PathReport:
 
     @property
     def alike(self) -> bool:
-        """Whether the builds have the same path; the file's own model counts where it has the same coordinates."""
+        """Whether all builds have the same path; the file's own path counts only if it has the same coordinates."""
         others = {FILE: self.quaternions, SOFT: self.soft}
         held = [size for name, size in self.distances.items() if not others.get(name)]
         return bool(held) and max(held) <= ALIKE
 
     def lines(self) -> list[str]:
-        """For the terminal."""
+        """Lines of text for the terminal."""
         under = f", under {self.controls}" if self.controls else ""
         rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state{under}:"]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
@@ -91,7 +91,7 @@ class PathReport:
 
 
 def steps_of_path(twin: TwinModel) -> int:
-    """How many steps a path at the file's own step takes; InputError where they are too many."""
+    """Number of steps of a path at the file's own step; InputError if there are too many."""
     step = float(twin.model.opt.timestep)
     if DURATION / step > MOST_STEPS:
         allowed = (
@@ -136,7 +136,7 @@ def paths(
 
 
 def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
-    """Keep a path, or why there is none."""
+    """Store the path of a build, or the reason why it failed."""
     try:
         with np.errstate(all="ignore"):  # what blows up is told
             path = run()
@@ -150,12 +150,13 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
 
 
 def blown_up(path: np.ndarray) -> bool:
-    """Whether a path has left all measure."""
+    """Whether the path contains numbers that are infinite, NaN or absurdly large."""
     return not (np.isfinite(path).all() and np.abs(path).max() < LARGEST)
 
 
 def path_by(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
-    """States (steps + 1, 2 n) of a build from coordinates and rates (n,), leg by leg, by steps of so many seconds."""
+    """States (steps + 1, 2 n) of a build, integrated from coordinates and rates (n,) section by section, with ``step``
+    seconds per step."""
     path = np.concatenate(start)[None]
     for leg in legs:
         q, v = np.split(path[-1], 2)
@@ -179,8 +180,8 @@ def file_path(
     integrator: str = "RK4",
     held: np.ndarray | None = None,
 ) -> np.ndarray:
-    """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), by so many steps of
-    so many seconds; held : controls (steps, nu), constant without."""
+    """MuJoCo's own states (steps + 1, nq + n) of the file's model from coordinates and rates (n,), over the number and
+    size of steps in ``grid``; held : controls (steps, nu), constant if not given."""
     (steps, step), model, data = grid, twin.model, mujoco.MjData(twin.model)
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
@@ -193,14 +194,15 @@ def file_path(
 
 
 def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
-    """How many states lie before a disturbance has grown to what counts as different."""
+    """Number of states before a small disturbance grows so much that two paths count as different."""
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
     grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= ALIKE * np.maximum(size, 1.0)))
     return max(2, int(grown[0])) if len(grown) else steps + 1
 
 
 def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
-    """How many states of a path lie before dry friction sticks in MuJoCo, less one whose step may have met that."""
+    """Number of states of a path before dry friction sticks in MuJoCo; one less, since the step before may already be
+    affected."""
     acting = (leg.twin for leg in legs for _ in range(leg.steps))
     for i, (twin, row) in enumerate(zip(acting, path, strict=False)):
         q, v = np.split(row, 2)
@@ -210,7 +212,8 @@ def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
 
 
 def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
-    """How many states of a path lie before it strikes a limit, and whose; less one whose step may have met it."""
+    """Number of states of a path before it reaches a joint limit, and the joint's name; one less, since the step before
+    may already be affected."""
     struck = limits_struck(twin) if ranges(twin.model) else lambda q: ()
     for i, row in enumerate(path):
         if names := struck(row[: twin.size]):
@@ -231,7 +234,8 @@ def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -
 
 
 def _ledger(legs: Sequence[Leg], path: np.ndarray, step: float) -> float | None:
-    """Kinetic energy less the work of all forces by Simpson's rule, as a share; None for fewer than three states."""
+    """Change of kinetic energy less the work of all forces (Simpson's rule), relative to the largest kinetic energy;
+    None for fewer than three states."""
     if len(path) < 3:
         return None
     kinetic, work, first = list[float](), 0.0, 0

@@ -37,7 +37,8 @@ LAST_GROUP = 30
 
 @dataclass(frozen=True, eq=False)
 class TwinModel:
-    """A file as MuJoCo parsed it (``model``), without what was left out, and the same as a description (``driven``)."""
+    """A file as MuJoCo parsed it (``model``), without the parts that were left out, and the same model as a description
+    (``driven``)."""
 
     name: str
     model: mujoco.MjModel
@@ -46,17 +47,17 @@ class TwinModel:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates."""
         return self.coordinates.size
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of every coordinate: its joint, and which freedom of it where it has several."""
+        """Name of every coordinate: its joint and, where the joint has several freedoms, which freedom."""
         return coordinate_names(self.model)
 
 
 def described(model: mujoco.MjModel, name: str) -> TwinModel:
-    """The model as a description; what ``content`` finds without an equal must have been left out of it before."""
+    """The model as a description; parts without an equivalent (see ``content``) must have been removed before."""
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
@@ -74,7 +75,8 @@ def described(model: mujoco.MjModel, name: str) -> TwinModel:
 
 
 def joint_elements(model: mujoco.MjModel) -> tuple[JointElement, ...]:
-    """What acts along the coordinates of joints: springs, dampers and rotors of joints and fixed tendons, actuators."""
+    """Elements that act along joint coordinates: springs, dampers and rotors of joints and fixed tendons, and
+    actuators."""
     return (*_joint_elements(model), *_tendon_elements(model), *_actuator_elements(model))
 
 
@@ -102,7 +104,7 @@ def _joint(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | N
 
 
 def _along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """Right-handed axes, as rows, the first of which lies along a unit vector."""
+    """Right-handed axes, as rows, of which the first is the given unit vector."""
     if axis[0] == 1.0:
         return PARALLEL
     second = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
@@ -111,7 +113,7 @@ def _along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
 
 
 def _armature(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """(3, 3): what an armature on the turning of a free body adds to its inertia, the same about all axes."""
+    """Inertia (3, 3), the same about all axes, that the armature on the rotation of a free body adds."""
     joint = int(model.body_jntadr[body])
     free = joint >= 0 and model.jnt_type[joint] == FREE
     return float(model.dof_armature[model.jnt_dofadr[joint] + 3]) * np.eye(3) if free else np.zeros((3, 3))
@@ -140,12 +142,12 @@ def tendon_travel(model: mujoco.MjModel, tendon: int) -> tuple[list[int], list[f
 
 
 def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
-    """Whether a tendon is a sum of joints, and not a way through space."""
+    """Whether a tendon is a linear combination of joints, not a path through space."""
     return bool(model.wrap_type[model.tendon_adr[tendon]] == mujoco.mjtWrap.mjWRAP_JOINT)
 
 
 def is_line(model: mujoco.MjModel, tendon: int) -> bool:
-    """Whether a tendon goes straight from one site to another."""
+    """Whether a tendon runs straight from one site to another."""
     first, site = int(model.tendon_adr[tendon]), mujoco.mjtWrap.mjWRAP_SITE
     return bool(model.tendon_num[tendon] == 2 and (model.wrap_type[first : first + 2] == site).all())
 
@@ -170,7 +172,7 @@ def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineS
 
 
 def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
-    """Springs and dampers of how ball and free joints turn; of how free ones shift is in ``joint_elements``."""
+    """Springs and dampers of the rotation of ball and free joints; those of translation are in ``joint_elements``."""
     springs, dampers = not disabled(model, "SPRING"), not disabled(model, "DAMPER")
     for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL, FREE)):
         body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE
@@ -186,7 +188,7 @@ def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Tu
 
 
 def _beside(model: mujoco.MjModel, joint: int) -> tuple[str | None, str]:
-    """The bodies before and behind a joint, which may be one of several of its body."""
+    """Names of the bodies before and after a joint. A massless body stands between two joints of the same body."""
     body = int(model.jnt_bodyid[joint])
     first, above = int(model.body_jntadr[body]), int(model.body_parentid[body])
     last = first + int(model.body_jntnum[body]) - 1
@@ -229,20 +231,21 @@ def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def controls(model: mujoco.MjModel) -> np.ndarray:
-    """Constant controls (nu,): 0, or the nearest number in the range of a limited one."""
+    """Constant controls (nu,): 0, or for a limited control the nearest number in its range."""
     limited = model.actuator_ctrllimited[:, None].astype(bool)
     low, high = np.where(limited, model.actuator_ctrlrange, (-np.inf, np.inf)).T
     return np.clip(np.zeros(len(low)), low, high)
 
 
 def pushes_site(model: mujoco.MjModel, actuator: int) -> bool:
-    """Whether an actuator pushes a site, and not against another one: it has no length then."""
+    """Whether an actuator acts on one site only, without a reference site; it then has no length."""
     kind, (_, other) = model.actuator_trntype[actuator], model.actuator_trnid[actuator]
     return bool(kind == mujoco.mjtTrn.mjTRN_SITE and other < 0)
 
 
 def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarray:
-    """(3,): the force of an actuator at a control, what it gains by length and by speed."""
+    """Three numbers (3,) of an actuator at a control: its constant force, and its coefficients of length and of
+    speed."""
     gain = np.array(model.actuator_gainprm[actuator, :3])
     gain[1:] *= model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE
     affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
@@ -262,7 +265,7 @@ def _acting(model: mujoco.MjModel) -> list[int]:
 
 
 def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoad]:
-    """Forces and moments of actuators that push sites, at constant controls."""
+    """Constant forces and moments of the actuators that act on sites."""
     constant, numbers = controls(model), moving(model)
     for i in (i for i in _acting(model) if pushes_site(model, i)):
         site = int(model.actuator_trnid[i, 0])
@@ -274,7 +277,7 @@ def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoa
 
 
 def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
-    """Forces gain u + bias, affine in length and speed of a joint or a fixed tendon, at constant controls."""
+    """Actuator forces gain u + bias at constant controls, affine in length and speed of a joint or fixed tendon."""
     constant = controls(model)
     for i in (i for i in _acting(model) if not pushes_site(model, i)):
         gear, target = float(model.actuator_gear[i, 0]), int(model.actuator_trnid[i, 0])
@@ -290,7 +293,8 @@ def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
 
 
 def compensation(model: mujoco.MjModel, body: int) -> float:
-    """Share of the joints that move a body through which its weight is compensated: 0 where nothing of it is.
+    """Share of a body's weight that is compensated, as the share of the joints above it that transmit the compensation;
+    0 for none.
 
     MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
     actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.
@@ -304,7 +308,7 @@ def compensation(model: mujoco.MjModel, body: int) -> float:
 
 
 def _lifted(model: mujoco.MjModel, design: mujoco.MjData, gravity: np.ndarray) -> Iterator[GroundSpring]:
-    """Loads at the centres of bodies whose weight is compensated."""
+    """Upward loads at the centres of the bodies whose weight is compensated."""
     for b in moving(model):
         if model.body_mass[b] and gravity.any() and compensation(model, b) == 1.0:
             load, still = -gravity * float(model.body_gravcomp[b] * model.body_mass[b]), np.zeros(3)

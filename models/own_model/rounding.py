@@ -38,7 +38,8 @@ Law = Callable[[TwinModel], Equations]
 
 
 def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Sequence[Moved]) -> list[Moved]:
-    """Changes of mass (n, n), force (n,) and acceleration (n,) at each state per share by which all numbers change.
+    """Sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative random
+    change of all input numbers.
 
     law, moved : the file's own model, and what it does at the states.
     """
@@ -55,7 +56,7 @@ def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Seq
 
 
 def _free(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
-    """What the file's own model does without its equality constraints."""
+    """Motion of the file's own model at the states, without its equality constraints."""
     model = copy(twin.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
     move = as_parsed(replace(twin, model=model))
@@ -63,8 +64,8 @@ def _free(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
 
 
 def _constrained(sensitive: Moved, free: Moved) -> Moved:
-    """Sensitivities with those of what constraints take away: where they stop a coordinate, the rounding of the motion
-    of all others is left, weighted with the root of inertia."""
+    """Sensitivities that include the motion suppressed by constraints. Rounding errors of all other coordinates remain
+    in a stopped coordinate, weighted with the root of inertia."""
     weight = np.sqrt(free.mass.diagonal())
     taken = float((weight * np.abs(free.acceleration)).max())
     return sensitive._replace(
@@ -81,7 +82,7 @@ def reach_of(twin: TwinModel) -> float:
 
 
 def changed(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> mujoco.MjModel:
-    """A copy, all of whose numbers that move something are changed at random by the share."""
+    """A copy of the model in which all numbers that affect motion are changed at random by a small relative amount."""
     model = copy(model)
 
     def unit(shape: tuple[int, ...]) -> np.ndarray:
@@ -105,7 +106,8 @@ def changed(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> m
 
 
 def _ends(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray]]:
-    """Every equality constraint, and the sizes (k,) of its numbers: of places between bodies, of factors elsewhere."""
+    """For every equality constraint, its index and the magnitudes (k,) of its numbers: positions between bodies, else
+    factors."""
     for e in range(model.neq):
         size = np.abs(model.eq_data[e])
         if joins(model, e):
@@ -115,7 +117,8 @@ def _ends(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray
 
 
 def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v: np.ndarray) -> State:
-    """A state that is changed by the share: coordinates with the zero that the file counts them from."""
+    """A state changed by a small relative amount; coordinates are changed including the offset that the file gives
+    them."""
     model, size = twin.model, np.abs(q)
     for j in range(model.njnt):
         first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL, FREE))

@@ -25,7 +25,7 @@ UNMET = "constraints cannot be satisfied all at once by coordinates in their ran
 
 
 def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates (count, n), uniform in the ranges: the same for the same count and seed.
+    """Random coordinates and rates (count, n), uniform in their ranges; equal for equal count and seed.
 
     Those that constraints tie go to the nearest place, and the nearest rate, that satisfies them. RunFailed where no
     state does.
@@ -47,8 +47,8 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
 
 
 def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (count, n) that satisfy constraints between bodies, from random ones: towards the design position where
-    none is near."""
+    """States (count, n) that satisfy the constraints between bodies, found from random ones; a state moves towards the
+    design position where no solution is near."""
     constraints, (low, high) = plain_constraints(twin), limits(twin.model)
     middle = np.clip(0.0, low, high)
 
@@ -64,7 +64,7 @@ def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarra
 
 
 def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates (n,) that states are drawn between."""
+    """Lowest and highest coordinates (n,) between which random states are drawn."""
     high = np.full(model.nv, ANGLE)
     low = -high
     for j in range(model.njnt):
@@ -83,7 +83,7 @@ def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates (n,) of the file's ranges, infinite where there is none.
+    """Lowest and highest coordinates (n,) of the ranges in the file, infinite where there is no range.
 
     The middle one of three angles keeps away from a quarter turn all the same.
     """

@@ -15,8 +15,9 @@ from models.own_model.states import random_states
 
 @dataclass(frozen=True)
 class PathGap:
-    """horizon : until when (s) paths are compared, as of ``PathReport``; distance : largest difference of a coordinate
-    or rate up to there, by the largest of the first file, at least 1; worst : whose; failed : why there is none."""
+    """Difference of two files' paths. horizon : time (s) up to which paths are compared, as in ``PathReport``; distance
+    : largest difference of a coordinate or rate, relative to the largest value in the first file, at least 1; worst :
+    which coordinate; failed : why there is no comparison."""
 
     horizon: float
     distance: float
@@ -24,7 +25,7 @@ class PathGap:
     failed: str = ""
 
     def line(self) -> str:
-        """For the terminal."""
+        """One line of text for the terminal."""
         if self.failed:
             return f"paths of both files from one state are not compared: {self.failed}"
         until = "" if self.horizon >= DURATION else f", where a disturbance of {DISTURBED:g} makes them different"
@@ -35,7 +36,8 @@ class PathGap:
 
 
 def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
-    """How far paths over 1 s are apart, at the step of the first file; both have the same names of coordinates."""
+    """Difference between two files' paths over 1 s, at the step of the first file; both must have the same names of
+    coordinates."""
     steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
     step, order = DURATION / steps, [first.names.index(name) for name in second.names]
     legs = [constant_leg(twin, steps) for twin in (first, second)]

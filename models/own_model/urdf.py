@@ -23,7 +23,7 @@ MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 @dataclass(frozen=True)
 class Misread:
-    """What MuJoCo's parser made something else of: kind, owner, unit, the file's value, and the parser's."""
+    """A number that MuJoCo's parser changed: kind, owner, unit, the file's value, and the parser's value."""
 
     kind: str
     owner: str
@@ -32,14 +32,14 @@ class Misread:
     parsed: np.ndarray
 
     def sentence(self) -> str:
-        """In words."""
+        """A sentence on the two values."""
         said = [", ".join(f"{number:.6g}" for number in np.ravel(each)) for each in (self.in_file, self.parsed)]
         return f"{self.kind} of {self.owner}: ({said[0]}) {self.unit} in the file, ({said[1]}) as MuJoCo parsed it"
 
 
 @dataclass
 class _Link:
-    """A link in the design position: its place and axes, the moving link that it is fixed to, and its joint."""
+    """A link in the design position: its position and axes, the moving link to which it is fixed, and its joint."""
 
     place: np.ndarray
     axes: np.ndarray
@@ -55,7 +55,7 @@ class _Mass:
     inertia: np.ndarray | None = None
 
     def add(self, mass: float, centre: np.ndarray, inertia: np.ndarray) -> None:
-        """Another one, fixed to this one."""
+        """Add another mass that is rigidly fixed to this one."""
         if self.centre is None or self.inertia is None:
             self.mass, self.centre, self.inertia = mass, centre, inertia
             return
@@ -66,7 +66,7 @@ class _Mass:
 
 
 def misread(file: ModelFile) -> list[Misread]:
-    """Numbers of a URDF that MuJoCo's compiled model has otherwise, each with both values."""
+    """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
     root = ElementTree.fromstring(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
@@ -112,7 +112,7 @@ def _same(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
 
 
 def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """Links by name in the design position, and anchors and axes in space of the hinges and slides by name."""
+    """Links by name in the design position; for hinges and slides by name, anchors and axes in space."""
     joints = list(root.iter("joint"))
     children = {_end(joint, "child") for joint in joints}
     links = {
@@ -139,7 +139,7 @@ def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dic
 
 
 def _masses(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
-    """Mass, centre and inertia of all links that are fixed to one another, by the one that moves."""
+    """Mass, centre and inertia of each group of links that are fixed to one another, by the name of its moving link."""
     sums = dict[str, _Mass]()
     for element in root.iter("link"):
         inertial, link = element.find("inertial"), links.get(element.get("name", ""))
@@ -164,7 +164,7 @@ def _end(joint: ElementTree.Element, which: str) -> str:
 
 
 def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Shift (3,) and rotation (3, 3) of an <origin>."""
+    """Translation (3,) and rotation (3, 3) of an <origin>."""
     origin = element.find("origin")
     roll, pitch, yaw = _numbers(origin, "rpy", (0.0, 0.0, 0.0), file)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
@@ -175,7 +175,7 @@ def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.nda
 
 
 def _numbers(element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str) -> np.ndarray:
-    """Numbers of an attribute; InputError where they are none, or not as many as wanted."""
+    """Numbers in an attribute; InputError where they are not numbers, or not as many as wanted."""
     text = None if element is None else element.get(name)
     if text is None:
         return np.array(default)

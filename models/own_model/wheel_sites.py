@@ -40,7 +40,7 @@ class WheelSite:
 
 
 def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[WheelSite, ...]:
-    """Wheels from the front, left before right; InputError where the sites make no axles of a car.
+    """Wheel sites from front to rear, left before right; InputError if the sites do not form the axles of a car.
 
     design : data of the model in the design position, with kinematics computed.
     """
@@ -61,7 +61,7 @@ def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document
 
 
 def place(model: mujoco.MjModel, document: Document, site: int) -> str:
-    """How messages call a site."""
+    """Text by which messages name a site."""
     name = model.site(site).name
     line = document.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")
@@ -88,7 +88,7 @@ def _check_site(
 def _axles(
     design: mujoco.MjData, document: Document, model: mujoco.MjModel, ordered: list[int]
 ) -> list[tuple[int, ...]]:
-    """Sites of every axle, from the front; InputError where they are no axles."""
+    """Sites of every axle, from the front; InputError where they do not form axles."""
     axles, x = [ordered[:1]], design.site_xpos[:, 0]
     for before, site in pairwise(ordered):
         apart = round(float(x[before] - x[site]), 9)
@@ -107,7 +107,7 @@ def _axles(
 
 
 def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel, sites: list[int]) -> None:
-    """A left wheel and a right one, or one in the middle."""
+    """Require that an axle has a left and a right wheel, or one wheel in the middle."""
     y, at = design.site_xpos[sites, 1], f"the axle at x = {design.site_xpos[sites[0], 0]:.6g} m"
     if len(sites) > ABREAST:
         names = ", ".join(repr(model.site(s).name) for s in sites)

@@ -23,7 +23,7 @@ PLUGINS = ("plugin", "extension")
 
 @dataclass(frozen=True)
 class XmlElement:
-    """tag, attributes, and where it stands: file, line, and the tags around it, outermost first."""
+    """An element: tag, attributes, and its location: file, line, and the enclosing tags, outermost first."""
 
     tag: str
     attributes: dict[str, str]
@@ -41,7 +41,7 @@ class Document:
     elements: tuple[XmlElement, ...]
 
     def line(self, tags: tuple[str, ...], name: str) -> str:
-        """ "FILE:LINE" of the first element with one of the tags and the name; "" where there is none."""
+        """Position "FILE:LINE" of the first element with one of the tags and the name; "" if there is none."""
         for element in self.elements:
             if element.tag in tags and element.attributes.get("name") == name:
                 return f"{element.file}:{element.line}"
@@ -81,15 +81,15 @@ class _Reader:
 
 
 class _Folders(NamedTuple):
-    """allowed : nothing may lie outside of it; base : where MuJoCo looks for what is included: the folder of the model
-    file, not of the file that includes; an attached model has its own."""
+    """Folders of included files. allowed : folder that must contain all of them; base : folder in which MuJoCo looks
+    for them, that of the model file, not of the including file; an attached model has its own."""
 
     allowed: Path
     base: Path
 
 
 def guarded(path: Path) -> Document:
-    """The file's elements; InputError for what must not reach the parser."""
+    """The file's elements, after checks; InputError for content that must not reach the parser."""
     folder, elements = path.resolve().parent, list[XmlElement]()
     _read(path, _Folders(folder, folder), elements, 0)
     root = elements[0].tag
@@ -120,7 +120,7 @@ def _read(path: Path, folders: _Folders, elements: list[XmlElement], depth: int)
 
 
 def _include(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
-    """Read what an element includes or attaches, unless it lies outside."""
+    """Read a file that an element includes or attaches; InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
     target = (folders.base / name).resolve()
     if not target.is_relative_to(folders.allowed):
@@ -150,7 +150,7 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
 
 
 def _modest(text: str) -> bool:
-    """Whether an amount of memory, as MuJoCo writes it (100M), is below 4 GB."""
+    """Whether an amount of memory, in MuJoCo's notation such as 100M, is below 4 GB."""
     units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
     number, unit = (text[:-1], units[text[-1:].upper()]) if text[-1:].upper() in units else (text, 1)
     try:

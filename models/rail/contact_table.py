@@ -92,23 +92,25 @@ class PatchReport:
 
     @property
     def wheel_centre(self) -> float:
-        """Centre of pressure on the wheel from the taping line (m); the roll shortens this by 1e-4 of it at most."""
+        """Centre of pressure on the wheel, y from the taping line (m); the wheelset's roll is neglected, which costs at
+        most 1e-4 of it."""
         return self.wheel_y + self.y - self.touch_y
 
     @property
     def on_rail(self) -> float:
-        """Centre of pressure from the rail's highest point (m)."""
+        """Centre of pressure on the rail, y from the rail's highest point (m)."""
         return self.y - self.top
 
     @property
     def touch_on_rail(self) -> float:
-        """First touch from there (m)."""
+        """Point of first touch on the rail, y from the rail's highest point (m)."""
         return self.touch_y - self.top
 
 
 @dataclass(frozen=True)
 class WheelsetPlacement:
-    """Contact at one lateral displacement (m) and yaw (rad): roll (rad), speed of spin (rad/s), the patches."""
+    """Contact at one lateral displacement (m) and yaw (rad): the wheelset's roll (rad), its speed of spin (rad/s), and
+    reports of the patches."""
 
     shift: float
     yaw: float
@@ -120,7 +122,8 @@ class WheelsetPlacement:
 
 @dataclass(frozen=True, eq=False)
 class LoadedWheel:
-    """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
+    """One wheel under its load: pressure of each patch, and creep forces and moment (N, N, N m); mirrored for the left
+    wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
     known. approach : vertical (m). lifted : vertical part of the creep forces, upwards on the rail (N). normal : that
@@ -140,14 +143,13 @@ class LoadedWheel:
 
     @property
     def loads(self) -> list[float]:
-        """Along the patches' normals (N)."""
+        """Loads of the patches along their normals (N)."""
         if self.shares:
             return [share.load for share in self.shares]
         return [0.0 if part is None else part.load for part in map(self.part, self.touches)]
 
     def part(self, touch: TouchingPlace) -> PatchPressure | None:
-        """The pressure on one patch by the simplified theory; None where that theory leaves the patch without
-        contact."""
+        """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
         return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
 
 
@@ -189,7 +191,7 @@ class WheelsetContact:
         return _standing(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
 
     def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
-        """The right wheel, and the left one in its mirror, each lowered until it touches and pressed on its rail.
+        """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
@@ -207,7 +209,7 @@ class WheelsetContact:
         return self._balanced(by_normal, self.load)
 
     def _with_exact_normal(self, approximate: LoadedWheel) -> LoadedWheel:
-        """The pressed wheel, its normal contact solved exactly in place of the simplified theory."""
+        """The loaded wheel with its normal contact solved exactly instead of by the simplified theory."""
         patches = [touch.patch for touch in approximate.touches]
 
         def by_normal(normal: float) -> LoadedWheel:
@@ -219,7 +221,8 @@ class WheelsetContact:
         return self._balanced(by_normal, approximate.normal)
 
     def _balanced(self, by_normal: Callable[[float], LoadedWheel], normal: float) -> LoadedWheel:
-        """A wheel whose normal and creep forces carry the load, by the vertical part (N) of the normal forces."""
+        """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``by_normal`` gives the
+        wheel for a vertical part (N) of the normal forces, which is iterated from ``normal``."""
         for _ in range(ITERATIONS):
             wheel = self._rolled(by_normal(normal))
             if abs(normal - wheel.lifted - self.load) < PRECISION * self.load:
@@ -228,8 +231,8 @@ class WheelsetContact:
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
-        """Rotational speed (rad/s) of a free wheelset, at which its creep forces have no moment about the axle, under
-        the present normal forces."""
+        """Speed of spin (rad/s) of a freely rolling wheelset: its creep forces have no moment about the axle, under the
+        present normal forces."""
 
         def moment(spin: float) -> float:
             return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
@@ -238,12 +241,12 @@ class WheelsetContact:
         return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
 
     def _at_other_spin(self, wheel: LoadedWheel, spin: float) -> LoadedWheel:
-        """A wheel that is pressed as it was and turns at another speed (rad/s)."""
+        """The wheel with unchanged normal contact at another speed of spin (rad/s)."""
         creepages = [self._creepage(wheel.pose, touch, spin) for touch in wheel.touches]
         return self._rolled(replace(wheel, creepages=creepages))
 
     def _rolled(self, wheel: LoadedWheel) -> LoadedWheel:
-        """The wheel with the creep forces of each patch, those without contact have none."""
+        """The wheel with the creep forces of each patch; patches without contact get zero forces."""
         forces = []
         for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
             part = wheel.part(touch)
@@ -259,7 +262,7 @@ class WheelsetContact:
         return replace(wheel, forces=forces, lifted=lifted, moment=moment)
 
     def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
-        """Creepages and spin (1/m) at a place of first touch."""
+        """Creepages and spin (1/m) at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
         axle, place = pose.turn[:, 1], self._arm(pose, touch)
@@ -272,12 +275,12 @@ class WheelsetContact:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
     def _arm(self, pose: Pose, touch: TouchingPlace) -> Array:
-        """Vector from the wheelset's centre to a place of first touch, in the track (m)."""
+        """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 
     def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
-        """The reports of a wheel's patches, those that carry something; patches that have grown together as one."""
+        """Reports of all patches of a wheel that carry load; patches that have grown together get one common report."""
         rows = [
             row
             for row in zip(wheel.touches, wheel.creepages, wheel.forces, wheel.shares, strict=True)
@@ -289,7 +292,8 @@ class WheelsetContact:
     def _joined_report(
         self, wheel: LoadedWheel, rows: list[tuple[TouchingPlace, Triple, Triple, Share]]
     ) -> PatchReport:
-        """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
+        """Report of one piece of the contact area; its first touch and creepages are those of the patch with the
+        largest load."""
         side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
         top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
         loads = np.array([share.load for *_, share in rows])
@@ -331,7 +335,7 @@ class WheelsetContact:
 
 
 def _standing(placed: WheelsetPlacement) -> WheelsetPlacement:
-    """The contact itself, unless a wheel stands on the top of its flange."""
+    """The contact unchanged; an error if a wheel stands on the tip of its flange."""
     for name, places in (("right", placed.right), ("left", placed.left)):
         least = min(place.below_tip for place in places)
         if least < CLIMBED:
@@ -344,18 +348,19 @@ def _standing(placed: WheelsetPlacement) -> WheelsetPlacement:
 
 
 def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
-    """Rolling radius of the right wheel less that of the left one (m), each at the patch that carries most."""
+    """Rolling radius of the right wheel less that of the left one (m), each at the patch with the largest load."""
     right, left = (max(places, key=lambda place: place.normal) for places in (placed_at.right, placed_at.left))
     return right.rolling_radius - left.rolling_radius
 
 
 def _axes(touch: TouchingPlace) -> tuple[Array, Array]:
-    """Directions along the rail's surface and into the rail, in the track."""
+    """Unit vectors along the rail's surface and along its inward normal, in the track's axes."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
 def _moments(lever: Array, touch: TouchingPlace, force: Triple) -> Array:
-    """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
+    """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
+    to the patch."""
     across, into = _axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into

@@ -18,7 +18,7 @@ def free_wheelset(wheelset: Wheelset) -> Wheelset:
 
 
 def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
-    """Wavelength (m) of the free wheelset by the slowest oscillation of all its motions."""
+    """Wavelength (m) of the free wheelset, from the oscillation with the lowest frequency among the eigenvalues."""
     roots = values(kind, free_wheelset(wheelset), SLOW_SPEED)
     return 2.0 * math.pi * SLOW_SPEED / min(roots[roots.imag > 0.0], key=abs).imag
 
@@ -29,25 +29,26 @@ def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarra
 
 
 def uncertainty(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
-    """Change (1/s) of the hunting eigenvalue by slopes over twice the way; NaN without one."""
+    """Change (1/s) of the hunting eigenvalue when slopes are taken over twice the distance; NaN without a hunting
+    mode."""
     equations = kind(wheelset, speed, "linear")
     wide = np.linalg.eigvals(slopes(equations.rates, equations.rest, 2.0))
     return float(abs(hunting(wide) - hunting(np.linalg.eigvals(equations.state_matrix))))
 
 
 def growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
-    """Largest real part (1/s) of the eigenvalues at a speed (m/s), for ``linear.critical_speed``."""
+    """Largest real part (1/s) of the eigenvalues at a speed (m/s), as an argument for ``linear.critical_speed``."""
     return float(values(kind, wheelset, speed).real.max())
 
 
 def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
-    """Eigenvalues (speeds, 9) in 1/s."""
+    """Eigenvalues (speeds, 9) in 1/s at each speed, for a root locus."""
     return np.array([values(kind, wheelset, float(speed)) for speed in speeds])
 
 
 def hunting(values: np.ndarray) -> np.ndarray:
-    """The hunting mode: of eigenvalues (..., 9) the least damped with an imaginary part above 0; NaN if there is
-    none."""
+    """Eigenvalue of the hunting mode: among eigenvalues (..., 9) with positive imaginary part, the least damped one;
+    NaN if there is none."""
     oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
     root = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
     return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

@@ -47,13 +47,13 @@ class Ledger:
 
     @cached_property
     def residual(self) -> Array:
-        """The energy that the sums leave unaccounted for at each time (n,), 0 at the start (J)."""
+        """Residual of the energy balance (n,) in J at each time; 0 at the start."""
         stored = self.kinetic + self.springs + self.gravity + self.contacts
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
 def ledger(equations: Equations, path: WheelsetPath) -> Ledger:
-    """Energy balance of a path that an implementation computed by RK4 with every step recorded."""
+    """Energy balance along a path computed by RK4, of which every step must be recorded."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
     for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
@@ -63,7 +63,7 @@ def ledger(equations: Equations, path: WheelsetPath) -> Ledger:
 
 
 def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
-    """Rates (n, 10) of states and the powers (n, 5) that the works add up, in the order of the ledger."""
+    """Rates (n, 10) of the states, and powers (n, 5) whose integrals are the works, in the order of the ledger."""
     rates, contacts = equations.at(states)
     names = "elastic_power", "fx", "damping_power", "power"
     elastic, ahead, damping, creep = (-contacts[name].sum(axis=1) for name in names)
@@ -72,7 +72,7 @@ def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]
 
 
 def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
-    """Energies (n,) of motion, of the springs and of gravity at states (n, 10), in J."""
+    """Energies (n,) in J at states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
     w, body = equations.wheelset, equations.body
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     moved = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
@@ -81,7 +81,7 @@ def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
 
 
 def _suspension(body: Body, states: Array) -> tuple[Array, Array]:
-    """Energy of the springs (n,) and power into the dampers (n,)."""
+    """Energy stored in the springs (n,), and power dissipated in the dampers (n,)."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])
     turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])

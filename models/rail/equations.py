@@ -67,9 +67,9 @@ Along = tuple[float, float, float]
 
 
 class Body(NamedTuple):
-    """The body and its suspension (SI): inertia along and across the axle; half spacing, springs and dampers of one
-    side, weight that each side carries, height at which the springs bear no more than that; lean of the track; whether
-    there is a spring or a damper."""
+    """The wheelset's body and suspension (SI): inertia along and across the axle; half spacing of the springs, springs
+    and dampers of one side, weight on each side, height at which the springs carry exactly that weight; lean of the
+    track; whether there is a spring or a damper."""
 
     mass: float
     along: float
@@ -84,7 +84,7 @@ class Body(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Arrays of the march: sum of the rates, rates and state of a stage (10,); a report of no rows."""
+    """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
     total: Array
     rate: Array
@@ -94,7 +94,7 @@ class Stages(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def rates(state, speed, body, rails, out, report):
-    """Fill ``out`` with the rates of a state (10,), and ``report``, REPORT (patches,), with the contacts.
+    """Fill ``out`` with the time derivative of a state (10,), and ``report``, REPORT (patches,), with the contacts.
 
     speed, body, rails : ``parameters`` of ``Equations``.
     """
@@ -104,8 +104,8 @@ def rates(state, speed, body, rails, out, report):
 
 @inlined
 def set_rates(state, speed, body, rails, out, report, room):
-    """Write the rates of the state into ``out``, with a workspace made beforehand; a report of no rows where nobody
-    asks."""
+    """Fill ``out`` with the time derivative of a state, using the workspace ``room``; ``report`` may have no rows if no
+    one needs it."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -138,7 +138,8 @@ def set_rates(state, speed, body, rails, out, report, room):
 
 @lean
 def _hold(state, body, turning, axle, force, moment):
-    """Add springs and dampers of both ends; turning : of the axle's own axes about x and y (rad/s)."""
+    """Add the forces of springs and dampers at both ends of the axle; turning : angular velocity about the x and y of
+    the axle's own axes (rad/s)."""
     (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = turning, body.stiffness, body.damping
     for side in (1.0, -1.0):
         arm, turn_z = side * body.arm, state[YAW_RATE]
@@ -157,7 +158,7 @@ def _hold(state, body, turning, axle, force, moment):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def march(state, parameters, steps, path, reports):
-    """RK4 from ``state``, which is moved; how many steps were made.
+    """Integrate from ``state`` by RK4; the state is modified. Returns the number of steps made.
 
     parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
     reports.
@@ -170,8 +171,8 @@ def march(state, parameters, steps, path, reports):
 
 @lean
 def _march(state, parameters, steps, path, reports, room, stages):
-    """March the state over all steps with arrays made by the caller: it counts no references to them, which takes 5 %
-    of a bare wheelset's time."""
+    """March the state over all steps with arrays allocated by the caller; holding no references to them saves 5 % of
+    the time of a bare wheelset."""
     (speed, body, rails), (step, count, every), (total, rate, here, none) = parameters, steps, stages
     for i in range(count + 1):
         row = i // every
@@ -198,14 +199,16 @@ def _march(state, parameters, steps, path, reports, room, stages):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelsetPath(Trajectory):
-    """A run, states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, right first."""
+    """Path of a run: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the right wheel's
+    first."""
 
     contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells : of FASTSIM's strips.
+    """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : "linear" or "fastsim"; cells :
+    of FASTSIM's strips.
 
     lean : of the track to the right, the weight across the track as a share of that square to it.
     """
@@ -254,24 +257,25 @@ class Equations:
 
     @cached_property
     def patch_count(self) -> int:
-        """How many contacts both wheels together can have."""
+        """Largest possible number of contacts of both wheels together."""
         return int(patches(self.rails.profile))
 
     def blank(self, *shape: int) -> Array:
-        """Contacts, REPORT (*shape, patches), that are not known yet.
+        """Records REPORT (*shape, patches) for contacts that are not yet known.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
         return np.full((*shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
-        """Rates (10,) of a state (10,)."""
+        """Time derivative (10,) of a state (10,)."""
         out = np.empty(STATES)
         rates(np.asarray(state, float), *self.parameters, out, UNREPORTED)
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:
-        """Rates (n, 10) by the written equations and contacts, REPORT (n, patches), at states (n, 10)."""
+        """Time derivatives (n, 10) of states (n, 10) by the hand-written equations, and their contacts, REPORT (n,
+        patches)."""
         every, contacts = np.empty_like(states), self.blank(len(states))
         for state, rate, contact in zip(states, every, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
@@ -285,7 +289,8 @@ class Equations:
         return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced(self, shift: float) -> Array:
-        """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
+        """State (10,) at a lateral displacement (m), at rest but for the spin, without yaw; height and roll are in
+        equilibrium."""
         start, w = self.rest.copy(), self.wheelset
         start[Y] = shift
         start[ROLL] = -shift * w.tilt
@@ -295,7 +300,7 @@ class Equations:
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
     def _state_in_balance(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
-        """The state with two of its values such that two accelerations vanish."""
+        """State in which two values, ``coordinates``, are solved for so that two accelerations vanish."""
         places = list(coordinates)
         scale = np.maximum(np.abs(start[places]), self.body.sunk)
 
@@ -311,12 +316,12 @@ class Equations:
 
     @cached_property
     def state_matrix(self) -> Array:
-        """A (9, 9) about rest, the angle of spin left out."""
+        """State matrix A (9, 9), linearised about rest; the angle of spin is left out."""
         return slopes(self.rates, self.rest)
 
     @cached_property
     def _fastest(self) -> float:
-        """Largest rate (1/s) of the motions about rest."""
+        """Largest eigenvalue magnitude (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
     def run(self, state: Array, duration: float, step: float, stride: int = 1) -> WheelsetPath:
@@ -333,7 +338,7 @@ class Equations:
         return path
 
     def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
-        """States and contacts of a path at every ``stride``-th step; ``state`` (10,) is moved."""
+        """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
         kept = count // stride + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
         done = march(state, self.parameters, (step, count, stride), states, contacts)
@@ -342,7 +347,8 @@ class Equations:
         return states, contacts
 
     def check(self, path: WheelsetPath, step: float, stride: int) -> None:
-        """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
+        """Raise RunFailed if the step was too large for the contact loads or, where every step is kept, for the
+        motion."""
         self.check_loads(path, step)
         if stride == 1:
             w = self.wheelset
@@ -350,7 +356,8 @@ class Equations:
             check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
     def check_loads(self, path: WheelsetPath, step: float) -> None:
-        """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
+        """Raise RunFailed if the step was too large for a patch with more than its load at rest, since the whole path
+        is then wrong."""
         for k in sorted(set(path.contacts["load"].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
@@ -362,7 +369,7 @@ class Equations:
                 )
 
     def _steps(self, state: Array, duration: float, step: float, stride: int) -> int:
-        """Number of steps of a run that is possible."""
+        """Number of steps of a run, after checks of state, duration, step and stride."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
         if not 0.0 < number("step", step, "a step in s") * self._fastest <= ALLOWED_STEP_RATE:
@@ -382,8 +389,8 @@ class Equations:
 
 
 def slopes(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
-    """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order over
-    so many times the usual way."""
+    """Jacobian (9, 9) of the rates about a state without the angle of spin, by fourth-order central differences over
+    ``wide`` times the usual distance."""
     columns, moved = [], wide * DIFFERENCE_STEPS
     for k in range(STATES):
         a, b, c, d = (rates(state + part * moved[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))

@@ -42,7 +42,7 @@ NODES = 720
 
 @dataclass(frozen=True)
 class KlingelWave:
-    """Klingel's wave of an amplitude, in the table's unit of length.
+    """Periodic motion of a free wheelset (Klingel) with one amplitude, in the table's unit of length.
 
     centre : middle between both turning points ``lowest`` and ``highest``. period : T of y'' = -dr(y); infinite where
     dr is zero over the whole of the amplitude: then the wheelset does not steer, the conicity is 0 and there is no
@@ -55,12 +55,12 @@ class KlingelWave:
 
     @property
     def lowest(self) -> float:
-        """Turning point to the left."""
+        """Turning point on the left, the smallest displacement."""
         return self.centre - self.amplitude
 
     @property
     def highest(self) -> float:
-        """Turning point to the right."""
+        """Turning point on the right, the largest displacement."""
         return self.centre + self.amplitude
 
     @property
@@ -69,7 +69,7 @@ class KlingelWave:
         return 0.5 * (2.0 * math.pi / self.period) ** 2
 
     def wavelength(self, radius: float, spacing: float) -> float:
-        """Length (m) of the wave on the track, for a rolling radius and a distance of the contact points (m)."""
+        """Wavelength (m) along the track, for a rolling radius and a distance between the contact points (m)."""
         return self.period * math.sqrt(radius * spacing)
 
 
@@ -109,9 +109,10 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | 
 
 
 def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
-    """Where waves of an amplitude may turn back on their left side: both ends of the swing have one potential.
+    """Possible left turning points of waves of an amplitude: the potential there equals that at the right turning
+    point.
 
-    Between the displacements at which either end meets a row, the difference of both potentials is a parabola.
+    Between the rows of the table, the difference of both potentials is a parabola in the left turning point.
     """
     y, width = table.displacements, 2.0 * amplitude
     places = np.unique(np.concatenate([y, y - width, [y[-1] - width]]))
@@ -130,7 +131,7 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
 
 
 def _roots(begin: float, middle_value: float, end: float) -> list[float]:
-    """Roots between 0 and 1 of the parabola with given values at 0, 1/2 and 1; none for the zero parabola."""
+    """Roots between 0 and 1 of the parabola with the given values at 0, 1/2 and 1; empty if it is zero everywhere."""
     bend, slope = 2.0 * (begin - 2.0 * middle_value + end), 4.0 * middle_value - 3.0 * begin - end
     scale = max(abs(begin), abs(middle_value), abs(end))
     if scale == 0.0:
@@ -146,7 +147,7 @@ def _roots(begin: float, middle_value: float, end: float) -> list[float]:
 
 
 def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
-    """The wave that turns back at ``low``; None where the wheelset would not come across, or not come back."""
+    """The wave whose left turning point is ``low``; None if the motion would stop before the other turning point."""
     y, dr = table.between(low, low + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
         return None
@@ -165,21 +166,23 @@ def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWav
 
 
 def _energy(dr: Array, length: Array) -> Array:
-    """v^2 / 2 (n,) at the rows of a swing, each summed from the nearer turning point, where it is small."""
+    """Energy v^2 / 2 (n,) at the rows of a swing. Each is summed from the nearer turning point, where it is small, to
+    limit rounding."""
     work = length * (dr[1:] + dr[:-1]) / 2.0
     from_left, from_right = -np.append(0.0, np.cumsum(work)), np.append(np.cumsum(work[::-1])[::-1], 0.0)
     return np.where(np.arange(len(dr)) <= np.argmax(from_left), from_left, from_right)
 
 
 def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
-    """Energy where the potential is highest within a piece: where a falling difference passes zero."""
+    """Energy at the maxima of the potential inside a piece, where a falling difference ``dr`` passes zero."""
     falls = (dr[:-1] > 0.0) & (dr[1:] < 0.0) & (length > 0.0)
     way = length[falls] * dr[:-1][falls] / (dr[:-1] - dr[1:])[falls]
     return energy[:-1][falls] - 0.5 * way * dr[:-1][falls]
 
 
 def _times(way: Array, slope: Array) -> Array:
-    """Time (n,) across pieces of dr: ``way``, length by the sum of the speeds at both ends; slope of dr."""
+    """Time (n,) to cross each piece of dr; ``way`` : ratio of the piece's length to the sum of the speeds at both ends;
+    slope : of dr."""
     root = np.sqrt(np.abs(slope))
     angle = root * way
     small, rising = angle < SERIES_LIMIT, slope > 0.0
@@ -189,7 +192,8 @@ def _times(way: Array, slope: Array) -> Array:
 
 
 def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
-    """No conicity where the wheels do not steer over the whole swing; else the error that says why no wave is there."""
+    """A wave of zero conicity if the wheels do not steer over the whole swing; else the error that explains why there
+    is no wave."""
     idle = _idle(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
@@ -205,7 +209,8 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
 
 
 def _idle(table: RollingRadiusTable, amplitude: float) -> float | None:
-    """Middle of a stretch of zeros that holds the whole swing, the one nearest to y = 0; None if there is none."""
+    """Centre of an interval with zero difference that is as wide as the swing, the one nearest to y = 0; None if there
+    is none."""
     y, zero = table.displacements, table.differences == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], zero.astype(int), [0]])))
     stretches = [(float(y[a]), float(y[b - 1])) for a, b in edges.reshape(-1, 2)]
@@ -236,7 +241,8 @@ def harmonic_linearised_conicity(
 
 @dataclass(frozen=True)
 class ConicityRow:
-    """Equivalent conicity at one amplitude (m), by the standard and by the first harmonic, and the wave's centre (m).
+    """Equivalent conicity at one amplitude (m), according to the standard and to the first harmonic, and the wave's
+    centre (m).
 
     spacing_error : difference of the standard's conicity on the table without every other row; NaN where that has no
     such wave.

@@ -13,12 +13,13 @@ FLANGE_ANGLE = math.radians(70.0)
 
 
 def nadal(friction: float, angle: float = FLANGE_ANGLE) -> float:
-    """Largest Y / Q at which a flange at an angle (rad) does not climb."""
+    """Limit of the ratio Y / Q below which a flange at an angle (rad) does not climb, by Nadal's formula."""
     return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
 
 
 def bound_shares(force: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """Magnitudes of forces by their bounds, of one shape: 0 without any force; infinite without a bound."""
+    """Ratios of forces' magnitudes to their bounds, arrays of one shape: 0 where there is no force, infinite where the
+    bound is zero."""
     force = np.abs(force)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(force > 0.0, force / bound, 0.0)

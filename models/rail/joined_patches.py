@@ -30,7 +30,7 @@ PRECISION, ITERATIONS = 1e-6, 30
 
 @dataclass(frozen=True)
 class Share:
-    """The load that one patch carries, and where.
+    """Load that one patch carries, and the position of that load.
 
     load : N, along its normal. x, y : centre of pressure from its place (m). area : m^2. box : sides x0, x1, y0, y1 of
     the rectangle about the area, along the rail and along its contour (m). peak : Pa. piece : number of the piece of
@@ -54,7 +54,7 @@ def press_exactly(
     material_pair: MaterialPair,
     coarser: float = 1.0,
 ) -> tuple[list[Share], float]:
-    """The patches' shares under a vertical load (N), and the vertical approach (m).
+    """Loads and areas of the patches under a total vertical load (N), and the vertical approach (m).
 
     approximate_patches : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs
     (m); coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of
@@ -101,7 +101,7 @@ def _pressed(
 
 
 def _grid(approximate_patches: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
-    """Centres (m) of the cells along x and along the contour."""
+    """Cell centres (m) of a grid around all patches, along x and along the contour."""
     x0, x1 = min(part.box[0] for part in approximate_patches), max(part.box[1] for part in approximate_patches)
     y0 = min(part.box[2] + part.patch.contour_position for part in approximate_patches)
     y1 = max(part.box[3] + part.patch.contour_position for part in approximate_patches)
@@ -114,7 +114,7 @@ def _grid(approximate_patches: Sequence[PatchPressure], margin: float, coarser: 
 
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
-    """Heights (ny, nx) of a patch along its normal, on the common contour."""
+    """Heights (ny, nx) of a patch along its normal, at the grid's points on the common contour."""
     known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
@@ -123,7 +123,8 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
 
 
 def _pressure_share(pressure: Array, x: Array, y: Array, contour_position: float, cell: float, pieces: Array) -> Share:
-    """Share of a patch at a place on the contour (m), of which ``pressure`` is zero elsewhere."""
+    """``Share`` of a patch whose origin is at a position on the contour (m); ``pressure`` is zero outside this
+    patch."""
     total = float(pressure.sum())
     if total == 0.0:
         return Share(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0, 0)
@@ -140,6 +141,6 @@ def _pressure_share(pressure: Array, x: Array, y: Array, contour_position: float
 
 
 def _outer_sides(cells: Array, inside: Array) -> tuple[float, float]:
-    """Outer sides (m) of the first and the last cell inside."""
+    """Positions (m) of the outer edges of the first and the last cell that are inside."""
     half = (cells[1] - cells[0]) / 2.0
     return float(cells[inside][0] - half), float(cells[inside][-1] + half)

@@ -30,7 +30,7 @@ _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_R
 
 
 def table(speed: float, rails: Rails) -> Array:
-    """The table of numbers that the compiled joint forces read."""
+    """Table of the numbers that the compiled joint forces read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)
@@ -39,7 +39,7 @@ def table(speed: float, rails: Rails) -> Array:
 
 @inlined
 def rails_at(numbers):
-    """``Rails`` that lie in a table at a pointer to doubles."""
+    """``Rails`` as views of a table at a pointer to doubles."""
     head = records(numbers, 1, HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
     wheels = beyond(numbers, IN_HEAD)
@@ -59,14 +59,14 @@ def rails_at(numbers):
 
 
 def to_joints(states: Array) -> Array:
-    """Positions and rates of the joints (..., 10) of states (..., 10)."""
+    """Joint positions and rates (..., 10) from states (..., 10)."""
     of_joints = states[..., _POSITIONS + _RATES]
     of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return of_joints
 
 
 def from_joints(joints: Array) -> Array:
-    """States (..., 10) of positions and rates of the joints (..., 10)."""
+    """States (..., 10) from joint positions and rates (..., 10)."""
     states = np.empty(joints.shape)
     states[..., _POSITIONS + _RATES] = joints
     states[..., SPIN] += states[..., YAW_RATE] * np.sin(states[..., ROLL])
@@ -74,7 +74,7 @@ def from_joints(joints: Array) -> Array:
 
 
 def rates_of(joints: Array, accelerations: Array) -> Array:
-    """Rates (10,) of the state by positions and rates (10,) and accelerations (5,) of the joints."""
+    """Time derivative (10,) of the state, from positions and rates (10,) and accelerations (5,) of the joints."""
     out = np.empty(STATES)
     out[_POSITIONS], out[_RATES] = joints[JOINTS:], accelerations
     roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
@@ -84,9 +84,9 @@ def rates_of(joints: Array, accelerations: Array) -> Array:
 
 @njit(cache=True, error_model="numpy")
 def joint_forces(numbers, t, q, v, f):
-    """Add the joints' forces (N, N m) to ``f`` (5,), for callbacks: all but the time are pointers to doubles.
+    """Add the joints' forces (N, N m) to ``f`` (5,). For callbacks: all arguments but the time are pointers to doubles.
 
-    Not a number where the wheelset has left the track: engines do not ask before they go on.
+    The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
     rails, speed = rails_at(numbers), records(numbers, 1, HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
@@ -115,7 +115,8 @@ def joint_forces(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def set_joint_forces(block, t, n):
-    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Set ``f`` to the forces of ``joint_forces``. All data are in one block of doubles at an address: f, q and v (n,),
+    then the table."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

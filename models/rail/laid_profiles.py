@@ -49,8 +49,7 @@ class Profiles(Strict):
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
     def located(self, scene: SceneFile) -> "Profiles":
-        """These profiles with the paths of the files that a scene names; InputError for what is neither file nor built
-        in."""
+        """These profiles with full paths of the files; InputError for a name that is neither a file nor built in."""
         files = {}
         for kind, known in BUILT_IN.items():
             name = getattr(self, kind)
@@ -61,7 +60,7 @@ class Profiles(Strict):
         return self.model_copy(update=files)
 
     def side(self, radius: float) -> WheelAndRail:
-        """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
+        """The right wheel with a radius (m) on its rail; raises InputError for files that contain no profile."""
         rail = _profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
             _profile(self.wheel, "wheel", self.smoothing),
@@ -70,7 +69,8 @@ class Profiles(Strict):
         )
 
     def touching(self, radius: float, shift: float) -> tuple[float, float]:
-        """Height z (m) over that in the middle, and roll (rad), at which both wheels just touch; InputError if none."""
+        """Rise of the wheelset (m) from its height at the track's middle, and roll (rad), at which both wheels just
+        touch; InputError if they cannot."""
         side = self.side(radius)
         pose = touching_pose(side, shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
@@ -87,7 +87,7 @@ def _profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
 
 @cache
 def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
-    """The arrays that ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
+    """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
     side = profiles.side(radius)
@@ -106,25 +106,26 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
 
 
 def no_profile() -> LaidProfile:
-    """The empty profile of a wheelset on cones: without a zone, a node or a knot."""
+    """An empty profile, for a wheelset on cones: no zones, nodes or knots."""
     return LaidProfile(np.zeros(1, PROFILE), np.empty(0, NODE), np.empty(0, KNOT))
 
 
 def _frozen(rows: Any, kind: np.dtype) -> Array:
-    """Records (n,) of rows of numbers, not to be changed."""
+    """Read-only records (n,) from rows of numbers."""
     made = np.ascontiguousarray(rows, float).view(kind)[:, 0]
     made.flags.writeable = False
     return made
 
 
 def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
-    """Places y at even distances (m) along a contour."""
+    """Positions y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
 def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
-    """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
+    """Position of first contact on the wheel (m from the taping line), all positions of the outline and their gaps (m).
+    None where the profiles do not meet."""
     try:
         pose = touching_pose(side, shift, 0.0)
     except InputError:
@@ -135,7 +136,8 @@ def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Arra
 
 
 def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]) -> float | None:
-    """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
+    """Position of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after`` are
+    pairs (shift, position). None if contact does not jump between them."""
     while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
         middle = (touch_before[0] + touch_after[0]) / 2.0
         touch = _first_contact(side, middle)
@@ -154,7 +156,7 @@ def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: t
 
 
 def _zones(y: Array, cuts: list[float]) -> Array:
-    """Zone (n,) of places on the wheel: a whole number, but where one passes smoothly into the next."""
+    """Zone (n,) of positions on the wheel: a whole number, or a fraction in the smooth transition between two zones."""
     zones = np.zeros(y.size)
     for cut in cuts:
         t = np.clip((y - cut) / (2.0 * BLEND) + 0.5, 0.0, 1.0)

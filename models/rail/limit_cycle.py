@@ -67,11 +67,11 @@ LARGEST_AMPLITUDE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """One periodic motion. state (10,) : at its maximum of y; period : s, of so many steps.
+    """One periodic motion. state (10,) : at a maximum of y; period : s, with the number of steps in it.
 
-    slopes (9, 11) : of the state after a period, the angle of spin left out, by the state before, the speed and the
-    period, by SIZES, 1 m/s and the period. error : change of the unknown by halving the step, frequency_error : Hz;
-    both NaN where it was not halved.
+    slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the state
+    before, the speed and the period, in units of SIZES, 1 m/s and the period. error : change of the unknown when the
+    step is halved, frequency_error : Hz; both NaN where the step was not halved.
     """
 
     equations: Equations
@@ -106,26 +106,26 @@ class Orbit:
 
     @property
     def stable(self) -> bool:
-        """Whether neighbouring motions come nearer."""
+        """Whether neighbouring motions approach this one."""
         return self.multiplier < 1.0
 
     def path(self) -> WheelsetPath:
-        """One period, start and end included."""
+        """Path over one period, with its start and end."""
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
 def guess_near_state(
     equations: Equations, state: Array, period: float, step: float, executor: Executor | None = None
 ) -> Orbit:
-    """A guess for ``solved_orbit``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at
-    most."""
+    """Initial guess for ``solved_orbit``: a state (10,) near a maximum of y, and a period (s) divided into steps of at
+    most ``step`` (s)."""
     start = state.copy()
     start[Y_RATE] = 0.0
     return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
 
 
 def beginning(equations: Equations, amplitude: float, step: float, executor: Executor | None = None) -> Orbit:
-    """The orbit of a small amplitude (m), from the motion that neither grows nor decays by the equations' own law.
+    """Orbit of a small amplitude (m), found from the linear motion that neither grows nor decays at the critical speed.
 
     step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
     amplitude is so small that cells of FASTSIM begin to slide one by one.
@@ -144,13 +144,14 @@ def beginning(equations: Equations, amplitude: float, step: float, executor: Exe
 
 
 def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
-    """A guess for the same orbit by other equations: everything ASIDE farther from rest."""
+    """Initial guess for the orbit of changed equations: the known orbit, with its distance from rest enlarged by the
+    share ASIDE."""
     rest = orbit.equations.rest
     return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
 
 
 def branch(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
-    """Orbits of one amplitude (m) after the other, each from the ones before; the speed of each is found.
+    """Orbits of successive amplitudes (m), each continued from the ones before; the speed of each is solved for.
 
     Raises RunFailed where the branch cannot be followed.
     """
@@ -163,7 +164,8 @@ def branch(first: Orbit, amplitudes: Iterable[float], executor: Executor | None 
 def _onwards(
     earlier_orbit: Orbit, latest_orbit: Orbit, amplitude: float, halvings: int, executor: Executor | None
 ) -> Orbit:
-    """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
+    """Orbit of an amplitude, predicted on the straight line through two earlier orbits; the interval is halved if this
+    fails."""
     way = latest_orbit.amplitude - earlier_orbit.amplitude
     share = (amplitude - latest_orbit.amplitude) / way
     state = latest_orbit.state + share * (latest_orbit.state - earlier_orbit.state)
@@ -187,7 +189,8 @@ def _onwards(
 
 
 def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:
-    """The orbit near a guess, with the speed or the amplitude of the guess, and its slopes if it is to be precise.
+    """Orbit near a guess. ``unknown`` is solved for: speed or amplitude, while the other keeps the guess's value. A
+    precise one gets its own slopes.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
     Raises RunFailed if none is found.
@@ -209,7 +212,7 @@ def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, execut
 
 
 def refined(orbit: Orbit, unknown: Unknown, executor: Executor | None = None) -> Orbit:
-    """The orbit at half the step, with the changes that halving made."""
+    """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
     half = solved_orbit(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
     return replace(
         half,
@@ -227,7 +230,7 @@ Guess = tuple[Equations, Array, float]
 
 
 def _linearised(orbit: Orbit, executor: Executor | None) -> Orbit:
-    """The orbit with slopes from its own linearisation."""
+    """The orbit with slopes computed about itself."""
     eq, T, state, signs = orbit.equations, orbit.period, orbit.state, (-1.0, 1.0)
     pairs: list[list[Guess]] = [
         *([(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T) for sign in signs] for k in RETURNS),
@@ -244,7 +247,7 @@ def _ends(pair: list[Guess], steps: int) -> list[Array]:
 
 
 def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
-    """One correction by the slopes; the lateral rate stays zero."""
+    """The orbit after one Newton correction with its slopes; the lateral rate stays zero."""
     returned = orbit.slopes.copy()
     returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE]
@@ -264,7 +267,7 @@ def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
 def attained(
     equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
-    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None where it dies out.
+    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None if the motion dies out.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
@@ -284,7 +287,7 @@ def attained(
 
 
 def maxima(values: Array) -> np.ndarray:
-    """Places of the positive maxima."""
+    """Indices of the positive local maxima."""
     before, here, after = values[:-2], values[1:-1], values[2:]
     return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
 
@@ -292,7 +295,7 @@ def maxima(values: Array) -> np.ndarray:
 def bifurcation(
     equations: Equations, slowest: float, fastest: float, step: float = 5e-4, executor: Executor | None = None
 ) -> Iterator[Orbit]:
-    """Cycles by rising amplitude, from the critical speed on until one leaves a range of speeds (m/s).
+    """Limit cycles of increasing amplitude, from the critical speed on until a cycle's speed leaves a range (m/s).
 
     Each at half the step (s), with the changes that halving made: of the speed, and of the frequency. Raises
     NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.

@@ -37,7 +37,8 @@ PRECISION = 1e-12
 
 
 class NoCriticalSpeed(InputError):
-    """A wheelset without a speed at which it turns from stable to unstable; ``unstable`` says which it is."""
+    """A wheelset does not change from stable to unstable at any speed; ``unstable`` is whether it is always
+    unstable."""
 
     def __init__(self, unstable: bool) -> None:
         self.unstable = unstable
@@ -53,7 +54,7 @@ class NoCriticalSpeed(InputError):
 
 @dataclass(frozen=True)
 class LinearWheelset:
-    """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
+    """Linear equations M q'' + D q' + K q = 0 for q = (y, psi); matrices (2, 2), SI units."""
 
     mass: Array
     damping: Array
@@ -73,7 +74,7 @@ def klingel(wheelset: Wheelset) -> float:
 
 
 def kalker(wheelset: Wheelset) -> Array:
-    """Forces (3, 3) by creepages: (-fx, -fy, -mz) of one wheel by (xi_x, xi_y, spin); N, N m, N m^2."""
+    """Negative forces (3, 3) per creepage of one wheel: rows -fx, -fy, -mz, columns xi_x, xi_y, spin; N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.pair
     c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
     turn = area**1.5 * c.c23
@@ -81,7 +82,7 @@ def kalker(wheelset: Wheelset) -> Array:
 
 
 def matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
-    """Equations of motion at a speed (m/s) above 0; raises InputError for another one."""
+    """``LinearWheelset`` at a speed (m/s), which must be above 0; raises InputError otherwise."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker(wheelset)
@@ -98,7 +99,8 @@ def matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
 
 
 def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
-    """Creepages (3) of the right and the left wheel by (y', psi') / V and by (y, psi), (3, 2) each."""
+    """Linear kinematics of the right and the left wheel: matrices (3, 2) from (y', psi') / V and from (y, psi) to the
+    creepages and spin."""
     cosine, b = w.slant[1], w.half_gauge
     across = b / (b - w.conicity * w.radius) / cosine
     return [
@@ -111,14 +113,14 @@ def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
 
 
 def gravity(w: Wheelset) -> Array:
-    """Stiffness of the load, which rises with y and sinks with yaw."""
+    """Stiffness matrix of the load, which is raised by lateral displacement y and lowered by yaw."""
     b, c = w.half_gauge, w.conicity
     rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2
     return w.load * np.diag([rise, -c * (b - c * w.radius)])
 
 
 def kinematic_wavelength(wheelset: Wheelset) -> float:
-    """Wavelength (m) by the eigenvalues of creep forces alone: no inertia, no suspension, no weight."""
+    """Wavelength (m) from the eigenvalues of a wheelset with creep forces only: no inertia, suspension or weight."""
     creep = kalker(wheelset)
     motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contacts(wheelset)) for k in (0, 1))
     values = np.linalg.eigvals(-np.linalg.solve(motion, place))
@@ -150,7 +152,7 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
 def critical_or_why(
     wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth
 ) -> tuple[float | None, str]:
-    """The critical speed (m/s), or why there is none, as words that follow "the wheelset"."""
+    """The critical speed (m/s) and "", or None and the reason, as words that continue "the wheelset"."""
     try:
         return critical_speed(wheelset, growth), ""
     except NoCriticalSpeed as error:

@@ -46,7 +46,7 @@ _SUMS = record("w2", "w3", "s1", "s2", "n_y", "n_z", "x", "y", "z", "radius")
 
 
 class Pose(NamedTuple):
-    """A wheelset's centre over the middle of the track (m), roll and yaw (rad)."""
+    """Position of a wheelset: its centre relative to the track's middle (m), roll and yaw (rad)."""
 
     y: float
     z: float
@@ -55,7 +55,7 @@ class Pose(NamedTuple):
 
 
 class LaidProfile(NamedTuple):
-    """A wheel's profile and that of its rail: PROFILE (1,), NODE (nodes,), KNOT (knots,)."""
+    """Profiles of a wheel and its rail as records: PROFILE (1,), NODE (nodes,), KNOT (knots,)."""
 
     head: Array
     nodes: Array
@@ -106,7 +106,7 @@ def profile_on_rail(side, pose, profile, modulus, touches):
 
 @lean
 def _seen(y, z, roll, yaw):
-    """Place, cosines and sines of roll and yaw, and what the nearest point of a circle needs."""
+    """Position, cosines and sines of roll and yaw, and factors for the point of a wheel circle nearest to the rail."""
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     lead = sr * sy / cy
     level = 1.0 / math.sqrt(1.0 + lead * lead)
@@ -115,7 +115,8 @@ def _seen(y, z, roll, yaw):
 
 @lean
 def _node(node, seen, head, knots, knot):
-    """Depth of a node's circle along the rail's normal (m), place x, y, z from the centre, slope of the rail, knot."""
+    """Contact of one node's circle: depth along the rail's normal (m), position x, y, z from the centre, slope of the
+    rail, and the index of the knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = seen
     sine = min(1.0, max(-1.0, -node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
@@ -142,8 +143,8 @@ def _node(node, seen, head, knots, knot):
 
 @lean
 def _add(node, at, length, sums):
-    """Add a node in contact, at a length (m) along the contour, to the sums of its zone, or of the two that pass into
-    each other there."""
+    """Add a touching node, which represents a length (m) of the contour, to the sums of its zone, or of both zones in a
+    transition."""
     depth, place_x, place_y, place_z, slope, _ = at
     upright = 1.0 / math.sqrt(1.0 + slope * slope)
     zone = int(node.zone)
@@ -166,7 +167,7 @@ def _add(node, at, length, sums):
 
 @lean
 def _patch(side, sums, seen, touch):
-    """One touch from its zone's sums."""
+    """Fill one touch from the sums of its zone."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
     whole = sums.w2
     if whole <= _LEAST_DEPTH_SQUARE:
@@ -183,10 +184,11 @@ def _patch(side, sums, seen, touch):
 
 @njit(cache=True, error_model="numpy")
 def settled(touches, modulus):
-    """Reduce the depths of one wheel's touches, TOUCH (zones,), by what each presses down under the others.
+    """Reduce the depths of one wheel's touches, TOUCH (zones,), by the elastic displacement that each touch's load
+    causes at the others.
 
-    modulus : E* (Pa). A load N presses a half-space down by N / (pi E* r) at a distance r, to which the mean square
-    lengths of both patches are added.
+    modulus : E* (Pa). A load N displaces the surface of a half-space by N / (pi E* r) at a distance r. To r^2, the mean
+    square lengths of both patches are added.
     """
     n = len(touches)
     alone, load, axis = np.empty(n), np.empty(n), np.empty(n)
@@ -208,14 +210,15 @@ def settled(touches, modulus):
 
 @lean
 def _cosine_of_normals(first, second, squares):
-    """Cosine between the normals of two touches by their distance (1/m)."""
+    """Ratio (1/m) of the cosine between the normals of two touches to their distance, which ``squares`` enlarge."""
     apart = (first.x - second.x) ** 2 + (first.y - second.y) ** 2 + (first.z - second.z) ** 2
     return (first.n_y * second.n_y + first.n_z * second.n_z) / math.sqrt(apart + squares / 5.0)
 
 
 @lean
 def pressed(penetration, along, across, modulus):
-    """Elastic normal force (N) and semi-axes (m) at a penetration (m), curvatures 1/m, E* (Pa); zeros for a gap."""
+    """Elastic normal force (N) and semi-axes (m) from a penetration (m), curvatures along and across (1/m) and E* (Pa);
+    zeros where there is a gap."""
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     g, cosine, sine = aspect(min(along, across) / max(along, across))

@@ -22,7 +22,8 @@ SHIFTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """z (m) and roll (rad) of the wheelset; touches, TOUCH (patches,), loads (patches,) in N, right wheel first."""
+    """Static position of a wheelset: height z (m) and roll (rad), its touches, TOUCH (patches,), and their loads
+    (patches,) in N, those of the right wheel first."""
 
     z: float
     roll: float
@@ -30,7 +31,8 @@ class Equilibrium:
     loads: Array
 
     def radii(self) -> Array:
-        """Rolling radius (2,) of the right and the left wheel, the mean of its patches by their loads (m)."""
+        """Rolling radii (2,) of the right and the left wheel (m); each is the load-weighted mean over the wheel's
+        patches."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
         places = np.column_stack([self.touches[name] for name in "xyz"])
         radius = np.linalg.norm(places - np.outer(places @ axle, axle), axis=1)
@@ -39,7 +41,7 @@ class Equilibrium:
 
 
 def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
-    """The wheelset at a lateral displacement (m), without yaw, half its load on each wheel.
+    """Static equilibrium of the wheelset at a lateral displacement (m), without yaw, with half the load on each wheel.
 
     Raises InputError for a wheelset without profiles or a displacement at which not both wheels touch.
     """
@@ -67,7 +69,8 @@ def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
 
 
 def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
-    """The wheelset with the cones that steer as its profiles do at an amplitude (m): for ``models.rail.linear``."""
+    """The wheelset on cones with the equivalent conicity that its profiles have at an amplitude (m), for
+    ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
     differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
     return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

@@ -67,7 +67,7 @@ class RollingRadiusTable:
 
     @cached_property
     def potential(self) -> Array:
-        """Integral (n,) of the difference from the first row on, the square of the table's unit."""
+        """Integral (n,) of the difference from the first row on, in the square of the table's unit."""
         y, dr = self.displacements, self.differences
         return np.append(0.0, np.cumsum(np.diff(y) * (dr[1:] + dr[:-1]) / 2.0))
 
@@ -77,14 +77,14 @@ class RollingRadiusTable:
         return float(self.displacements[0]), float(self.displacements[-1])
 
     def between(self, low: float, high: float) -> tuple[Array, Array]:
-        """Displacements and differences of the part from ``low`` to ``high``, both ends in it."""
+        """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
         first, last = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
         ends = self.difference(low, "right"), self.difference(high, "left")
         return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
 
     def difference(self, displacement: float, side: Any = "right") -> float:
-        """The difference at a displacement; at a jump the value to its left or right."""
+        """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
         i, share = self._row_before(displacement, side)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
@@ -97,20 +97,20 @@ class RollingRadiusTable:
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
     def _row_before(self, displacement: float, side: Any) -> tuple[int, float]:
-        """The row before a displacement, and the share of the way from there to the next one."""
+        """Index of the row before a displacement, and the position between that row and the next, as a share."""
         y = self.displacements
         i = int(np.clip(np.searchsorted(y, displacement, side) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
     def thinned(self) -> "RollingRadiusTable":
-        """The table without every other row, both ends kept: what its spacing costs."""
+        """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
         kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
         return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
 
 
 def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
-    """The table in a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; here in m.
+    """Table from a CSV file with the columns ``y`` and ``dr``, each in m, cm or mm as its heading says; converted to m.
 
     InputError names the line that is wrong.
     """
@@ -124,10 +124,10 @@ def rolling_radii_of(
     displacements: Array,
     report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
-    """The table of two wheels on their rails; the left one is described as a right one seen in a mirror.
+    """Rolling radius table of two wheels on their rails; the left wheel is described as a mirrored right one.
 
-    displacements : (n,) m, rising. Those at the ends at which not both wheels touch are left out. told : called with
-    the share that is done. Raises InputError where fewer than three are left.
+    displacements : (n,) m, ascending. Displacements at the ends at which not both wheels touch are left out.
+    report_progress : called with the completed share. Raises InputError where fewer than three are left.
     """
     shifts = quantity("displacements", displacements, "lateral displacements in m from -0.03 to 0.03", -0.03, 0.03)
     rows = []
@@ -152,6 +152,6 @@ def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float
 
 
 def rolling_radius(side: WheelAndRail, pose: Pose) -> float:
-    """Radius (m) of a wheel where it comes nearest to its rail."""
+    """Radius (m) of a wheel at the point nearest to its rail."""
     across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
     return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))

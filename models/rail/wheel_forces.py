@@ -94,7 +94,8 @@ class Rails(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
+    """Arrays for intermediate values, overwritten in every call, because allocating one takes as long as a wheel's
+    kinematics.
 
     wheelset : WHEELSET (1,); touches : TOUCH (patches,); of those in contact, first to last, contacts : CONTACT,
     motion : MOTION, creep forces of one rolling direction, and the creep forces that act : FORCES.
@@ -109,7 +110,8 @@ class Workspace(NamedTuple):
 
 
 class PatchPlace(NamedTuple):
-    """Normal into the rail, and place from the wheelset's centre in the track's axes (m)."""
+    """Position of a contact patch: normal into the rail, and coordinates from the wheelset's centre in the track's axes
+    (m)."""
 
     n_y: float
     n_z: float
@@ -119,8 +121,8 @@ class PatchPlace(NamedTuple):
 
 
 class PatchMotion(NamedTuple):
-    """Motion of a contact patch: slip along, velocity across the track, slip across (m/s), turning about the normal
-    (1/s), speed of approach (m/s)."""
+    """Motion of a contact patch: sliding velocity along, velocity across the track, sliding velocity across (m/s),
+    rotation about the normal (1/s), velocity of approach (m/s)."""
 
     vx: float
     vy: float
@@ -155,26 +157,26 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
 
 
 def plain(rails: Rails) -> tuple[Any, ...]:
-    """``Rails`` as plain tuples, for functions that Python calls."""
+    """``Rails`` as plain tuples, which Python passes to compiled functions faster."""
     return tuple(tuple(part) if isinstance(part, LaidProfile) else part for part in rails)
 
 
 @inlined
 def rails_in(parts):
-    """``Rails`` of plain tuples."""
+    """``Rails`` made from the plain tuples of ``plain``."""
     wheels, (head, nodes, knots), strips, cells, middle, law = parts
     return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
 
 
 @lean
 def patches(profile):
-    """How many contacts both wheels together can have: one each of cones, one for each zone of profiles."""
+    """Largest number of contacts of both wheels together: one per cone, or one per zone of the profiles."""
     return 2 if profile.nodes.size == 0 else 2 * int(profile.head[0].zones)
 
 
 @njit(cache=True, error_model="numpy")
 def room_for(profile):
-    """``Workspace`` for the contacts of a wheelset on these profiles."""
+    """``Workspace`` for the contacts of a wheelset on these profiles (or cones)."""
     n = patches(profile)
     return Workspace(
         np.empty(1, WHEELSET),
@@ -188,7 +190,7 @@ def room_for(profile):
 
 @inlined
 def contact_points(pose, rails, touches):
-    """Fill ``touches``, TOUCH (patches,), the right wheel's first; without a normal where nothing is near."""
+    """Fill ``touches``, TOUCH (patches,), the right wheel's first; touches far from contact get no normal."""
     each, wheels = len(touches) // 2, rails.wheels[0]
     for k in range(2):
         side, of_side = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
@@ -204,7 +206,8 @@ def contact_points(pose, rails, touches):
 
 @njit(cache=True, error_model="numpy")
 def supported_force(z, rails):
-    """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
+    """Vertical part (N) of the elastic normal forces, with the wheelset's centre at height z (m) in the middle of the
+    track."""
     touches, whole = np.zeros(patches(rails.profile), TOUCH), 0.0
     contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)
     for k in range(len(touches)):
@@ -215,7 +218,7 @@ def supported_force(z, rails):
 
 @inlined
 def _linear(a, b, motion, shear, poisson):
-    """Creep forces and moment of one patch by Kalker's coefficients, at creepages and spin ``motion``."""
+    """Creep forces and moment of one patch by Kalker's coefficients, for creepages and spin given as ``motion``."""
     x, y, spin = motion
     if a <= 0.0:
         a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
@@ -231,7 +234,8 @@ def _linear(a, b, motion, shear, poisson):
 
 @inlined
 def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
-    """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
+    """Fill fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll backwards (sign
+    -1)."""
     by = max(abs(speed), REGULAR)
     for k in range(len(contacts)):
         contact = contacts[k]
@@ -248,7 +252,8 @@ def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
 
 @lean
 def _both_ways(forwards, contacts, slip, speed, rails, room):
-    """Fill the forces fx, fy, mz in the room of wheels that roll forwards by a share."""
+    """Fill fx, fy, mz in ``room`` as a mixture of forward and backward rolling; ``forwards`` is the weight of forward
+    rolling."""
     for k in range(len(contacts)):
         room.forces[k].fx = room.forces[k].fy = room.forces[k].mz = 0.0
     directed = room.directed[: len(contacts)]
@@ -264,7 +269,7 @@ def _both_ways(forwards, contacts, slip, speed, rails, room):
 
 @inlined
 def creep(contacts, slip, speed, rails, room):
-    """Fill the forces fx, fy, mz in the room of contacts (CONTACT) from their slip (MOTION).
+    """Fill the forces fx, fy, mz in ``room`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
     """
@@ -281,10 +286,11 @@ def creep(contacts, slip, speed, rails, room):
 
 @inlined
 def wheel_forces(pose, rails, report, room):
-    """Add what both rails do to the wheelset to its force and moment.
+    """Add the forces and moments of both rails on the wheelset to its resultants.
 
     pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Workspace``, its
-    wheelset given in, all else written over."""
+    wheelset given in, all else written over.
+    """
     if rails.law == LINEAR and rails.profile.nodes.size == 0 and room.wheelset[0].velocity[0] >= REGULAR:
         _linear_cones(pose, rails.wheels[0], room.wheelset[0], report)
     else:
@@ -293,7 +299,7 @@ def wheel_forces(pose, rails, report, room):
 
 @inlined
 def _linear_cones(pose, wheels, wheelset, report):
-    """``patch_by_patch`` of cones with the linear law, rolling forwards: nothing is written down in between."""
+    """``patch_by_patch`` for cones with the linear law that roll forwards, without storing intermediate values."""
     cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
     speed, modulus, shear, poisson = wheelset.velocity[0], wheels.modulus, wheels.shear, wheels.nu
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
@@ -313,7 +319,7 @@ def _linear_cones(pose, wheels, wheelset, report):
 
 @lean
 def patch_by_patch(pose, rails, report, room):
-    """``wheel_forces`` of all patches, laws and directions."""
+    """``wheel_forces`` for all kinds of patches, force laws and directions of rolling."""
     touches, wheels, wheelset, n, count = room.touches, rails.wheels[0], room.wheelset[0], len(room.touches), 0
     velocity, on_cones = wheelset.velocity, rails.profile.nodes.size == 0
     contact_points(pose, rails, touches)
@@ -338,25 +344,25 @@ def patch_by_patch(pose, rails, report, room):
 
 @inlined
 def _along(rolling, conicity):
-    """Curvature (1/m) of a cone along the track."""
+    """Curvature (1/m) of a cone along the track, from its rolling radius and conicity."""
     return 0.5 / (rolling * math.sqrt(1.0 + conicity * conicity))
 
 
 @inlined
 def _flange(side, y, wheels):
-    """Lateral force (N) of a cone's flange."""
+    """Lateral force (N) of a cone's flange at a lateral position y."""
     return -side * wheels.flange * max(0.0, side * y - wheels.clearance)
 
 
 @inlined
 def _place(touch):
-    """``PatchPlace`` of a touch."""
+    """``PatchPlace`` of a touching point."""
     return PatchPlace(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
 
 
 @inlined
 def _moving(place, velocity, turning):
-    """``PatchMotion`` of a patch."""
+    """``PatchMotion`` of a patch, from velocity and angular velocity of the wheelset."""
     n_y, n_z, cx, cy, cz = place
     vx = velocity[0] + turning[1] * cz - turning[2] * cy
     vy = velocity[1] + turning[2] * cx - turning[0] * cz
@@ -366,7 +372,7 @@ def _moving(place, velocity, turning):
 
 @inlined
 def _press(touch, wheelset, wheels, push, contact, motion):
-    """Kinematics and normal force of one patch: its contact for the creep law, its motion."""
+    """Kinematics and normal force of one patch: fill its contact for the creep law and its motion."""
     moving = _moving(_place(touch), wheelset.velocity, wheelset.turning)
     elastic, a, b = pressed(touch.depth, touch.along, touch.across, wheels.modulus)
     motion.vx, motion.vy, motion.aside, motion.turn, motion.rate = moving
@@ -377,7 +383,7 @@ def _press(touch, wheelset, wheels, push, contact, motion):
 
 @inlined
 def _act(place, press, creeping, force, moment):
-    """Add one patch's forces to force and moment."""
+    """Add the forces of one patch to the wheelset's force and moment."""
     n_y, n_z, cx, cy, cz = place
     fx, fy, mz = creeping
     across, down = n_z * fy - n_y * press.load + press.push, -n_y * fy - n_z * press.load
@@ -391,7 +397,7 @@ def _act(place, press, creeping, force, moment):
 
 @lean
 def _blank(report):
-    """Zeros for a patch that touches nothing."""
+    """Fill the report of a patch without contact with zeros."""
     report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
     report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
     report.flange_force = report.elastic_power = report.damping_power = 0.0
@@ -399,7 +405,7 @@ def _blank(report):
 
 @lean
 def _tell(place, motion, press, creeping, speed, report):
-    """Fill one patch's report."""
+    """Fill the report of one patch."""
     fx, fy, mz = creeping
     vx, vy, aside, turn, rate = motion
     report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz

@@ -62,7 +62,7 @@ class Wheelset(Strict):
 
     @property
     def pair(self) -> MaterialPair:
-        """Wheel and rail, of one material."""
+        """Materials of wheel and rail, which are the same."""
         return MaterialPair(self.material, self.material)
 
     @property
@@ -73,16 +73,17 @@ class Wheelset(Strict):
 
     @property
     def tilt(self) -> float:
-        """Roll (rad/m) to the left by lateral displacement to the right, at small displacement."""
+        """Roll to the left per lateral displacement to the right (rad/m), for small displacements."""
         return self.conicity / (self.half_gauge - self.conicity * self.radius)
 
     @property
     def equivalent_conicity(self) -> float:
-        """Change of a wheel's rolling radius by lateral displacement, roll included (exact, at small displacement)."""
+        """Change of a wheel's rolling radius per lateral displacement, including the effect of roll (exact for small
+        displacements)."""
         return self.tilt * (self.half_gauge + self.head_radius * self.slant[0])
 
     def coned(self, equivalent: float) -> "Wheelset":
-        """A copy of the wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
+        """A copy of the wheelset on cones with this equivalent conicity, as profiles have at some amplitude."""
         most = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
         conicity = brentq(
             lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most, xtol=1e-15
@@ -90,12 +91,12 @@ class Wheelset(Strict):
         return self.changed(conicity=float(conicity))
 
     def changed(self, **values: Any) -> "Wheelset":
-        """A copy of the wheelset with some values changed, checked as strictly as a file."""
+        """A copy of the wheelset with some values changed and checked as in a file."""
         return Wheelset(**{name: getattr(self, name) for name in type(self).model_fields} | values)
 
     @property
     def ellipse(self) -> Hertz:
-        """Contact of one wheel in the middle of the track, under half the load."""
+        """Contact ellipse of one wheel in the middle of the track, under half the load."""
         cosine = self.slant[1]
         load = self.load / (2.0 * cosine)
         return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.pair)

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 @dataclass(frozen=True)
 class QuarterCar:
-    """Masses in kg, stiffnesses in N/m, damping in N s/m."""
+    """A quarter car: body and wheel. Masses in kg, stiffnesses in N/m, damping in N s/m."""
 
     m_s: float
     m_u: float
@@ -23,22 +23,23 @@ class QuarterCar:
 
     @property
     def mass(self) -> float:
-        """Body and wheel, kg."""
+        """Mass of body and wheel together, kg."""
         return self.m_s + self.m_u
 
     def body_acceleration(self, q: float, corner: float = 0.0) -> float:
-        """Variance, m^2/s^4. q in m^2/s."""
+        """Variance of the body's acceleration, m^2/s^4; q : intensity of the road, m^2/s."""
         s, u, k, c, t, w = self.m_s, self.m_u, self.k, self.c, self.k_t, corner
         top = c**3 * t * w + c**2 * k * t + c**2 * t * s * w**2 + c * k**2 * self.mass * w + k**3 * self.mass
         return q * t / (2 * c * s**2) * (top + k**2 * s * u * w**2) / self._common(w)
 
     def suspension_travel(self, q: float, corner: float = 0.0) -> float:
-        """Variance of body height less wheel height, m^2."""
+        """Variance of the suspension travel, body height less wheel height, m^2."""
         slow = self.mass * (self.c * corner + self.k) + self.m_s * self.m_u * corner**2
         return q * self.k_t / (2 * self.c) * slow / self._common(corner)
 
     def tyre_deflection(self, q: float) -> float:
-        """Variance of wheel height less road height, m^2, on a random walk; times k_t^2 that of the wheel load."""
+        """Variance of the tyre deflection, wheel height less road height, m^2, on a random-walk road; times k_t^2, that
+        of the wheel load."""
         s, u, k, c, t, m = self.m_s, self.m_u, self.k, self.c, self.k_t, self.mass
         return q / 2 * (c * m**2 / (t * s**2) + (k**2 * m**3 / (t * s) ** 2 - 2 * k * m * u / (t * s) + u) / c)
 
@@ -62,11 +63,12 @@ class QuarterCar:
 
 
 def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, speed: float) -> float:
-    """Variance (m^2/s^4) at the centre of gravity, a (m) behind the front axle, b before the rear one, of a half car
-    that splits into two identical quarter cars.
+    """Variance (m^2/s^4) of the vertical acceleration at the centre of gravity of a half car that splits into two
+    similar quarter cars; the front axle is a (m) ahead of the centre, the rear one b behind.
 
-    It does so if its pitch inertia is m a b and each axle's spring, damper, tyre and wheel are in the ratio of its
-    share of the mass, front b / (a + b), rear a / (a + b); ``corner`` is the quarter car of either, to that scale.
+    It splits if its pitch inertia is m a b, and if springs, dampers, tyres and wheels of the axles are in the ratio of
+    their shares of the mass, front b / (a + b), rear a / (a + b). ``corner`` is the quarter car of both, up to this
+    factor.
     """
     base = a + b
     at_axle = corner.body_acceleration(q)
@@ -75,6 +77,7 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
 
 
 def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:
-    """Front and rear corner of that half car, 2 b / (a + b) and 2 a / (a + b) times ``corner``; inertia in kg m^2."""
+    """Front and rear corner of a half car that splits: 2 b / (a + b) and 2 a / (a + b) times ``corner``; inertia in kg
+    m^2."""
     front, rear = (QuarterCar(*(2 * share / (a + b) * value for value in vars(corner).values())) for share in (b, a))
     return front, rear, 2 * corner.m_s * a * b

@@ -16,8 +16,8 @@ TOGETHER = 64
 
 
 class Curves(NamedTuple):
-    """Forces (N) of s springs over travel (m) or over rate (m/s): offset and first slope (s,), and what their slopes
-    change by, bends (s, k), at k corners (s, k); a bend is 0 where a spring has fewer."""
+    """Curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope (s,), and changes of
+    slope, bends (s, k), at k corners (s, k); unused bends are 0."""
 
     offset: np.ndarray
     slope: np.ndarray
@@ -26,8 +26,8 @@ class Curves(NamedTuple):
 
 
 class PushingTyres(NamedTuple):
-    """Tyres that only push: wheel (u,) of each among those on the road, load at rest (u,) in N, stiffness (u,) in N/m,
-    damping (u,) in N s/m, heights (u, n): rise of each by the coordinates."""
+    """Tyres that only push: index (u,) of the wheel of each, static load (u,) in N, stiffness (u,) in N/m, damping (u,)
+    in N s/m, heights (u, n): rise of the wheel per coordinate."""
 
     wheel: np.ndarray
     load: np.ndarray
@@ -37,7 +37,8 @@ class PushingTyres(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Small motion of n coordinates over w wheels with s bent springs, u tyres that only push, and p outputs.
+    """Force laws and linear motion of n coordinates over w wheels, with s nonlinear springs, u tyres that only push,
+    and p outputs.
 
     rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
     forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,
@@ -57,7 +58,7 @@ class Laws(NamedTuple):
 
 @lean
 def add(total, factor, values):
-    """Add a multiple of a row (copies,) to another; nothing where the factor is 0."""
+    """Add ``factor`` times a row (copies,) to another row; nothing is done where the factor is 0."""
     if factor != 0.0:
         for c in range(total.size):
             total[c] += factor * values[c]
@@ -65,7 +66,7 @@ def add(total, factor, values):
 
 @lean
 def on_curve(curves, spring, argument, force):
-    """Add what a spring's curve over travel or rate (copies,) gives to its force (copies,) in N."""
+    """Add to ``force`` (copies,) in N the force of a spring's curve at its travel or rate, ``argument`` (copies,)."""
     offset, slope = curves.offset[spring], curves.slope[spring]
     for c in range(force.size):
         force[c] += offset + slope * argument[c]
@@ -78,9 +79,10 @@ def on_curve(curves, spring, argument, force):
 
 @lean
 def off_road(u, x, road, tyres, pressed, rate, lost):
-    """Fill what a tyre that only pushes has beside a linear one (copies,) in N: 0 on the road, its pull off it.
+    """Fill ``lost`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0 on the
+    road, and cancels the pull of a lifted tyre.
 
-    pressed, rate (copies,) are written over.
+    pressed, rate (copies,) are overwritten.
     """
     n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[u]
     load, stiffness, damping = tyres.load[u], tyres.stiffness[u], tyres.damping[u]
@@ -98,8 +100,8 @@ def off_road(u, x, road, tyres, pressed, rate, lost):
 
 @lean
 def rates(x, road, laws, force, out, room):
-    """Fill the rates (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the forces
-    (s + u, copies) in N that are not linear; room (2, copies) is written over."""
+    """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
+    nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
     for s in range(springs):
         travel, slip, bent = room[0], room[1], force[s]
@@ -127,7 +129,7 @@ def rates(x, road, laws, force, out, room):
 
 @lean
 def output(p, x, road, rate, force, laws, out):
-    """Fill one output (copies,) of states with their rates."""
+    """Fill one output (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
     out[:] = 0.0
     for j in range(2 * n):
@@ -142,7 +144,7 @@ def output(p, x, road, rate, force, laws, out):
 
 @lean
 def sum_up(value, sums, p, first):
-    """Add powers of output p (copies,) to their sums, from copy ``first`` on."""
+    """Add the first four powers of output p (copies,) to their sums, in columns from copy ``first`` on."""
     for c in range(value.size):
         square = value[c] * value[c]
         sums[0, p, first + c] += value[c]
@@ -153,7 +155,7 @@ def sum_up(value, sums, p, first):
 
 @lean
 def states_ahead(x, time, rate, moved):
-    """Fill the states (2 n, copies) that rates lead to in a time (s)."""
+    """Fill ``moved`` with the states (2 n, copies) after a time (s) at constant rates."""
     for j in range(x.shape[0]):
         for c in range(x.shape[1]):
             moved[j, c] = x[j, c] + time * rate[j, c]
@@ -161,7 +163,8 @@ def states_ahead(x, time, rate, moved):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def march(states, roads, step, first, every, laws, sums):
-    """Step copies (s) by the classical Runge-Kutta method, and add up powers of their outputs on the way.
+    """Advance the copies by steps (s) of the classical Runge-Kutta method, and sum up powers of their outputs on the
+    way.
 
     states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; sums (4, p, copies) gain
     the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.

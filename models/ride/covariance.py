@@ -26,7 +26,7 @@ FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 
 @dataclass(frozen=True)
 class StationaryCovariance:
-    """State and outputs in the stationary state.
+    """Stationary covariance of the state and variances of the outputs.
 
     P (n, n): covariance of the state, without motions that diffuse. Per output (p,): ``variance`` (unit^2), inf where
     there is none; ``status`` and a sentence on its ``reason``; ``rate`` and ``power`` of a variance that grows as
@@ -47,12 +47,12 @@ class StationaryCovariance:
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (p,) of the outputs, inf where there is none."""
+        """Standard deviations (p,) of the outputs, inf where an output has no finite variance."""
         return np.sqrt(self.variance)
 
 
 def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryCovariance:
-    """Covariance of a system that meets unit white noise, axle after axle.
+    """Stationary covariance of a system whose axles meet unit white noise one after the other.
 
     ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
@@ -91,14 +91,16 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryC
 
 
 def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Variances (p,) of y = C x up to which an output counts as silent, its variance as rounding."""
+    """Thresholds (p,) of the variance of y = C x below which it is mere rounding, so that the output counts as
+    silent."""
     terms = abs(C) @ np.sqrt(abs(np.diagonal(P)))
     most = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
     return np.asarray(np.maximum(CANCELLED * terms, SILENT * most) ** 2, float)
 
 
 class Hits(NamedTuple):
-    """B (n, k), D (p, k) and delays (s) of the instants at which noise arrives; ``independent``: of its own each."""
+    """Instants at which noise reaches the axles: B (n, k), D (p, k) and delays (s); ``independent`` : whether each axle
+    has its own noise."""
 
     B: list[np.ndarray]
     D: list[np.ndarray]
@@ -107,7 +109,7 @@ class Hits(NamedTuple):
 
 
 def hits(system: DelayedSystem) -> Hits:
-    """When noise arrives: axles that meet the same noise at once are one."""
+    """The ``Hits`` of a system; axles that meet the same noise at the same instant are combined."""
     if system.independent:
         return Hits([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
@@ -123,7 +125,7 @@ Moved = Callable[[float, np.ndarray], np.ndarray]
 
 
 def _responses(A: np.ndarray, met: Hits, moved: Moved | None = None) -> list[np.ndarray]:
-    """F_j, the response just before each hit: zero for noise that no axle has met before."""
+    """State responses F_j to earlier noise just before each hit; zero where no axle has met this noise before."""
     if moved is None:
 
         def moved(time: float, B: np.ndarray) -> np.ndarray:
@@ -138,12 +140,13 @@ def _responses(A: np.ndarray, met: Hits, moved: Moved | None = None) -> list[np.
 
 
 def noise_of(system: DelayedSystem, moved: Moved | None = None) -> np.ndarray:
-    """``intensity`` of a system's own noise, in double precision."""
+    """``intensity`` of the noise in a given system, in double precision."""
     return intensity(system.A, hits(system), moved).astype(float)
 
 
 def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarray:
-    """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact.
+    """Matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise of all hits, with exact
+    delays.
 
     ``moved`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
@@ -153,7 +156,8 @@ def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarra
 
 
 def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """P of A P + P A' + Q = 0 in extended precision, the last correction, and the residual by its largest term.
+    """Solution P of A P + P A' + Q = 0 in extended precision, the last correction, and the ratio of the residual to its
+    largest term.
 
     python-control with its method named (left alone it takes another where slycot is installed), then refined: the
     residual, in extended precision, is solved for what is missing. Q may be indefinite. Raises InputError for a Q that
@@ -208,9 +212,11 @@ One is enough but where a motion hardly dies out; each takes as many digits off 
 def _with_marginal(
     split: MarginalParts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Covariance of the whole state (marginal motions first), its correction and basis, motions that diffuse left out.
+    """Covariance of the whole state (marginal motions first), its last correction and basis; motions with unbounded
+    variance are left out.
 
-    A motion that does not diffuse lives from the first hit to the last: integrals over that window.
+    A motion that does not diffuse responds only between the first and the last hit: its covariances are integrals over
+    that window.
     """
     k, onto_marginal = split.marginal, met._replace(B=[split.W0 @ b for b in met.B])
     before = _responses(split.M, onto_marginal), _responses(split.S, onto_stable)
@@ -241,7 +247,7 @@ def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
 
 
 def _output_variances(C: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Variances (p,) of y = C x."""
+    """Variances (p,) of the outputs y = C x with state covariance P."""
     return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
 
 
@@ -259,7 +265,7 @@ def verdicts(
     accuracy: float,
     split: MarginalParts | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Status and reason of every output.
+    """Status of every output's variance, and the reason for it.
 
     White noise that comes through D counts if, up to the ``fastest`` rate of the system (1/s), it carries more than
     rounding could of the output's variance without it; ``floor`` (p,) is what rounding makes of a variance of zero.

@@ -20,7 +20,8 @@ from models.vehicles.linear_vehicle import LinearVehicle, OutputRows
 
 @dataclass(frozen=True)
 class DelayedSystem:
-    """State, noise and outputs y = C x + sum_i D_i w(t - tau_i), w of unit intensity with k channels.
+    """Linear system excited by delayed white noise, with outputs y = C x + sum_i D_i w(t - tau_i); w has unit intensity
+    and k channels.
 
     A (n, n); B, one (n, k) per axle; delays tau_i in s, the first 0, none falling; C (p, n); D, one (p, k) per axle.
     ``independent`` axles meet noises that know nothing of one another; the delays then have no meaning.
@@ -36,7 +37,7 @@ class DelayedSystem:
 
 
 def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
-    """The vehicle behind its road filters at a constant speed (m/s, above 0).
+    """The vehicle with its road filters, at a constant speed (m/s, above 0).
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
     z' = H f', white noise in part where the filter is of first order: it reaches the wheels through tyre damping.
@@ -89,13 +90,13 @@ NEGLIGIBLE_SHARE = 1e-10
 
 
 def singular(mass: np.ndarray) -> bool:
-    """Whether nothing inert moves with some motion."""
+    """Whether the mass matrix is singular: some motion involves no inertia."""
     return bool(_range_and_kernel(mass)[1].size)
 
 
 @dataclass(frozen=True)
 class VehicleStates:
-    """A vehicle under generalised forces g (n,), of first order: x' = A x + B g, q = Q x + direct g.
+    """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
     inert, slow: a and b by q.
@@ -110,7 +111,8 @@ class VehicleStates:
 
 
 def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
-    """States of a vehicle whose mass may be singular; InputError where nothing holds a body without mass."""
+    """``VehicleStates`` of a vehicle whose mass matrix may be singular; InputError where no spring or damper holds a
+    massless body."""
     Y, Z = _range_and_kernel(vehicle.mass)
     V, E = (Z @ part for part in _range_and_kernel(Z.T @ vehicle.damping @ Z))
     n, a, b = len(vehicle.mass), Y.shape[1], V.shape[1]
@@ -132,7 +134,8 @@ def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
 def first_order(
     vehicle: LinearVehicle, states: VehicleStates, excitation: Excitation, speed: float
 ) -> tuple[DelayedSystem, np.ndarray]:
-    """The system with state (a, a', b, f), and r by its state (n, x); the mass may be singular.
+    """The system with state (a, a', b, f) for a vehicle whose mass matrix may be singular, and the vehicle's
+    coordinates as a function of that state (n, x).
 
     C and D are without rounding; what would see the derivative of white noise has infinite D.
     """
@@ -157,7 +160,8 @@ def first_order(
 
 
 def _direct(read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """D (axles, p, k) of outputs, by q and q' of the state, B, and the noise in the rates of the heights."""
+    """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, B, and noise in
+    the rates of the road's heights."""
     seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise
     size = abs(read.rate_factors) @ abs(q) @ abs(B) + abs(read.acceleration_factors) @ abs(v) @ abs(B)
     told = abs(seen) > NEGLIGIBLE_SHARE * (size + abs(read.road_rate_factors) @ abs(noise))
@@ -168,7 +172,7 @@ def _direct(read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise
 
 
 def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """matrix^-1 right; InputError where nothing holds a body without mass."""
+    """Solution of matrix X = right; InputError where no spring or damper holds a massless body."""
     if not len(matrix):
         return right
     if np.linalg.cond(matrix) > 1 / NEGLIGIBLE_SHARE:
@@ -177,7 +181,7 @@ def _solved_for(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _range_and_kernel(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bases of what a symmetric matrix acts on and of what it does not; single coordinates where it is diagonal."""
+    """Bases of the range and of the null space of a symmetric matrix; single coordinates where it is diagonal."""
     if not len(matrix):
         return matrix, matrix
     scale = np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))

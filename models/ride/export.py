@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 
 def matrices(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
-    """A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and standard deviations."""
+    """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and
+    standard deviations."""
     named: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
         named |= {f"B{i}": B, f"D{i}": D}
@@ -41,7 +42,8 @@ def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) ->
 
 
 def state_space(system: DelayedSystem) -> "control.StateSpace":
-    """The system with the noise of each axle as inputs of its own, axle after axle; delays are for the user to apply.
+    """State-space model in which each axle's noise is a separate input, axle after axle; the user must apply the
+    delays.
 
     Inputs are named w1_1, w1_2, ... (axle, channel); the noise of axle i is that of the first, ``delays[i]`` later.
     """

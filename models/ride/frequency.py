@@ -48,7 +48,8 @@ Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 
 @dataclass(frozen=True)
 class Quadrature:
-    """variance (p,) with its own estimate of the relative error (p,); frequencies that it took."""
+    """Result of the integration: variance (p,), its estimated relative error (p,), and the number of frequencies
+    used."""
 
     variance: np.ndarray
     error: np.ndarray
@@ -56,7 +57,8 @@ class Quadrature:
 
 
 def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
-    """Outputs by heights under the wheels (n, p, w) at angular frequencies (n,) in rad/s, by the dynamic stiffness."""
+    """Transfer functions (n, p, w) from heights under the wheels to outputs at angular frequencies (n,) in rad/s, from
+    the dynamic stiffness."""
     s = 1j * np.asarray(omega, float)[:, None, None]
     stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
     motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
@@ -66,7 +68,8 @@ def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
 
 
 def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
-    """Heights under the wheels by the noise (a, n, w, k), axle by axle, each without its delay; m / sqrt(1/s)."""
+    """Transfer functions (a, n, w, k) from the noise to heights under the wheels, one axle after the other, without
+    delays; m / sqrt(1/s)."""
     s = 1j * np.asarray(omega, float)[:, None, None]
     shape = s * np.eye(len(excitation.F)) - speed * excitation.F
     filtered = np.linalg.solve(shape, speed**0.5 * excitation.G.astype(complex)[None])
@@ -76,7 +79,8 @@ def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
 def spectra(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights | None = None
 ) -> np.ndarray:
-    """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over both signs."""
+    """Two-sided spectral densities (n, p) of the outputs over the angular frequency (rad/s); their integral over
+    positive and negative frequencies is the variance."""
     parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
@@ -86,12 +90,12 @@ def spectra(
 
 
 def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
-    """One-sided densities (n, p) over the frequency (Hz)."""
+    """One-sided spectral densities (n, p) of the outputs over the frequency (Hz)."""
     return 4 * np.pi * spectra(vehicle, excitation, speed, 2 * np.pi * frequency)
 
 
 def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
-    """Outputs by heights (n, p, w), the weighted ones in place of their own."""
+    """Transfer functions (n, p, w) from heights to outputs, in which weighted outputs replace the unweighted ones."""
     whole = transfer(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
@@ -113,7 +117,7 @@ def quadrature(
     _check_stable(vehicle)
 
     def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
-        """Shares (panels, p) of the variances between the two frequencies of each row."""
+        """Contributions (panels, p) to the variances from the frequency interval in each row of ``edges``."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
         omega = (centre[:, None] + half[:, None] * NODES).ravel()
         parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
@@ -140,7 +144,7 @@ def quadrature(
 
 
 def _check_stable(vehicle: LinearVehicle) -> None:
-    """Raise Unstable for a motion that grows faster than rounding makes a free one grow."""
+    """Raise Unstable if a motion grows faster than rounding alone can make a free motion grow."""
     rates = poles(vehicle)
     worst = rates[rates.real.argmax()]
     if worst.real > GROWING * abs(rates).max():
@@ -150,7 +154,8 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 def _halve_panels(
     over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, each halved until that changes it by no more than ``limit`` (p,); the last changes."""
+    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most ``limit``
+    (p,)."""
     variance, error = np.zeros_like(limit), np.zeros_like(limit)
     taken, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
@@ -175,7 +180,8 @@ TO_LEGENDRE = (DEGREES[:, None] + 0.5) * eval_legendre(DEGREES[:, None], NODES) 
 def _integrals(
     parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
 ) -> np.ndarray:
-    """Variances (panels, p) of the sum of delayed parts (a, panels, nodes, p, k); both signs of the frequency."""
+    """Contributions (panels, p) to the variances, for outputs that are sums of delayed parts (a, panels, nodes, p, k);
+    both signs of the frequency are included."""
     integrals = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
     for j in range(1, len(parts)) if not excitation.independent else ():
         for i in range(j):
@@ -187,7 +193,8 @@ def _integrals(
 
 
 def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.ndarray:
-    """Edges (rad/s) of the first panels: doublings from almost 0 to beyond all, and the undamped frequencies."""
+    """Edges (rad/s) of the first panels: frequencies that double from nearly 0 to far above all motions, and the
+    undamped natural frequencies."""
     squares = abs(np.linalg.eigvals(np.linalg.solve(vehicle.mass, vehicle.stiffness)))
     natural = np.sqrt(squares[squares > 1e-8 * squares.max()])
     corners = speed * abs(np.linalg.eigvals(excitation.F))
@@ -210,7 +217,8 @@ def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, w
 
 
 def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float) -> np.ndarray:
-    """Variances (p,) in unit^2 of the outputs, from the wavenumbers ``low`` to ``high`` (rad/m) on both sides of 0.
+    """Variances (p,) in unit^2 of the outputs, from wavenumbers between ``low`` and ``high`` (rad/m), positive and
+    negative.
 
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
     """
@@ -219,7 +227,8 @@ def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: flo
 
 
 def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    """Wavenumbers (k,) in rad/m from ``low`` to ``high`` and their weights in an integral over both sides of 0."""
+    """Positive and negative wavenumbers (k,) in rad/m between ``low`` and ``high``, and their weights for
+    integration."""
     behind = vehicle.axles[0] - vehicle.axles[-1]
     longest = np.pi / behind if behind else np.inf
     edges = [low]

@@ -20,7 +20,8 @@ WIDE, TALL = 20.0, 9.0
 
 
 def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float, float]:
-    """E[f(x)] (N) and E[f'(x)] (N by the unit of x) of a curve, x normal; no curve gives zeros."""
+    """Expected values E[f(x)] (N) and E[f'(x)] (N per unit of x) of a curve f for normally distributed x; zeros without
+    a curve."""
     if curve is None:
         return 0.0, 0.0
     if deviation == 0.0:
@@ -33,13 +34,14 @@ def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float,
 
 
 def _slope(curve: Curve, x: float) -> float:
-    """Slope away from rest, to the right of a corner."""
+    """Slope of a curve at x; at a corner, the slope on the side away from rest."""
     _, slope, corners, bends = curve.hinges()
     return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
 
 
 def of_friction(friction: float, friction_rate: float, deviation: float) -> float:
-    """E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), v normal with mean 0 and this deviation (m/s).
+    """Expected slope E[f'(v)] (N s/m) of f(v) = friction tanh(v / friction_rate), for v normal with mean 0 and a
+    standard deviation (m/s).
 
     With t = v / friction_rate the integrand sech^2(t) times the density of t is smooth at any ratio of the two.
     """
@@ -52,7 +54,8 @@ def of_friction(friction: float, friction_rate: float, deviation: float) -> floa
 
 
 def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[float, float, float]:
-    """Mean force (N), gain (N/m) and variance (N^2) that the gain leaves out, of the curve over travel (m)."""
+    """Statistical linearisation of the curve over travel (m): mean force (N), gain (N/m), and variance (N^2) of the
+    remaining force."""
     force, gain = of_curve(spring.travel_force, mean, deviation)
     x = deviation * POINTS
     law = _curve_at(spring.travel_force, mean + x)
@@ -60,7 +63,8 @@ def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[floa
 
 
 def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
-    """Mean force (N), gain (N s/m) and variance (N^2) left out, of curve and friction over the rate (m/s)."""
+    """Statistical linearisation of curve and friction over the rate (m/s): mean force (N), gain (N s/m), and variance
+    (N^2) of the remaining force."""
     force, gain = of_curve(spring.rate_force, 0.0, deviation)
     gain += of_friction(spring.friction, spring.friction_rate, deviation)
     x = deviation * POINTS
@@ -74,7 +78,7 @@ WEIGHTS = np.exp(-(POINTS**2) / 2.0) / np.exp(-(POINTS**2) / 2.0).sum()
 
 
 def _curve_at(curve: Curve | None, x: np.ndarray) -> np.ndarray:
-    """The curve at many arguments."""
+    """Forces of the curve at many arguments."""
     if curve is None:
         return np.zeros_like(x)
     offset, slope, corners, bends = curve.hinges()

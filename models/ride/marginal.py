@@ -29,7 +29,7 @@ ROUNDING = 10 * float(np.finfo(float).eps)
 
 
 class Unstable(InputError):
-    """A system that leaves its equilibrium on its own: ``growth`` in 1/s, ``frequency`` in Hz."""
+    """The system leaves its equilibrium without excitation: ``growth`` in 1/s, ``frequency`` in Hz."""
 
     def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
         self.growth, self.frequency = growth, frequency
@@ -46,7 +46,7 @@ class Unstable(InputError):
 
 @dataclass(frozen=True)
 class MarginalParts:
-    """x' = A x + u in two parts that know nothing of one another: x = V0 a + V b, a' = M a + W0 u, b' = S b + W u.
+    """Decoupling of x' = A x + u into a marginal and a stable part: x = V0 a + V b, a' = M a + W0 u, b' = S b + W u.
 
     M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
@@ -67,12 +67,13 @@ class MarginalParts:
 
     @property
     def marginal(self) -> int:
-        """Number of marginal states."""
+        """Number of marginal states, those with eigenvalues on the imaginary axis."""
         return len(self.M)
 
 
 def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
-    """Marginal and stable part of x' = A x + u, A (n, n); raises Unstable, InputError where it cannot be told.
+    """Marginal and stable part of x' = A x + u, with A (n, n); raises Unstable, or InputError where they cannot be
+    separated.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
@@ -120,7 +121,7 @@ def _refuse(fastest: float) -> None:
 
 
 def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """A in states of like size, these sizes (n,), and the norm of A as LAPACK balances it (1/s).
+    """A after scaling the states to similar size, these scales (n,), and the norm of A as LAPACK balances it (1/s).
 
     LAPACK counts diagonals in: a road filter whose corner is almost 0 would get a size of almost 0, and beside its
     noise, which does not shrink, nothing could be told from rounding. The fastest rate on all diagonals prevents it.
@@ -157,7 +158,8 @@ def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarra
 
 
 def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Orthogonal U, the ordered real Schur form U' A U with its undamped pairs first, their eigenvalues' number.
+    """Orthogonal U, the ordered real Schur form U' A U with its undamped pairs first, and the number of their
+    eigenvalues.
 
     Raises Unstable if any eigenvalue lies beyond them, on the right.
     """
@@ -178,7 +180,7 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
 
 
 def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
-    """Take the coupling form[:k, k:] out of a block triangular form = W A V, by a Sylvester equation, in place."""
+    """Remove the coupling form[:k, k:] of a block triangular form = W A V in place, by solving a Sylvester equation."""
     if 0 < k < len(form):
         from control import lyap
 
@@ -189,7 +191,7 @@ def _decouple(form: np.ndarray, V: np.ndarray, W: np.ndarray, k: int) -> None:
 
 
 def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A in coordinates close to its own motions, T^-1 A T, with T and its inverse: real, in extended precision.
+    """A transformed almost to its own modes, T^-1 A T, with T and its inverse: real, in extended precision.
 
     In positions and velocities an acceleration is a small difference of large forces, and a rounding of the state
     is multiplied by stiffnesses; in these coordinates each motion has its own size. They need not be exact, and
@@ -212,7 +214,7 @@ PARALLEL = 1e8
 
 @dataclass(frozen=True)
 class Growth:
-    """Per output, of its variance in the long run: rate * t^power (t in s), power 0 where it does not grow."""
+    """Long-run growth of each output's variance: rate * t^power (t in s), with power 0 where it does not grow."""
 
     rate: np.ndarray
     power: np.ndarray
@@ -227,7 +229,8 @@ def growth(
     variance: np.ndarray,
     accuracy: float = ACCURACY,
 ) -> Growth:
-    """Growth of y = C x along the marginal motions under noise through B_i (n, k) with delays tau_i (s).
+    """Long-run growth of the variances of y = C x along the marginal motions, under noise through B_i (n, k) with
+    delays tau_i (s).
 
     Axles that meet the same noise act as one input, the sum of e^(-M tau_i) W0 B_i: what the first one starts, the
     last one may stop. C (p, n). Products no larger than ZERO_MARGIN times their accuracy are zero, unless the motion,
@@ -259,8 +262,8 @@ def _of_zeros(
     lower_bound: float,
     upper_bound: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rates and powers (p,): h(t) = sum of C N^l G t^l / l!, whose highest power wins; rates above ``upper_bound``
-    count."""
+    """Growth rates and powers (p,) from h(t) = sum of C N^l G t^l / l!, whose highest power dominates; only rates above
+    ``upper_bound`` count."""
     rate, power = np.zeros(len(C)), np.zeros(len(C), int)
     step, step_size = G, G_size
     for level in range(len(N)):
@@ -283,8 +286,8 @@ def _of_undamped(
     lower_bound: float,
     upper_bound: np.ndarray,
 ) -> np.ndarray:
-    """Rates (p,): the mean square of the response C e^(T t) G, frequency by frequency; those above ``upper_bound``
-    count."""
+    """Growth rates (p,): the mean square of the response C e^(T t) G, summed over the frequencies; only those above
+    ``upper_bound`` count."""
     rate = np.zeros(len(C))
     values, vectors = np.linalg.eig(T)
     right, left = C @ vectors, np.linalg.solve(vectors, G.astype(complex)) if len(T) else G

@@ -16,7 +16,7 @@ def share_beyond(deviation: float, limit: float) -> float:
 
 
 def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
-    """Number of times per second that abs(x) passes the limit outwards, from the deviations of x and of its rate x'
+    """Number of times per second that abs(x) exceeds the limit, from the standard deviations of x and of its rate x'
     (1/s).
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
@@ -28,7 +28,7 @@ def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
 
 
 def dynamic_load_factor(deviation: float, static: float) -> float:
-    """Standard deviation of a wheel's load by its static load (both N): 0.33 is where a tyre begins to lift off.
+    """Ratio of the standard deviation of a wheel's load to its static load (both N): at 0.33 a tyre begins to lift off.
 
     At three standard deviations the load is then gone, which a linear vehicle does not notice.
     """
@@ -39,7 +39,7 @@ def dynamic_load_factor(deviation: float, static: float) -> float:
 
 
 def _check(**given: float) -> None:
-    """Raise InputError for what is below 0 or no number."""
+    """Raise InputError for a negative value or one that is not a number."""
     for name, value in given.items():
         if not 0.0 <= value < math.inf:
             raise InputError("", name, value, "must be 0 or more, and finite")

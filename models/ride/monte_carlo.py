@@ -42,7 +42,8 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class VarianceEstimate:
-    """Variances of outputs over the copies: time (N,), s; variance, error (N, p), unit^2, inf where there is none.
+    """Variances of outputs estimated from the copies: time (N,), s; variance, error (N, p), unit^2, inf where a
+    variance is infinite.
 
     ``error`` is the standard error. The mean is known to be zero.
     """
@@ -54,8 +55,8 @@ class VarianceEstimate:
     copies: int
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """Standard scores (N, p) of the estimate: its distance, in standard errors, above the variance of these
-        standard deviations (N, p)."""
+        """Standard scores (N, p): the estimate less the variances of the given standard deviations (N, p), divided by
+        the standard errors."""
         known = np.isfinite(self.variance)
         off = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
         return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)
@@ -71,7 +72,7 @@ def variances_along_drive(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Variances along a drive, over the copies, where a cell ends next to each of the instants (s).
+    """Variances over the copies along a drive, at ends of cells next to each of the instants (s).
 
     The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
     ``weighting.weighted``. Raises InputError for a standstill: a cell would take for ever.
@@ -103,7 +104,8 @@ def at_constant_speed(
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
 ) -> VarianceEstimate:
-    """Stationary variances (1, p) over the copies and, in each of them, over ``duration`` (s)."""
+    """Stationary variances (1, p) at a constant speed, averaged over the copies and, in each of them, over ``duration``
+    (s)."""
     cells = _Cells(vehicle, excitation, weightings, speed)
     skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
@@ -116,7 +118,7 @@ def at_constant_speed(
 
 
 def path_cell(lengths: Sequence[float], longest: float, tolerance: float = TOLERANCE) -> tuple[float, np.ndarray]:
-    """Length (m) of a cell, at most ``longest``, and how many cells each axle runs behind the first.
+    """Length (m) of a path cell, at most ``longest``, and by how many cells each axle is behind the first.
 
     All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
     """
@@ -132,7 +134,7 @@ def path_cell(lengths: Sequence[float], longest: float, tolerance: float = TOLER
 
 
 class _Cells:
-    """A system cut into cells of path that suit its axles and its slowest speed (m/s)."""
+    """A system whose path is divided into cells that fit its axle distances and its slowest speed (m/s)."""
 
     def __init__(
         self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
@@ -150,7 +152,7 @@ class _Cells:
         )
 
     def to_forget(self, speed: float) -> int:
-        """Cells at a constant speed after which a copy has forgotten its beginning."""
+        """Number of cells at a constant speed after which a copy no longer depends on its initial state."""
         slowest = -np.linalg.eigvals(self.at_rest + speed * self.per_speed).real.max()
         if slowest < SLOWEST_DECAY:
             said = "has a motion that does not die out: a copy never forgets its beginning"
@@ -158,7 +160,8 @@ class _Cells:
         return int(np.ceil(FORGOTTEN / slowest * speed / self.length))
 
     def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
-        """States (n, copies) at the end of each cell, crossed by the first axle in the given times (s)."""
+        """States (n, copies) at the end of each cell; ``durations`` : times (s) in which the first axle crosses the
+        cells."""
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
         draws = _draw_coefficients(seed, copies, k * MODES * (axles if independent else 1))
@@ -175,7 +178,7 @@ class _Cells:
             yield x
 
     def _crossed(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Transition (n, n) over a cell and responses (n, a k MODES) to its noise, axle by axle."""
+        """Transition matrix (n, n) over a cell, and responses (n, a k MODES) to the noise in it, axle by axle."""
         matrix = duration * self.at_rest + self.length * self.per_speed
         rows = [np.stack(self.at_unit_speed.B, axis=1) * self.length**0.5]
         for _ in range(TERMS - 1):
@@ -184,11 +187,12 @@ class _Cells:
         return expm(matrix), responses.reshape(len(matrix), -1)
 
     def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
-        """Outputs (p, copies) without white noise."""
+        """Outputs (p, copies), without their white-noise part."""
         return (self.at_unit_speed.C + (speed - 1.0) * (self.at_double_speed.C - self.at_unit_speed.C)) @ x
 
     def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> VarianceEstimate:
-        """The estimate from variances and their errors (N, 2, p), inf where an output has none."""
+        """``VarianceEstimate`` from variances and their errors (N, 2, p), inf where an output has no finite
+        variance."""
         moments = np.where(self.finite, rows, np.inf)
         return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
 

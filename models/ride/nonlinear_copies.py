@@ -48,44 +48,43 @@ class Copies:
 
     @property
     def mean(self) -> np.ndarray:
-        """Means (p,)."""
+        """Means (p,) of the outputs."""
         return self.moments[0].mean(axis=0)
 
     @property
     def mean_error(self) -> np.ndarray:
-        """Standard errors (p,) of the outputs' means, from the scatter of the copies, which do not depend on each
-        other."""
+        """Standard errors (p,) of the outputs' means, from the scatter between the independent copies."""
         return self.moments[0].std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
 
     @property
     def variance(self) -> np.ndarray:
-        """Variances (p,) about the means."""
+        """Variances (p,) of the outputs about their means."""
         return self.about_mean().mean(axis=0)
 
     @property
     def error(self) -> np.ndarray:
-        """Standard errors (p,) of the outputs' variances, from the scatter of the copies."""
+        """Standard errors (p,) of the outputs' variances, from the scatter between the copies."""
         return self.about_mean().std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations (p,)."""
+        """Standard deviations (p,) of the outputs."""
         return np.sqrt(self.variance)
 
     @property
     def kurtosis(self) -> np.ndarray:
-        """Fourth moment about the mean by the square of the variance (p,): 3 for a Gaussian output."""
+        """Ratio (p,) of the fourth central moment to the squared variance: 3 for a Gaussian output."""
         first, second, third, fourth = self.moments.mean(axis=1)
         central = fourth - 4 * first * third + 6 * first**2 * second - 3 * first**4
         return central / self.variance**2
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """Standard scores (p,) of the variances: distance, in standard errors, above that of these standard deviations
-        (p,)."""
+        """Standard scores (p,): the variances less those of the given standard deviations (p,), divided by the standard
+        errors."""
         return (self.variance - deviation**2) / self.error
 
     def about_mean(self) -> np.ndarray:
-        """Each copy's mean square about the mean of all (copies, p)."""
+        """Mean square of each copy about the mean of all copies, (copies, p)."""
         first, second = self.moments[:2]
         return second - 2 * self.mean * first + self.mean**2
 
@@ -100,7 +99,7 @@ def copies_in_time(
     seed: int = 0,
     longest: float | None = None,
 ) -> Copies:
-    """Run the copies for ``duration`` (s) after they have forgotten their beginning.
+    """Run the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial state.
 
     longest : largest step (s); by itself it comes from the fastest rates.
     Raises InputError for damped tyres on a road whose heights have no rates.
@@ -126,7 +125,8 @@ RERUN_SHARE = 0.5
 def coarser_variances(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine: Copies, times: int, seed: int
 ) -> np.ndarray:
-    """Variances (k, p) about the means of the first copies, on their own roads in steps 2 or 4 ``times`` as long."""
+    """Variances (k, p) about the means for the first copies, rerun on the same roads with steps 2 or 4 ``times`` as
+    long."""
     copies = len(fine.moments[0])
     kept, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine.step / 2.0)
     settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
@@ -146,7 +146,8 @@ def coarser_variances(
 
 
 class CopiesMarch:
-    """Copies of a vehicle at rest, stepped over roads; ``sums`` (4, p, copies): of powers of its outputs so far."""
+    """Time integration of copies of a vehicle, from rest, over roads; ``sums`` (4, p, copies): sums of the powers of
+    its outputs so far."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float, step: float, copies: int) -> None:
         springs = nonlinear_springs(vehicle)
@@ -156,7 +157,8 @@ class CopiesMarch:
         self.states: np.ndarray | None = None
 
     def over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
-        """Go on over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step ``first``."""
+        """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
+        ``first``."""
         if self.states is None:
             self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
@@ -164,35 +166,36 @@ class CopiesMarch:
 
 
 def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
-    """Step (s) for a vehicle that ``equivalent`` stands for, by statistical linearisation."""
+    """Step (s) for a nonlinear vehicle, from its statistically linearised ``equivalent``."""
     return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), followed(vehicle, speed))
 
 
 def forgotten(equivalent: LinearVehicle) -> float:
-    """Time (s) after which copies have forgotten their beginning."""
+    """Time (s) after which copies no longer depend on their initial state."""
     decay = abs(poles(equivalent).real)
     return SETTLE / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
 def followed(vehicle: SpatialVehicle, speed: float) -> float:
-    """Longest step (s) that follows the vehicle with its springs as steep as they get."""
+    """Longest step (s) that resolves the vehicle's motion when its springs are as stiff as they can become."""
     steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in nonlinear_springs(vehicle)})
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
 def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PER_READING) -> int:
-    """Steps from those that are done to the first one before which outputs are read."""
+    """Number of steps, after the ``completed`` ones, to the first step at which outputs count."""
     return settling - completed if completed <= settling else (settling - completed) % stride
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
-    """Positions (n, copies) at rest on a road (2 w, copies): vehicles dropped onto it from metres ring for long."""
+    """Positions (n, copies) of static equilibrium on a road (2 w, copies). Vehicles that start far above the road would
+    oscillate for long."""
     heights = road[: plain.road_stiffness.shape[1]]
     return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
 
 
 def _steepest(spring: SpringDamper) -> Gains:
-    """Stiffness (N/m) and damping (N s/m) where its curves are steepest."""
+    """Largest stiffness (N/m) and damping (N s/m) of a spring's curves."""
     travel, rate = (_slopes(curve).max() for curve in (spring.travel_force, spring.rate_force))
     return spring.stiffness + travel, spring.damping + rate + spring.friction / spring.friction_rate
 
@@ -205,7 +208,8 @@ def _slopes(curve: Curve | None) -> np.ndarray:
 
 
 def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[SpringDamper, ...], speed: float) -> Laws:
-    """Motion of the vehicle for compiled loops: ``plain`` is the one without what bends these springs."""
+    """``Laws`` of the vehicle for compiled loops; ``plain`` is the vehicle without the nonlinear parts of these
+    springs."""
     n = len(plain.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in springs))
     rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
@@ -246,12 +250,12 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
 
 
 def _part_of_output(output: SpatialOutput) -> str:
-    """The spring or tyre that an output reads."""
+    """Name of the spring or tyre whose force or travel an output reads; "" if none."""
     return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
 
 
 def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
-    """Tyres that only push, whose rises by the coordinates are ``heights`` (u, n)."""
+    """``PushingTyres`` of tyres that only push; ``heights`` (u, n) : rise of each tyre's wheel per coordinate."""
     loads = preloads(vehicle).tyres if tyres else {}
     load, stiffness, damping = (
         np.array([(loads[tyre.name], tyre.stiffness, tyre.damping) for tyre in tyres], dtype=float)
@@ -263,7 +267,7 @@ def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray
 
 
 def _curves(curves: Sequence[Curve | None]) -> Curves:
-    """The curves of springs, filled up with bends of 0; a spring without one has a curve of 0."""
+    """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets one that is 0 everywhere."""
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
     most = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()

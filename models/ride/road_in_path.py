@@ -28,7 +28,8 @@ from models.vehicles.linear_vehicle import LinearVehicle
 
 @dataclass(frozen=True)
 class RoadInPath:
-    """y' = A y + sum_i inputs_i f_i, outputs (C + v rate) (y, f) beside white noise that the road may bring.
+    """Equations of a vehicle on a road: y' = A y + sum_i inputs_i f_i, and outputs (C + v rate) (y, f), plus possibly
+    white noise from the road.
 
     A (n, n); inputs (n, a, m) over axles and filter states; ``basis`` turns (y, f) into the states of
     ``excited``, weightings included; C, rate (p, n + a m).
@@ -46,7 +47,8 @@ class RoadInPath:
 def road_in_path(
     vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None = None
 ) -> RoadInPath:
-    """The form of a vehicle on a road, with weighted outputs as in ``weighted``; raises its errors.
+    """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``weighted``; raises the errors of that
+    function.
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
@@ -90,7 +92,7 @@ TERMS = 24
 
 
 class Responses:
-    """Transitions of the state (y, f) of a form along a drive, exact in time and in path.
+    """Transition matrices of the state (y, f) along a drive, exact in time and in path.
 
     Between the points of the profile only: on a step the path must be a polynomial of time.
     """
@@ -104,7 +106,7 @@ class Responses:
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
     def transition(self, start: float, end: float) -> np.ndarray:
-        """E (n + a m, n + a m) over a step from start to end (s)."""
+        """Transition matrix E (n + a m, n + a m) over a step from start to end (s)."""
         motion, inputs = self.of_length(round(end - start, 14))
         driven = self.path(start + (end - start) * np.append(POINTS, 1.0)) - self.path(start)
         decay = (powers(driven, TERMS) @ self.decay).reshape(-1, self.m)
@@ -116,7 +118,8 @@ class Responses:
         return E
 
     def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
-        """e^(A h) and what e^(A (h - u)) makes of inputs at the points of the step: (n a, g m)."""
+        """Matrix exponential e^(A h) over a length h, and the effect of inputs at the points of the step through e^(A
+        (h - u)): (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in POINTS])
         inputs = np.einsum("g,gij,jam->iagm", WEIGHTS * length, left, self.form.inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
@@ -142,7 +145,7 @@ class Responses:
 
 
 def series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """A^j B, flat, in row j: e^(A t) B = powers(t) @ series."""
+    """Vectors A^j B, flattened, in row j, such that e^(A t) B = powers(t) @ series."""
     rows = [B]
     for _ in range(TERMS - 1):
         rows.append(A @ rows[-1])

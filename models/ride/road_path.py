@@ -22,7 +22,7 @@ from models.vehicles.spatial import SpatialVehicle
 
 @dataclass(frozen=True)
 class RoadPath:
-    """A road met at a constant ``speed`` (m/s) and read every ``half`` step (s)."""
+    """A road travelled at a constant ``speed`` (m/s) and sampled every ``half`` step (s)."""
 
     excitation: Excitation
     speed: float
@@ -30,12 +30,13 @@ class RoadPath:
 
     @property
     def step(self) -> float:
-        """Step (s) of a run that reads the road path."""
+        """Time step (s) of a run on this road path."""
         return 2.0 * self.half
 
     @property
     def has_rates(self) -> bool:
-        """Whether the heights have rates, as those of filters of second order: no noise reaches them at once."""
+        """Whether the heights have finite rates, as with filters of second order, where white noise does not act on
+        heights directly."""
         return not any((H @ self.excitation.G).any() for H in self.excitation.heights)
 
     def table(self, steps: int, seed: int, path: int = 0) -> np.ndarray:
@@ -71,7 +72,8 @@ class RoadPath:
     def _road_under_wheels(
         self, F: np.ndarray, heights: Sequence[np.ndarray], met: np.ndarray, lags: np.ndarray, count: int
     ) -> np.ndarray:
-        """Heights and rates (count, 2 w, copies) of what the filters met, every axle after its lag."""
+        """Heights and rates (count, 2 w, copies) under all wheels, from the filter states ``met`` with each axle's
+        delay."""
         out = np.zeros((count, 2 * len(heights[0]), met.shape[2]))
         for lag, H in zip(lags, heights, strict=True):
             rates = self.speed * H @ F if self.has_rates else 0.0 * H
@@ -93,12 +95,12 @@ def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "")
 
 
 def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:
-    """The road for runs at a step (s) of at most ``longest``, whose halves fit the distances of the axles."""
+    """Road path for runs with steps (s) of at most ``longest``; its half steps divide the axle distances."""
     return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest / 2.0)[0] / speed)
 
 
 def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-    """F, G and heights of all noise that there is: one filter, or one for each axle where they are independent."""
+    """F, G and heights of each independent noise source: one filter, or one per axle if the axles are independent."""
     F, G, heights = excitation.F, excitation.G, excitation.heights
     if not excitation.independent:
         return F, G, heights
@@ -107,9 +109,11 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
 
 
 def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition over a length (m) of road and root of the covariance of the noise met there (van Loan).
+    """Transition matrix of the road filter over a length (m), and a root of the covariance of the noise in it (van
+    Loan).
 
-    By doubling: over many decays at once, rounding would grow as their exponential.
+    The result is built by doubling short lengths, because rounding would grow exponentially over many decay lengths at
+    once.
     """
     m, halved = len(F), max(0, ceil(log2(max(length * float(np.linalg.norm(F)), 1.0))))
     block = expm(length / 2**halved * np.block([[-F, G @ G.T], [np.zeros((m, m)), F.T]]))
@@ -121,13 +125,13 @@ def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.nd
 
 
 def _stationary_root(F: np.ndarray, G: np.ndarray) -> np.ndarray:
-    """Root of the stationary covariance; zeros if the road is a random walk."""
+    """Root of the stationary covariance of the filter state; zeros if the road is a random walk."""
     if np.linalg.eigvals(F).real.max() >= 0.0:
         return np.zeros_like(F)
     return _root(solve_continuous_lyapunov(F, -G @ G.T))
 
 
 def _root(P: np.ndarray) -> np.ndarray:
-    """S of S S' = P, P not negative up to rounding."""
+    """Root S of S S' = P for a symmetric P that is positive semidefinite except for rounding."""
     values, vectors = np.linalg.eigh((P + P.T) / 2.0)
     return vectors * np.sqrt(values.clip(0.0))

@@ -50,7 +50,7 @@ class SpeedProfile:
         return self.paths[piece] + since * (self.speeds[piece] + acceleration * since / 2.0)
 
     def time(self, path: np.ndarray | float) -> np.ndarray:
-        """Time (s) at which a place (m) is passed; minus or plus infinity for a place never passed.
+        """Time (s) at which a position (m) is passed; minus or plus infinity if it never is.
 
         At a place of standstill: the time of arrival.
         """
@@ -65,7 +65,7 @@ class SpeedProfile:
 
 
 def _check(values: np.ndarray, valid: np.ndarray, place: str, allowed: str, file: str) -> None:
-    """Name the first value that is not good."""
+    """Raise InputError for the first value that is not valid."""
     if not valid.all():
         at = int(np.argmin(valid))
         raise InputError(file, f"{place}.{at}", float(values[at]), allowed)
@@ -84,7 +84,7 @@ SHRINKING = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
 
 @dataclass(frozen=True)
 class Nodes:
-    """Points (K,) of the integral over the path: time (s), weight (m), step in which they lie."""
+    """Integration points (K,) for the integral over the path: time (s), weight (m), and the step in which each lies."""
 
     time: np.ndarray
     weight: np.ndarray
@@ -113,10 +113,11 @@ def steps(
 
 
 def nodes(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
-    """Points on cells that end with every step and wherever an axle passes the place of a step's end.
+    """Integration points in cells. Cells end at every step's end, and wherever an axle passes a place at which a step
+    ended.
 
-    ``distances`` (m) of axles behind others: at such a place the other one's speed may bend, or it may have stood.
-    Towards a place of standstill, where its time goes like the root of the distance, cells shrink.
+    ``distances`` (m) of the other axles behind the first: at such a place the speed may change its slope, or the
+    vehicle may have stood. Near a standstill, where time depends on the root of the distance, cells become smaller.
     """
     path, ends_after = profile.path(step_ends), step_ends[step_ends >= profile.times[0]]
     stops = _passing(profile, path[profile.speed(step_ends) == 0.0], distances)
@@ -135,6 +136,6 @@ def nodes(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[floa
 
 
 def _passing(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:
-    """Times (s) at which an axle that is one of the ``distances`` behind passes the places of the first."""
+    """Times (s) at which any axle, one of ``distances`` behind the first, reaches the positions of the first."""
     different = np.unique(places)
     return np.concatenate([profile.time(different + distance) for distance in distances] or [np.zeros(0)])

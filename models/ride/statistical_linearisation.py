@@ -45,7 +45,8 @@ HARMONIC = 2.0
 
 @dataclass(frozen=True)
 class BentSpring:
-    """A spring with curves or friction as it moves: gains (N/m, N s/m) that stand for it, mean travel (m) and force.
+    """A nonlinear spring (curves or friction) in motion: its equivalent gains (N/m, N s/m), mean travel (m) and mean
+    force.
 
     deviation, rate : standard deviations of travel (m) and its rate (m/s). ``force``: mean force less the preload (N).
     ``left_out``: share of the variance of its force that the gains leave out.
@@ -79,13 +80,14 @@ class StatisticallyLinear:
 
     @property
     def contraction(self) -> float:
-        """Factor by which changes shrank from one iteration to the next, the worst while they were above rounding."""
+        """Largest ratio of a change to the change one iteration before, among changes above rounding."""
         seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * GAIN_TOLERANCE]
         return max(seen[len(seen) // 2 :], default=0.0)
 
     @property
     def distance(self) -> float:
-        """Largest relative distance of the gains to the fixed point: last change * c / (1 - c), Banach's bound."""
+        """Largest relative distance of the gains from the fixed point: last change * c / (1 - c) with contraction c,
+        Banach's bound."""
         c = self.contraction
         return self.changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
 
@@ -98,7 +100,7 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 def statistically_linear(
     vehicle: SpatialVehicle, excitation: Excitation, speed: float, scale: float = 1.0
 ) -> StatisticallyLinear:
-    """Replace the bent springs of a vehicle on a road at a constant speed (m/s).
+    """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
 
     scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
         points, the vehicle has several ways to move, and no one covariance.
@@ -121,7 +123,8 @@ Law = tuple[float, float, float]
 
 @dataclass
 class _Moments:
-    """Motion of the bent springs: mean travel, deviations of travel and rate, each (springs,)."""
+    """Moments of the nonlinear springs' motion: mean travel, and standard deviations of travel and rate, each
+    (springs,)."""
 
     mean: np.ndarray
     travel: np.ndarray
@@ -129,7 +132,7 @@ class _Moments:
 
 
 class _Search:
-    """One vehicle on one road at one speed, its bent springs watched by outputs of their own."""
+    """Fixed-point search for one vehicle, road and speed; extra outputs read the motion of the nonlinear springs."""
 
     def __init__(self, vehicle: SpatialVehicle, excitation: Excitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, excitation, speed
@@ -142,7 +145,7 @@ class _Search:
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
     def solved(self, scale: float) -> StatisticallyLinear:
-        """Iterate to the fixed point."""
+        """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
         first = _Moments(np.zeros(count), np.full(count, scale * TRAVEL), np.full(count, scale * RATE))
         gains, position = self._gains(first), np.zeros(len(self.plain.mass))
@@ -164,14 +167,14 @@ class _Search:
         return self._result(gains, moments, position, changes)
 
     def _gains(self, moments: _Moments) -> np.ndarray:
-        """Stiffness and damping (springs, 2) that stand for springs which move like this."""
+        """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
         laws = zip(self.springs, self._laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
     def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
-        """Statistical linearisation of every spring's laws over travel and rate: mean force, gain and variance that the
-        gain leaves out."""
+        """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
+        the force that the gain does not represent."""
         moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
         return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
 
@@ -190,7 +193,8 @@ class _Search:
         return _Moments(self.rows @ position, travel, rate), position
 
     def _mean(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
-        """Mean position (n,) where all mean forces balance, by Newton's method; motions that nothing holds stay 0."""
+        """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
+        stay 0."""
         damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
         for _ in range(NEWTON):
             laws = [of_travel(s, m, d) for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)]
@@ -231,7 +235,7 @@ class _Search:
         )
 
     def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
-        """Means (p,) of the outputs; the force of a bent spring is not its gain times its mean travel."""
+        """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
         means = np.array([output.displacement_factors @ position for output in linear.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
             if isinstance(spec, PartOutput) and spec.kind == "force" and spec.part in springs:
@@ -241,7 +245,8 @@ class _Search:
     def _left_out(
         self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: StationaryCovariance
     ) -> np.ndarray:
-        """Shares (p,) of the outputs' variances by the neglected residual forces, each law separately."""
+        """Ratios (p,) of the variance that the neglected residual forces would add to each output's own variance; each
+        force law counts separately."""
         if not self.springs:
             return np.zeros(len(linear.outputs))
         n = len(linear.mass)
@@ -256,7 +261,7 @@ class _Search:
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
     def _own_forces(self) -> np.ndarray:
-        """(p, 2 springs): outputs that read the force of a bent spring itself."""
+        """Matrix (p, 2 springs) with 1 where an output is the force of a nonlinear spring itself."""
         names = [s.name for s in self.springs] * 2
         return np.array(
             [
@@ -267,12 +272,14 @@ class _Search:
 
 
 def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    """Corner (1/s) of left-out forces by the deviations of what moves the spring and of its rate."""
+    """Corner frequency (1/s) of a residual force's spectrum, from the standard deviations of the spring's motion and of
+    its rate."""
     return HARMONIC * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
 
 
 def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
-    """The vehicle with forces along rows (f, n) in place of the road's heights; ``reading`` (p, f): read at once."""
+    """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
+    forces on the outputs."""
     none = np.zeros(len(rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, none)
@@ -283,13 +290,13 @@ def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> Lin
 
 
 def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
-    """Largest change of a gain, by the gain or, where that is next to nothing, by the largest of its kind."""
+    """Largest relative change of a gain; a very small gain is related to the largest gain of its kind instead."""
     size = np.maximum(abs(wanted), 1e-6 * abs(wanted).max(axis=0, initial=np.finfo(float).tiny))
     return float((abs(wanted - gains) / size).max(initial=0.0))
 
 
 def _sentence(name: str, share: float, status: str) -> str:
-    """Sentence on how far the left-out share may change an output's standard deviation."""
+    """Sentence on how much the neglected share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
@@ -303,5 +310,5 @@ def _sentence(name: str, share: float, status: str) -> str:
 
 
 def promised(share: float) -> float:
-    """Relative error that the deviation of an output with this left-out share was found to keep."""
+    """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
     return next((error for most, error, _ in GRADES if share <= most), EXTRAPOLATION_ERROR)

@@ -30,9 +30,10 @@ LOSS = 1e-9
 
 @dataclass(frozen=True)
 class Sweep:
-    """variance (cases, speeds, outputs), inf where there is none, with status and reason for each; units (outputs,).
+    """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
+    units (outputs,).
 
-    ``direct``: how many of the points went the direct way, by the reason for which the fast one was not taken.
+    ``direct``: number of points computed by the direct method, by the reason for not using the fast one.
     """
 
     cases: tuple[str, ...]
@@ -94,7 +95,7 @@ Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 
 
 def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
-    """Variances by solving for the covariance; a vehicle that is unstable is told with its speed."""
+    """Variances from solving for the covariance; the error for an unstable vehicle states its speed."""
     try:
         exact = stationary(system, accuracy)
     except Unstable as error:
@@ -105,7 +106,7 @@ def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
 def _fast_variances(
     system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
 ) -> Answer | str:
-    """Variances by the fast route, or the reason why that cannot be trusted here."""
+    """Variances by the fast method, or a text that says why it is unreliable here."""
     quick = modal(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
@@ -119,7 +120,7 @@ def _fast_variances(
 
 @dataclass(frozen=True)
 class Modes:
-    """A = V diag(values) V^-1, and the condition of V as it was balanced."""
+    """Eigen-decomposition A = V diag(values) V^-1, and the condition number of V after balancing."""
 
     A: np.ndarray
     values: np.ndarray
@@ -129,13 +130,13 @@ class Modes:
 
     @property
     def blurred(self) -> float:
-        """Relative rounding of the slowest decay: the fastest motion's, times the condition."""
+        """Relative rounding error of the slowest decay rate: that of the fastest motion, times the condition number."""
         return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
 
 
 def modes(A: np.ndarray) -> Modes:
-    """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled parts, so that equal parts stay exactly
-    equal."""
+    """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled blocks, so that equal blocks give exactly
+    equal results."""
     count, label = connected_components(A != 0, directed=False)
     values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
     worst = 1.0
@@ -156,7 +157,7 @@ BLURRED = 1e-11
 
 
 class Shared:
-    """Eigen-decompositions of the blocks met so far: roads and speeds that share a block share its modes."""
+    """Cache of eigen-decompositions, so that roads and speeds with the same block share its modes."""
 
     def __init__(self) -> None:
         self.known: dict[bytes, Modes] = {}
@@ -170,7 +171,8 @@ class Shared:
 
 @dataclass(frozen=True)
 class Modal:
-    """Per output (p,): variance, ``floor`` that rounding makes of zero, and ``relative_error`` that may be left.
+    """Results per output (p,): variance, ``floor`` that rounding makes of a zero variance, and bound
+    ``relative_error``.
 
     fastest : rate of the system in 1/s
     """
@@ -182,7 +184,8 @@ class Modal:
 
 
 def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: Shared) -> Modal | str:
-    """Variances of a system as ``excited`` and ``weighted`` build it, or the reason in words why there are none here.
+    """Variances of a system as built by ``excited`` and ``weighted``, or a text that says why they cannot be computed
+    here.
 
     vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
     the states of weightings stand last.
@@ -218,14 +221,14 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
 
 
 def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """X of A X + coupling = X diag(values) for a diagonalised A."""
+    """Solution X of A X + coupling = X diag(values), for a diagonalised A."""
     return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
 
 
 def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
 ) -> Modal | str:
-    """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""
+    """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
     before = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
     for j, b in enumerate(inputs):

@@ -37,7 +37,7 @@ BLOCK = 128
 
 @dataclass(frozen=True)
 class VaryingSpeed:
-    """Standard deviations at every instant.
+    """Standard deviations at every instant of a drive.
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
     and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
@@ -54,7 +54,7 @@ class VaryingSpeed:
     P: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
-        """Standard deviation (N,) of one output; raises InputError if there is none of that name."""
+        """Standard deviation (N,) of one output; raises InputError for an unknown name."""
         if name not in self.names:
             raise InputError("", "output", name, "must be an output of the vehicle", self.names)
         return self.deviation[:, self.names.index(name)]
@@ -122,7 +122,8 @@ def quasi_stationary(
     weightings: Mapping[str, str] | None = None,
     accuracy: float = ACCURACY,
 ) -> np.ndarray:
-    """Standard deviations (N, p) as if each of the speeds (N,) had always been driven; at 0 those at rest.
+    """Standard deviations (N, p) as if each of the speeds (N,) had been constant for ever; for speed 0, those of a
+    vehicle at rest.
 
     Errors are those of ``varying_speed``.
     """
@@ -143,7 +144,7 @@ def quasi_stationary(
 def _moments(
     road_in_path: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
 ) -> Iterator[tuple[float, np.ndarray]]:
-    """End of each step of the drive and the covariance there, from P at its beginning on.
+    """End of each step of the drive and the covariance there, starting from P.
 
     Where the vehicle moves from the beginning, the steps begin earlier: the first axle is ahead of the last one.
     """
@@ -171,7 +172,7 @@ def _moments(
 
 
 class _Met:
-    """Responses, at the ends of the steps, to noise that an axle meets at given times (s), rising."""
+    """State responses at the ends of the steps to noise that an axle meets at given times (s) in ascending order."""
 
     def __init__(self, responses: Responses, axle: int, time: np.ndarray, step_ends: np.ndarray) -> None:
         self.responses, self.axle, self.time, self.ends = responses, axle, time, step_ends
@@ -179,11 +180,11 @@ class _Met:
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
     def within(self, step: int) -> slice:
-        """The slice of the times that lie in a step."""
+        """Slice of the times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
     def of(self, step: int) -> np.ndarray:
-        """Responses (n, c, k) to what is met in a step."""
+        """Responses (n, c, k) to the noise met in a step."""
         block = step // BLOCK
         last = min((block + 1) * BLOCK, len(self.ends) - 1)
         begin = self.first[block * BLOCK]
@@ -195,7 +196,7 @@ class _Met:
 
 
 class _Queue:
-    """Responses (n, q, k) to noise that one axle has met and another, the ``last``, meets at given times (s)."""
+    """Responses (n, q, k) to noise that one axle has already met and the ``last`` axle will meet at given times (s)."""
 
     def __init__(self, responses: Responses, axle: int, last: int, time: np.ndarray, step_ends: np.ndarray) -> None:
         profile, form, self.last = responses.profile, responses.form, last
@@ -207,25 +208,27 @@ class _Queue:
         self.met = _Met(responses, axle, met[~before], step_ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
-        """Moves all responses on by one step; those whose noise is met within the step join them."""
+        """Advance all responses by one step, and add those to noise that is met within the step."""
         n, _, k = self.waiting.shape
         moved = (E @ self.waiting.reshape(n, -1)).reshape(n, -1, k)
         self.waiting = np.concatenate([moved, self.met.of(step)], axis=1)
 
     def take(self, count: int) -> np.ndarray:
-        """Take the first entries out of the queue."""
+        """Remove the first ``count`` entries from the queue and return them."""
         taken, self.waiting = self.waiting[:, :count], self.waiting[:, count:]
         return taken
 
 
 def _product(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Sum over points and channels of one times other, both (n, c, k), with the points' weights (c,)."""
+    """Sum over points and channels of the products of two responses, both (n, c, k), weighted with the points' weights
+    (c,)."""
     n = len(first)
     return (first * weight[:, None]).reshape(n, -1) @ second.reshape(n, -1).T
 
 
 def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
-    """Responses (n, q, k) of a vehicle at rest to noise that the axle met ``behind`` (m) its place, long ago."""
+    """Responses (n, q, k) of a vehicle at rest to noise that the axle met long ago, at a distance ``behind`` (m) its
+    position."""
     F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
     n, axles, m = road_in_path.inputs.shape
@@ -237,7 +240,7 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
 
 
 def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
-    """State (y, f) of a vehicle at rest over the states f of its road: (n + a m, a m)."""
+    """State (y, f) of a vehicle at rest as a linear function of its road's filter states f: (n + a m, a m)."""
     if np.linalg.cond(road_in_path.A) > 1.0 / (1e3 * np.finfo(float).eps):
         raise InputError(
             "",

@@ -19,7 +19,8 @@ from models.ride.excited import DelayedSystem
 
 @dataclass(frozen=True)
 class Section:
-    """(n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency), frequency in Hz."""
+    """Second-order section (n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency), frequency in
+    Hz."""
 
     frequency: float
     quality: float
@@ -28,13 +29,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Weighting:
-    """Sections in a row; the name is the standard's."""
+    """Product of sections; its name is that in the standard."""
 
     name: str
     sections: tuple[Section, ...]
 
     def response(self, frequency: np.ndarray) -> np.ndarray:
-        """Complex factor at the frequencies (Hz), from the sections' formulas."""
+        """Complex frequency response at frequencies (Hz), from the sections' formulas."""
         out = np.ones(np.shape(frequency), complex)
         for section in self.sections:
             p = 1j * np.asarray(frequency) / section.frequency
@@ -43,7 +44,8 @@ class Weighting:
         return out
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A (n, n), B (n,), C (n,) of x' = A x + B u, y = C x, n = 2 per section; nothing passes at once."""
+        """State-space form A (n, n), B (n,), C (n,) of x' = A x + B u, y = C x, with n = 2 per section and no direct
+        transmission."""
         size = 2 * len(self.sections)
         A, B = np.zeros((size, size)), np.zeros(size)
         before, direct = np.zeros(size), 1.0  # what reaches the next section: before . x + direct u
@@ -64,7 +66,7 @@ class Weighting:
 def weighting(
     name: str, transition: tuple[float, float, float] | None, step: tuple[float, float, float, float] | None = None
 ) -> Weighting:
-    """Weighting from the standard's parameters: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); Hz.
+    """Weighting from parameters of the standard: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
 
     The band limit is that of all weightings for comfort and health: 0.4 to 100 Hz, Q = 1 / sqrt(2).
     """
@@ -130,5 +132,5 @@ def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]
 
 
 def _columns(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Block-diagonal matrix with each vector as a column."""
+    """Block-diagonal matrix in which each given vector is one column."""
     return block_diag(*(part[:, None] for part in parts))

@@ -17,7 +17,7 @@ TRACK_WIDTH = 1.5
 
 
 def __getattr__(name: str) -> Any:
-    """The classes above, when first asked for: their kernels bring the compiler, which random roads do without."""
+    """Import the classes above on first use: their kernels need the compiler, which random roads do not."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from models.road import profile

@@ -56,7 +56,7 @@ def continued(profile: RoadProfile, rule: str, needed: float, file: object = "")
 
 
 def _mirrored_points(profile: SplineProfile, needed: float, file: object) -> tuple[np.ndarray, np.ndarray]:
-    """Stations and heights, reflected at every end until they cover ``needed``."""
+    """Stations and heights of the road, reflected at its ends repeatedly until it reaches ``needed``."""
     station, height = profile.points
     gaps, length = np.diff(station), profile.end - profile.start
     copies = math.ceil((needed - profile.start) / length)

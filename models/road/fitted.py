@@ -80,7 +80,8 @@ def fit_road(
 def _fit_first_order(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str
 ) -> FilterFit:
-    """ln S = ln(q / 2 pi) - ln(corner^2 + k^2), both unknowns as logarithms."""
+    """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as
+    unknowns."""
     from scipy.optimize import least_squares
 
     middle, mean = _bands(k, density, freedom, low, high)
@@ -106,7 +107,8 @@ def _fit_first_order(
 def _bands(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middles (rad/m) and ln of the densities times k^2 averaged in bands, freed of the bias of a logarithm."""
+    """Band centres (rad/m), and logarithms of the densities times k^2 averaged in bands, corrected for the bias of the
+    logarithm."""
     from scipy.special import digamma
 
     count = max(1, round(PER_DECADE * math.log10(high / low))) if high > low else 0
@@ -124,7 +126,7 @@ def _bands(
 
 
 def _limits(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
-    """Sentences on what no fit of the road could change."""
+    """Sentences on limits of the data that no fit can remove."""
     least = spectra.wavenumber[0]
     low, high = spectra.band()
     return [
@@ -136,7 +138,7 @@ def _limits(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
 
 
 def _doubts(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
-    """Where the fitted road is not the measured one."""
+    """Sentences on where the fitted road differs from the measured one."""
     said = []
     for name, fitted in (("mean", mean), ("roll", roll)):
         if fitted is None:

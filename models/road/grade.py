@@ -33,7 +33,7 @@ class Graded:
 
     @property
     def name(self) -> str:
-        """The profile's, and the grade."""
+        """Name of the profile, with the grade."""
         return f"{self.profile.name}, grade {self.grade:g} rad"
 
     @property
@@ -65,7 +65,7 @@ class Graded:
         return height + float(more[0]), slope + float(more[1])
 
     def _climb(self, s: np.ndarray) -> Samples:
-        """Heights (m) and slopes that the grade adds."""
+        """Heights (m) and slopes that the grade adds at stations ``s``."""
         beyond = (s - self.start) / TRANSITION
         x, steepness = np.clip(beyond, 0.0, 1.0), math.tan(self.grade)
         risen = x**4 * (2.5 - x * (3.0 - x)) + np.maximum(beyond - 1.0, 0.0)

@@ -70,7 +70,8 @@ def level_of_class(road_class: str, level: str = "one-sided") -> float:
 
 
 def class_at_level(level: float) -> str:
-    """The class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), in words with the convention."""
+    """Text with the ISO class of a road of density S0 / Omega^2 (S0 in m, two-sided over rad/m), and the convention
+    used."""
     if level <= 0.0:
         return "smooth"
     place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes
@@ -102,7 +103,7 @@ def random_phases(seed: int, waves: int) -> np.ndarray:
 
 
 def _check_class(road_class: str, level: str) -> None:
-    """Refuse what the standard does not know."""
+    """Refuse a class or level convention that the standard does not know."""
     if road_class not in CLASSES:
         raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(CLASSES))
     if level not in SIDES:
@@ -110,7 +111,7 @@ def _check_class(road_class: str, level: str) -> None:
 
 
 def _check_band(gd: float, seed: int, n_min: float, n_max: float, waves: int) -> None:
-    """Refuse what cannot be a road."""
+    """Refuse a density, seed, band or number of waves that is not possible."""
     if not (math.isfinite(gd) and gd >= 0.0):
         raise InputError("", "gd", gd, "must be a finite density in m^3, 0 or more")
     if not (math.isfinite(n_max) and 0.0 < n_min < n_max):

@@ -45,7 +45,8 @@ class DensityPart:
             raise InputError("", "waviness", self.waviness, "must be above 1: else the heights have no variance")
 
     def density(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Cross density (m^3) of tracks ``distance`` (m) apart, at 0 that of one track; infinite at Omega = 0 = a."""
+        """Cross density (m^3) of tracks ``distance`` (m) apart, or the density of one track at distance 0; infinite
+        where wavenumber and corner are both 0."""
         from scipy.special import gamma, kv
 
         sigma, order = np.hypot(self.corner, wavenumber), self.waviness / 2.0
@@ -60,7 +61,8 @@ class DensityPart:
 
 @dataclass(frozen=True)
 class IsotropicRoad:
-    """A road whose track density is the sum of parts."""
+    """A road with the same statistics in all directions; its track density is the sum of several terms
+    ``DensityPart``."""
 
     parts: tuple[DensityPart, ...]
 
@@ -73,7 +75,7 @@ class IsotropicRoad:
         return np.sum([part.density(wavenumber, distance) for part in self.parts], axis=0)
 
     def coherency(self, wavenumber: np.ndarray, distance: float) -> np.ndarray:
-        """Cross density over the density of one track."""
+        """Coherency of two tracks ``distance`` (m) apart: ratio of their cross density to the density of one track."""
         return self.cross_spectrum(wavenumber, distance) / self.spectrum(wavenumber)
 
 
@@ -95,7 +97,8 @@ def isotropic_class(road_class: str, corner: float = 0.0, level: str = "one-side
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:
-    """Cross density (m^3) by quadrature, for any autocovariance R(r) in m^2 of a track; wavenumbers above 0 (rad/m).
+    """Cross density (m^3) of two tracks by numerical integration, for any autocovariance R(r) in m^2 of a track;
+    wavenumbers above 0 (rad/m).
 
     Its error is about 1e-12 m times R(distance), whatever the density itself.
     """

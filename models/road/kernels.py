@@ -42,7 +42,8 @@ def smoothstep(x: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def windowed(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
-    """Value and slope of ``w(distance / window) * height``; 0 up to distance 0; window 0 means none."""
+    """Value and slope of ``w(distance / window) * height``; 0 for distances up to 0; a window of 0 means no
+    windowing."""
     if distance <= 0.0:
         return 0.0, 0.0
     if distance >= window:
@@ -53,7 +54,8 @@ def windowed(distance: float, window: float, height: float, slope: float) -> tup
 
 @njit(cache=True)
 def sines_at(s, amplitude, wavenumber, phase, window):
-    """Height (m, down) and slope at one station; to be handed ``Waves`` from Python would take as long again."""
+    """Height (m, down) and slope at one station. The arrays of ``Waves`` are separate arguments, since passing the
+    tuple from Python doubles the time."""
     height, slope = 0.0, 0.0
     if s > 0.0:
         for i in range(amplitude.size):
@@ -72,7 +74,7 @@ def sines(s, waves, height, slope):
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _rotate(sine, cosine, turn_sine, turn_cosine, wavenumber):
-    """Sum of all waves and of their slopes here; then turn every wave to the next sample.
+    """Sums of all waves and of their slopes at the present sample; then rotate every wave to the next sample.
 
     The waves are the inner loop because they are independent: the sums may be reordered (``reassoc``),
     so the loop becomes one of vector instructions. ``sine`` and ``cosine`` carry the amplitudes.
@@ -109,7 +111,7 @@ def sines_uniform(start, step, waves, height, slope):
 
 @njit(cache=True)
 def segment(station, s, guess):
-    """Index of the piece that holds ``s``; pieces beside the last one found cost no search."""
+    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guess``."""
     last = station.size - 2
     for i in range(guess, min(guess + 2, last + 1)):
         if station[i] <= s < station[i + 1]:
@@ -126,7 +128,8 @@ def segment(station, s, guess):
 
 @njit(cache=True)
 def cubic_at(s, piece, station, coefficients, window):
-    """Height and slope of one cubic piece (rows highest power first), windowed from the first station."""
+    """Height and slope of one cubic piece (coefficient rows from the highest power), multiplied by the window that
+    starts at the first station."""
     d = s - station[piece]
     a, b, c, e = coefficients[piece, 0], coefficients[piece, 1], coefficients[piece, 2], coefficients[piece, 3]
     height = ((a * d + b) * d + c) * d + e

@@ -31,7 +31,7 @@ class MeasuredTracks:
 
     @property
     def length(self) -> float:
-        """First to last station, m."""
+        """Distance from the first to the last station, m."""
         return (len(self.left) - 1) * self.increment
 
 
@@ -59,14 +59,14 @@ class TrackSpectra:
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
     def band(self, level: float = 0.95) -> tuple[float, float]:
-        """Factors on a density between which the true one lies with the probability ``level``."""
+        """Factors by which to multiply a density to get its confidence interval at probability ``level``."""
         from scipy.stats import chi2
 
         low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.freedom)
         return self.freedom / high, self.freedom / low
 
     def chance_coherency(self, level: float = 0.95) -> float:
-        """Coherency that two tracks without anything in common stay below with the probability ``level``."""
+        """Coherency that two unrelated tracks do not exceed by chance, with probability ``level``."""
         independent = self.freedom / 2.0
         return math.sqrt(1.0 - (1.0 - level) ** (1.0 / (independent - 1.0)))
 
@@ -107,7 +107,7 @@ def read_tracks(
 
 
 def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
-    """Densities by Welch's method; ``window_length`` in m, by default such that eight windows fit.
+    """Spectral densities by Welch's method; ``window_length`` in m, by default so that eight windows fit.
 
     Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
     """

@@ -38,7 +38,7 @@ _KEYWORD = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
 
 @dataclass(frozen=True)
 class _Promise:
-    """Layout of the data by the header: records, channels, bytes per value, text or binary."""
+    """Data layout that the header announces: records, channels, bytes per value, text or binary."""
 
     records: int
     channels: int
@@ -116,7 +116,7 @@ def write_opencrg(
 
 
 def _stations(path: str | Path, length: float, increment: float) -> int:
-    """Count the stations of a road to be written."""
+    """Number of stations of a road to be written."""
     if not (math.isfinite(increment) and increment >= SMALLEST_INCREMENT):
         raise InputError(path, "increment (m)", increment, f"must be {SMALLEST_INCREMENT} or more")
     steps = round(length / increment) if math.isfinite(length) else 0
@@ -126,7 +126,7 @@ def _stations(path: str | Path, length: float, increment: float) -> int:
 
 
 def _load(path: str | Path) -> Any:
-    """Read a file that is complete; whatever the library finds to say about reading it is an error."""
+    """Read a complete file; every complaint of the library about reading becomes an error."""
     promise = _check_header(path)
     try:
         with warnings.catch_warnings():
@@ -146,7 +146,7 @@ def _load(path: str | Path) -> Any:
 
 
 def _unreadable(path: str | Path, error: Exception) -> InputError:
-    """Turn any error of the library into the user's: damaged bytes may raise almost anything there."""
+    """InputError from any exception of the library, which damaged bytes may raise in almost any form."""
     reason = str(error).replace(f"{path}: ", "").split("\nTo open it anyway")[0]
     return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
 
@@ -169,7 +169,7 @@ def _check_header(path: str | Path) -> _Promise:
 
 
 def _records(path: str | Path, header: IplData) -> int:
-    """Count the cross sections between the first and the last u of the header."""
+    """Number of cross sections between the first and the last u of the header."""
     if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
         raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
     block, _ = cut_block(header.struct, "ROAD_CRG")
@@ -188,7 +188,7 @@ def _records(path: str | Path, header: IplData) -> int:
 
 
 def _value(path: str | Path, values: dict[str, str], key: str, default: str = "") -> float:
-    """One number of the header; without the length and the increment nobody can tell if data are missing."""
+    """One number from the header. Length and increment must be there, since without them missing data go unnoticed."""
     text = values.get(key, default)
     try:
         number = float(text.replace("d", "e"))
@@ -200,7 +200,7 @@ def _value(path: str | Path, values: dict[str, str], key: str, default: str = ""
 
 
 def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
-    """Binary data are records without gaps, filled up to a whole number of 80 bytes."""
+    """Check that binary data are records without gaps, padded to a multiple of 80 bytes."""
     wanted = math.ceil(promise.records * promise.channels * promise.width / _LINE) * _LINE
     if len(data) != wanted:
         what = f"{promise.records} cross sections of {promise.channels} values need {wanted} bytes"
@@ -208,7 +208,7 @@ def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
 
 
 def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
-    """Text data are lines of full width, each with its line end: a shorter number shows as a shorter line."""
+    """Check that text data are lines of full width with line ends; a number cut short makes its line shorter."""
     body = data.rstrip(b"\r\n")
     lines, ended = body.split(b"\n"), len(body) < len(data)
     per_line = _LINE // promise.width

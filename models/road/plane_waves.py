@@ -11,7 +11,8 @@ GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 def plane_waves(level: float, count: int = 48, seed: int = 0) -> np.ndarray:
-    """(count, 4) numbers of the waves: wave numbers along x and y (rad/m), amplitudes of cosine and sine (m).
+    """Plane waves of a rough surface, (count, 4): wave numbers along x and y (rad/m), amplitudes of cosine and sine
+    (m).
 
     level : every track has the two-sided density level / Omega^2 (S0 in m), whatever its direction; count : of waves,
     1 or more, evenly over the logarithm of their length and over directions. A density level / Omega^2 of tracks is

@@ -11,7 +11,7 @@ from models.road.profile import SplineProfile
 
 
 class PolylineProfile(SplineProfile):
-    """Piecewise linear road; at a point the slope is that of the piece that follows. Units as its base."""
+    """Piecewise linear road; at a point, the slope is that of the following piece. Units as in the base class."""
 
     @classmethod
     def through(cls, station: ArrayLike, height: ArrayLike, name: str = "polyline") -> "PolylineProfile":

@@ -36,7 +36,7 @@ class RoadProfile(Protocol):
 
     @property
     def finest(self) -> float:
-        """Length (m) of its finest detail: an adaptive solver must not step farther."""
+        """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 
     def height_and_slope(self, s: ArrayLike) -> Samples:
@@ -85,17 +85,17 @@ class SineProfile:
 
     @property
     def waves(self) -> kernels.Waves:
-        """The profile's waves as compiled functions take them."""
+        """The profile's waves in the form that compiled functions take."""
         return kernels.Waves(self.amplitude, self.wavenumber, self.phase, self.window_length)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length: without end on both sides."""
+        """First and last arc length: minus and plus infinity."""
         return -math.inf, math.inf
 
     @property
     def finest(self) -> float:
-        """A quarter (m) of the shortest wave."""
+        """A quarter of the shortest wavelength (m)."""
         return float(0.5 * math.pi / np.abs(self.wavenumber).max())
 
     def height_and_slope(self, s: ArrayLike) -> Samples:
@@ -183,7 +183,7 @@ class SplineProfile:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """First and last arc length (m); a road with a window is flat for ever before its start."""
+        """First and last arc length (m); a road with a window is also defined before its start, where it is flat."""
         return (-math.inf if self.window_length > 0.0 else self.start), self.end
 
     @property
@@ -222,7 +222,7 @@ class SplineProfile:
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
     def _check(self, first: float, last: float) -> None:
-        """Refuse arc lengths outside the road: a spline carried on beyond its points is no road at all."""
+        """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
         if not (first >= begin - slack and last <= end + slack):
@@ -240,7 +240,7 @@ def _frozen(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
 
 
 def _flat(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Arc lengths as a flat contiguous array, and their shape."""
+    """Arc lengths as a flat contiguous array, and the original shape."""
     array = np.asarray(s, dtype=float)
     return np.ascontiguousarray(array).reshape(-1), array.shape
 

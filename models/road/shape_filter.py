@@ -23,7 +23,7 @@ class ShapeFilter:
     cutoff: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise InputError for what is no filter."""
+        """Raise InputError for parameters that do not define a filter."""
         if not (math.isfinite(self.corner) and self.corner >= 0.0):
             raise InputError("", "corner", self.corner, "must be 0 or more, in rad/m")
         if not (math.isfinite(self.intensity) and self.intensity >= 0.0):

@@ -25,7 +25,8 @@ class RoadUnderWheels:
 
     @property
     def resolution(self) -> float:
-        """Time (s) to pass the finest detail of the road: a station's spacing or a quarter of a wave."""
+        """Time (s) in which the vehicle passes the finest detail of the road: a station spacing or a quarter of a
+        wavelength."""
         return self.profile.finest / self.speed
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
@@ -45,7 +46,7 @@ class RoadUnderWheels:
         return out
 
     def knots(self, duration: float) -> np.ndarray:
-        """Times at which a wheel passes a place where the road is only C2, such as its start."""
+        """Times at which a wheel passes a point where the road is only C2, such as its start."""
         stations = np.array(self.kinks)
         times = np.concatenate((stations, stations + self.wheelbase)) / self.speed
         return np.unique(times[(times > 0) & (times < duration)])

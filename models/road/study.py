@@ -22,7 +22,7 @@ HILL_LENGTHS = np.array([400.0, 150.0, 60.0])
 
 
 def hills_road() -> SineProfile:
-    """Hills alone: 1.2, 0.6, 0.2 m at wavelengths 400, 150, 60 m, all in phase 0 at s = 0."""
+    """A road with hills only: amplitudes 1.2, 0.6, 0.2 m at wavelengths 400, 150, 60 m, all with phase 0 at s = 0."""
     return SineProfile(HILL_AMPLITUDES, 2.0 * math.pi / HILL_LENGTHS, np.zeros(3), WINDOW, "hills")
 
 

@@ -42,7 +42,7 @@ CASES = {
 
 @dataclass(frozen=True)
 class TwoTrackRoad:
-    """Mean process (m, intensity q1 in m) and roll process (rad, intensity q2 in 1/m)."""
+    """A road of two random processes: mean height (m, intensity q1 in m) and roll (rad, intensity q2 in 1/m)."""
 
     mean: ShapeFilter
     roll: ShapeFilter
@@ -52,7 +52,8 @@ class TwoTrackRoad:
         return self.cross_spectrum(wavenumber, y, y)
 
     def cross_spectrum(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
-        """Two-sided cross density (m^3) of the heights at y1 and y2; real, for they lie side by side."""
+        """Two-sided cross density (m^3) of the heights at y1 and y2; it is real, because both points lie at the same
+        station."""
         return self.mean.spectrum(wavenumber) + y1 * y2 * self.roll.spectrum(wavenumber)
 
     def coherency(self, wavenumber: np.ndarray, y1: float, y2: float) -> np.ndarray:
@@ -61,16 +62,16 @@ class TwoTrackRoad:
         return np.abs(cross) / np.sqrt(self.spectrum(wavenumber, y1) * self.spectrum(wavenumber, y2))
 
     def covariance(self, distance: np.ndarray, y1: float, y2: float) -> np.ndarray:
-        """Covariance (m^2) of the heights at y1 and y2 whose places are ``distance`` (m) apart along the path."""
+        """Covariance (m^2) of the height at y1 with that at y2, ``distance`` (m) farther along the path."""
         roll = y1 * y2 * self.roll.covariance(distance) if y1 * y2 else 0.0
         return self.mean.covariance(distance) + roll
 
     def level(self, y: float) -> float:
-        """S0 (m): without cutoffs the spectrum at y tends to S0 / Omega^2, two-sided."""
+        """Level S0 (m) at y: without cutoffs the two-sided spectrum there tends to S0 / Omega^2."""
         return (self.mean.intensity + y * y * self.roll.intensity) / (2.0 * math.pi)
 
     def label(self, y: float) -> str:
-        """Text that names the road and the convention of its level."""
+        """Text with the name of the road and the convention of its level."""
         cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
         steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
         return (
@@ -99,16 +100,14 @@ def road_of_level(
 
 
 def half_track(wheels: Sequence[WheelPosition]) -> float:
-    """Half the distance (m) of the outermost wheels of the first axle: 0 for wheels on the centre line."""
+    """Half the distance (m) between the outermost wheels of the first axle; 0 for wheels on the centre line."""
     front = [wheel.y for wheel in wheels if wheel.axle == 0]
     return (max(front) - min(front)) / 2.0
 
 
 def on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, ...]:
-    """The wheels all on the track at y (m): a quarter or half car, drawn on the centre line, on one track of a road.
-
-    Left on the centre line it would meet the mean process alone, which is smoother than any track.
-    """
+    """The wheels moved to the track at y (m); so a quarter or half car, drawn on the centre line, drives on one track
+    of a road."""
     return tuple(replace(wheel, y=y) for wheel in wheels)
 
 
@@ -160,7 +159,8 @@ def input_covariance(
 
 
 def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """F, G of both processes side by side and the rows that read z_M and theta; a silent process is left out."""
+    """Matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero intensity is
+    left out."""
     parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
     F, G, H = (block_diag(*matrices) for matrices in zip(*(part.matrices() for part in parts), strict=True))
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
@@ -169,7 +169,7 @@ def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
 def _row(
     wheel: WheelPosition, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[WheelPosition]
 ) -> np.ndarray:
-    """Factors of the filter's states in the height under one wheel."""
+    """Factors of the filter states in the height under one wheel."""
     if left_right == "equal":
         return mean + abs(wheel.y) * roll
     height = mean + wheel.y * roll

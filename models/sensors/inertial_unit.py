@@ -35,7 +35,8 @@ def random_walk(deviation: float, rate: float) -> float:
 def measured_attitude(
     rates: np.ndarray, period: float, deviation: np.ndarray, start: np.ndarray, paths: range, seed: int = 0
 ) -> np.ndarray:
-    """Quaternions (n + 1, paths, 4) that noisy rates give, held over each period and integrated by exact rotations.
+    """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are held over each period and integrated by
+    exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
@@ -50,7 +51,8 @@ def true_attitude(rates: np.ndarray, period: float, start: np.ndarray) -> np.nda
 
 
 def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) of E = S~ S^T: what turns the true attitude into the measured one, in global components."""
+    """Quaternions (..., 4) of the error E = S~ S^T, the rotation from the true to the measured attitude, in global
+    components."""
     return product(measured, conjugate(true))
 
 
@@ -88,7 +90,8 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.nd
 
 
 def _exponentials(m: np.ndarray) -> np.ndarray:
-    """Matrix exponentials of m (n, 3, 3), all at once: power series of m / 2^k with small entries, squared k times.
+    """Matrix exponentials of all matrices m (n, 3, 3) at once: power series of m / 2^k with small entries, squared k
+    times.
 
     scipy's own goes matrix by matrix through a threaded library, and takes many times as long where others run.
     """
@@ -102,7 +105,8 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
 
 
 def spread(walks: np.ndarray) -> np.ndarray:
-    """1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: reduction of the mean rotation by noise, in local components."""
+    """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: rate at which noise reduces the mean rotation matrix, in local
+    components."""
     return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
 
 
@@ -164,7 +168,7 @@ def angle_variance(
 
 
 def _check(minimum: float = math.ulp(0.0), **given: float) -> None:
-    """Refuse the first number that is below the least one."""
+    """Refuse the first number that is below ``minimum``."""
     for name, value in given.items():
         if not value >= minimum:
             raise InputError("", name, value, f"must be {'0 or more' if minimum == 0.0 else 'above 0'}")

@@ -19,8 +19,8 @@ LEVEL = 0.05
 
 @dataclass(frozen=True)
 class Record:
-    """Readings (n, sensors, 3) in m/s^2 every ``period`` (s), what was told of them, and whether the motion was taken
-    to begin at rest and level, with gravity in the readings."""
+    """Accelerometer readings (n, sensors, 3) in m/s^2 every ``period`` (s), the facts stated about them, and whether
+    the motion was assumed to begin at rest and level, with gravity in the readings."""
 
     quality: Quality
     readings: np.ndarray
@@ -29,7 +29,7 @@ class Record:
 
 
 def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
-    """Assumptions of a motion (n samples) recovered from a record."""
+    """Assumptions behind a motion (n samples) recovered from a record."""
     pitch, turned = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
     listed = [
         Assumption(
@@ -60,13 +60,14 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
 
 
 def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
-    """Pitch (n,) in rad, which is defined at every attitude."""
+    """Pitch angle (n,) in rad of a recovered motion; it is defined at every attitude."""
     w, x, y, z = recovered.orientation.T
     return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))
 
 
 def _rigid(quality: Quality) -> Assumption:
-    """Sensors move with the body; one that alone does not is left out, and nothing is assumed of it."""
+    """Assumption that the sensors move with one rigid body. A single sensor that does not is left out, without an
+    assumption about it."""
     size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
     return Assumption(
         "rigid body",
@@ -79,7 +80,7 @@ def _rigid(quality: Quality) -> Assumption:
 
 
 def _tilt(first: np.ndarray) -> np.ndarray:
-    """Angle (1,) in rad between a specific force (3,) and straight up."""
+    """Angle (1,) in rad between a specific force (3,) and the upward vertical."""
     return np.array([np.arctan2(np.hypot(first[0], first[1]), -first[2])])
 
 

@@ -18,10 +18,10 @@ EYE = np.eye(3)
 
 
 class _Rates(ExtendedKalmanFilter):
-    """The filter whose prediction follows the angular acceleration instead of a matrix."""
+    """Kalman filter for the rates whose prediction integrates the angular acceleration instead of using a matrix."""
 
     def predict_x(self, u: np.ndarray) -> None:
-        """Advance w by the increment of this period."""
+        """Advance the rates w by their increment ``u`` over one period."""
         self.x += u
 
 
@@ -59,7 +59,8 @@ def filter_rates(
 
 
 def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:
-    """One period with the mean acceleration; in a plane w1 and w2 turn about the normal besides."""
+    """Predict over one period with the mean acceleration; with sensors in a plane, w1 and w2 also turn about the
+    normal."""
     slope, change = np.zeros((3, 3)), alpha
     if planar:
         w = filter_.x + 0.5 * period * alpha  # the middle of the period

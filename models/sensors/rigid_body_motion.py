@@ -25,7 +25,8 @@ NOISE_FACTOR = 1.5
 
 @dataclass(frozen=True)
 class Spin:
-    """Products of the angular rate by relative accelerations at each instant, in the array's axes e1, e2, n.
+    """Differences of the readings at each instant, in the array's axes e1, e2, n: the matrix M of angular rates, and
+    relative accelerations.
 
     gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
     relative : (n, 3, sensors) in m/s^2, readings less their mean
@@ -55,7 +56,7 @@ class Quality:
 
     @property
     def rigid(self) -> bool | None:
-        """Whether the body passes for rigid; None where no equation is left over to tell."""
+        """Whether the readings agree with a rigid body; None if no redundant equation can check it."""
         if self.redundancy == 0:
             return None
         return self.share <= LIMIT or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected
@@ -79,7 +80,7 @@ class Start:
 
 @dataclass(frozen=True)
 class CutOffs:
-    """High-pass filters (Hz) against drift; None is no filter.
+    """Cut-off frequencies (Hz) of high-pass filters against drift; None means no filter.
 
     turning : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
     position.
@@ -140,7 +141,7 @@ def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
 
 
 def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
-    """Angular acceleration (n, 3) in the array's axes; w (n, 3) in them too."""
+    """Angular acceleration (n, 3) in the array's axes from the differences of readings; w (n, 3) in the same axes."""
     m = spins.gradient
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
     if spins.array.planar:
@@ -161,7 +162,7 @@ def rates_up_to_sign(spins: Spin) -> np.ndarray:
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
-    """Rates (n, 3) up to one sign: the largest eigenvalue of w w^T and its direction."""
+    """Rates (n, 3), except for a common sign, from the largest eigenvalue of w w^T and its eigenvector."""
     symmetric = 0.5 * (m + np.swapaxes(m, 1, 2))
     half = 0.5 * np.trace(symmetric, axis1=1, axis2=2)[:, None, None]
     sizes, directions = np.linalg.eigh(symmetric - half * np.eye(3))
@@ -192,7 +193,7 @@ def unexplained(spins: Spin) -> np.ndarray:
 
 
 def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
-    """Relative accelerations (n, 3, sensors) of the rates w with the angular acceleration that fits best.
+    """Relative accelerations (n, 3, sensors) of a rigid body with rates w and the angular acceleration that fits best.
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
@@ -206,7 +207,7 @@ def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
 
 
 def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
-    """How rigid the body is that these readings (n, sensors, 3) come from; ``noise`` is their standard deviation.
+    """Quality of the rigid-body fit to readings (n, sensors, 3); ``noise`` is their standard deviation.
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
     """
@@ -229,7 +230,7 @@ def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quali
 
 
 def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise: float) -> Quality | None:
-    """Quality of the other sensors; None where they do not make an array."""
+    """Quality of the fit without the sensor ``name``; None if the remaining sensors do not make an array."""
     keep = [i for i, other in enumerate(array.names) if other != name]
     try:
         rest = sensor_array({array.names[i]: array.positions[i].tolist() for i in keep})
@@ -239,7 +240,8 @@ def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise:
 
 
 def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
-    """start + the integral of values (n, ...), by the cubic through four neighbours: order 4 in the period."""
+    """Sum of ``start`` and the time integral of values (n, ...), by cubics through four neighbouring samples: order 4
+    in the period."""
     return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(integrals(values, period), axis=0)])
 
 
@@ -319,7 +321,7 @@ ORDER = 2
 
 
 def check_cut_off(count: int, period: float, cut_off: float, file: str = "", place: str = "high-pass") -> None:
-    """Refuse a cut-off (Hz) that ``count`` samples every ``period`` (s) cannot carry."""
+    """Refuse a cut-off frequency (Hz) that does not suit ``count`` samples every ``period`` (s)."""
     if not 0 < cut_off < 0.5 / period:
         raise InputError(file, place, cut_off, f"the cut-off must lie between 0 and {0.5 / period:g} Hz")
     if count <= round(1 / (cut_off * period)):
@@ -333,7 +335,7 @@ def check_cut_off(count: int, period: float, cut_off: float, file: str = "", pla
 
 
 def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:
-    """Values (n, ...) without what is slower than ``cut_off`` (Hz), sampled every ``period`` (s).
+    """Values (n, ...), sampled every ``period`` (s), with frequencies below ``cut_off`` (Hz) removed.
 
     A Butterworth filter of order ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 + (fc/f)^4)
     and nothing is delayed; the ends are extended by their mirror image, which

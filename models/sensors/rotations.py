@@ -28,7 +28,7 @@ SKEWED = 1e-6
 
 
 class GimbalLock(InputError):
-    """Cardan angles were asked for where roll and yaw cannot be told apart; quaternions go on without harm.
+    """Cardan angles were requested where roll and yaw cannot be distinguished; quaternions are not affected.
 
     sample : index of the first such orientation; pitch : its pitch (rad).
     """
@@ -53,7 +53,7 @@ def skew(v: np.ndarray) -> np.ndarray:
 
 
 def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Quaternion product p q (..., 4): first the rotation q, then p; S(p q) = S(p) S(q)."""
+    """Quaternion product p q (..., 4), the rotation q followed by p: S(p q) = S(p) S(q)."""
     scalar = p[..., :1] * q[..., :1] - np.sum(p[..., 1:] * q[..., 1:], axis=-1, keepdims=True)
     vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
     return np.concatenate([scalar, vector], axis=-1)
@@ -65,7 +65,7 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 
 
 def exponential(turn: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding, at no angle singular."""
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) in rad; exact to rounding and regular at all angles."""
     half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
 
@@ -106,7 +106,7 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
 
 
 def _check_turned(rates: np.ndarray, period: float) -> None:
-    """Refuse angular rates that turn the body too far between two samples."""
+    """Refuse angular rates that rotate the body too far between two samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * period > HALF_TURN:
         samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"
@@ -139,7 +139,8 @@ def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = 
 
 @njit(cache=True)
 def _chain(start, steps):
-    """Normalised running products start steps[0] steps[1] ..., shapes (m, 4) and (n, m, 4) -> (n + 1, m, 4)."""
+    """Normalised running products start, start steps[0], start steps[0] steps[1] ...: from shapes (m, 4) and (n, m, 4)
+    to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
     for j in range(steps.shape[1]):
         a, b, c, d = start[j]

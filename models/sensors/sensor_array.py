@@ -20,7 +20,7 @@ PLANE = 1e-6
 
 @dataclass(frozen=True)
 class SensorArray:
-    """Sensors on a body, fixed and known.
+    """Sensors that are fixed at known positions on a body.
 
     Attributes
     ----------
@@ -42,25 +42,28 @@ class SensorArray:
 
     @property
     def redundancy(self) -> int:
-        """Equations per sample that a rigid body must fulfil and that are left over to check it."""
+        """Number of equations per sample that a rigid body must satisfy beyond those needed for its motion; they check
+        the fit."""
         return 3 * (len(self.names) - 1) - 6
 
     @property
     def flat(self) -> bool:
-        """True where the sensors lie in a plane to rounding."""
+        """Whether the sensors lie in a plane, except for rounding."""
         return self.weights.shape[1] == 2
 
     def gains(self, planar: bool | None = None) -> np.ndarray:
-        """Standard deviation (3,) of the angular acceleration about x, y, z per unit of the readings', in 1/m.
+        """Ratios (3,), in 1/m, of the standard deviation of the angular acceleration about x, y, z to that of the
+        readings.
 
-        For independent noise, the same on all axes of all sensors; the plain formula's are infinite in a plane.
+        The readings' noise is independent and the same on all axes of all sensors. For sensors in a plane the spatial
+        formula gives infinite gains.
         """
         squares = self.own_gains(self.planar if planar is None else planar) ** 2
         shares = np.where(np.abs(self.frame) > PLANE, self.frame**2, 0.0)  # infinity times a rounding error
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
-        """Noise gains about the array's axes e1, e2, n."""
+        """Noise gains as ``gains``, about the array's axes e1, e2, n."""
         first, two, three = self.inverse_squares
         return np.sqrt(
             [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
@@ -68,7 +71,7 @@ class SensorArray:
 
     @property
     def inverse_squares(self) -> np.ndarray:
-        """1 / spreads^2 (3,) in 1/m^2: variances of the columns of M per unit of the readings'."""
+        """1 / spreads^2 (3,) in 1/m^2: variances of the columns of M for readings with unit variance."""
         return np.append(1 / self.spreads[:2] ** 2, np.inf if self.flat else 1 / self.spreads[2] ** 2)
 
     def describe(self) -> list[str]:

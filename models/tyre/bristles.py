@@ -36,14 +36,15 @@ UNIT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2"
 
 @cache
 def net(cells: int) -> Grid:
-    """Net of the patch with ``cells`` per strip, from 3 to 200; InputError."""
+    """Grid of the contact patch with ``cells`` cells per strip, from 3 to 200; InputError otherwise."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
         raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
     return grid(cells, int(strips_of(np.array(1.0), cells)), "parabolic")
 
 
 def shape_factor(cells: int) -> float:
-    """C / (a^2 b k) of a patch with ``cells`` cells: slip stiffness by the bristles' stiffness; near the exact 8/3."""
+    """Ratio of the slip stiffness to a^2 b k, with bristle stiffness k, for a patch with ``cells`` cells; near the
+    exact 8/3."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT.items():
         contacts[name] = value
@@ -53,7 +54,8 @@ def shape_factor(cells: int) -> float:
 
 @lean
 def tyre_forces(contacts, slides, strips, cells, middle, answer):
-    """Fill ``answer`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning. No array is made.
+    """Fill ``answer`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
+    allocated.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
     (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s);
@@ -76,7 +78,7 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
 
 @lean
 def _creepages(sign, patches, slides):
-    """Creepages of tyres that roll forwards (sign 1) or backwards (-1)."""
+    """Creepages of tyres that roll forwards (sign 1) or backwards (sign -1), from the sliding velocities."""
     for i in range(len(patches)):
         patch, speed = patches[i], max(abs(slides[i, 3]), FADING_SPEED)
         patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed
@@ -85,7 +87,8 @@ def _creepages(sign, patches, slides):
 
 @lean
 def _mix(slides, backwards, answers):
-    """Forces of rolling forwards with their share, and those of rolling backwards, seen from ahead, with theirs."""
+    """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
+    view."""
     for i in range(len(answers)):
         share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), answers[i], backwards[i]
         answer.fx = share * answer.fx - (1.0 - share) * behind.fx
@@ -96,7 +99,8 @@ def _mix(slides, backwards, answers):
 def brush(
     load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray, cells: int = 21
 ) -> np.ndarray:
-    """fx, fy (N), mz (N m) (m, 3) of one tyre at ``slides`` (m, 4), as ``tyre_forces`` takes them.
+    """Forces fx, fy (N) and moments mz (N m), (m, 3), of one tyre for sliding velocities ``slides`` (m, 4) as in
+    ``tyre_forces``.
 
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.
     """

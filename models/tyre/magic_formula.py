@@ -18,7 +18,7 @@ Friction = Callable[[np.ndarray, float], np.ndarray]
 
 
 def graded(end: float, first: float, count: int) -> np.ndarray:
-    """Nodes from 0 to ``end`` whose distances grow as x + ``first``."""
+    """Nodes from 0 to ``end`` with spacings that grow in proportion to x + ``first``."""
     nodes = first * np.expm1(np.linspace(0.0, np.log1p(end / first), count))
     nodes[-1] = end
     return nodes
@@ -36,7 +36,7 @@ def by_similarity(
     slips: np.ndarray = SLIPS,
     name: str = "",
 ) -> TyreTable:
-    """Table of a curve along the wheel and one across it.
+    """Tyre table from a friction curve along the wheel and one across it, combined by similarity.
 
     g is the mean over the loads, weighted by h squared: exact if all loads share one shape of the curve across. Where
     both together would be above the largest node of either, which falls short of the curve's peak, they are that.
@@ -53,7 +53,8 @@ def by_similarity(
 
 
 def factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """g (a, s) and h (a, f) of friction across the wheel (a, f, s): h is that at slip 0, and g the best for all loads.
+    """Factors g (a, s) and h (a, f) whose product approximates mu_y (a, f, s): h is mu_y at slip 0, and g the best fit
+    for all loads.
 
     At slip angle 0, where h is 0, g is that of the next angle.
     """
@@ -66,7 +67,7 @@ def factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _at_no_angle(across: Friction, slips: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """g at slip angles towards 0: slope of mu_y there with slip over that without."""
+    """Limit of g for slip angles towards 0: ratio of the slope of mu_y at a slip to that without slip."""
     little = np.full(1, 1e-9)
     slope = np.array([across(little, load)[0] / little[0] for load in loads])[:, None]
     secant = np.array([across(slips[1:], load) / slips[1:] for load in loads])
@@ -85,7 +86,7 @@ class Burckhardt:
     c3: float
 
     def __call__(self, slip: np.ndarray) -> np.ndarray:
-        """mu at slips from 0 on."""
+        """Friction coefficients mu at slips from 0 on."""
         least = np.minimum(slip, 1.0)
         return -self.c1 * np.expm1(-self.c2 * least) - self.c3 * least
 
@@ -113,7 +114,7 @@ class MagicFormulaCurve:
     E: float
 
     def __call__(self, slip: np.ndarray) -> np.ndarray:
-        """mu at slips from 0 on."""
+        """Friction coefficients mu at slips from 0 on."""
         bent = self.B * slip
         return self.D * np.sin(self.C * np.arctan(bent - self.E * (bent - np.arctan(bent))))
 

@@ -40,7 +40,7 @@ class Property:
 
 
 def tir_table(path: str | Path) -> TyreTable:
-    """Table of the tyre in a `.tir` file; raises InputError that names file, line, key, value and what is allowed."""
+    """Table of the tyre in a `.tir` file; raises InputError with file, line, key, value and the allowed values."""
     properties = _properties(path)
     _check(path, properties)
     named = (name for name in properties if name in (*NEEDED, *UNIT_SCALES) or COEFFICIENT.fullmatch(name))
@@ -83,13 +83,13 @@ def lateral_formula(c: dict[str, float], load: float) -> MagicFormulaCurve:
 
 
 def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
-    """Scaled nominal load (N), and by which share of it a load is above."""
+    """Scaled nominal load (N), and relative excess of a load above it."""
     nominal = c["FNOMIN"] * c["LFZO"]
     return nominal, (load - nominal) / nominal
 
 
 def _properties(path: str | Path) -> dict[str, Property]:
-    """Keys of all sections, in capitals."""
+    """Keys of all sections, in capital letters."""
     properties: dict[str, Property] = {}
     for line, row in enumerate(whole_text(path).splitlines(), start=1):
         plain = row.partition("$")[0].partition("!")[0].strip()
@@ -137,7 +137,7 @@ def _wrong_value(path: str | Path, properties: dict[str, Property], name: str, a
 
 
 def _check_curves(path: str | Path, curves: dict[float, tuple[MagicFormulaCurve, MagicFormulaCurve]]) -> None:
-    """Refuse coefficients that give no friction, or one that turns round."""
+    """Refuse coefficients that give no friction, or friction that changes its sign."""
     for load, pair in curves.items():
         for letter, curve in zip("XY", pair, strict=True):
             if not (0.0 < curve.D <= 3.0 and 0.0 < curve.C <= 2.0 and 0.0 < curve.B < 1e4):

@@ -46,7 +46,7 @@ def tyre_table(path: str | Path) -> TyreTable:
 
 
 def _columns(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Line (n,) of every row, and the columns (n,) in SI; raises InputError for the first row that is wrong."""
+    """Line number (n,) of every row, and columns (n,) in SI; raises InputError for the first row with an error."""
     parts: list[RowBlock] = []
     for block in blocks(path, COLUMNS):
         for row, wrong in block.wrong.items():
@@ -80,7 +80,7 @@ def _error_in_row(path: str | Path, lines: np.ndarray, name: str, row: int, valu
 
 
 def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: list) -> np.ndarray:
-    """Row of every combination of nodes; each must be there once."""
+    """Index of the row for each combination of nodes; every combination must occur exactly once."""
     shape = tuple(nodes.size for nodes, _ in axes)
     order = np.argsort(number, kind="stable")
     twice = np.flatnonzero(np.diff(number[order]) == 0)

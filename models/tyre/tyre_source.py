@@ -14,14 +14,14 @@ SCALES = (0.0, 2.0)
 
 
 def from_file(path: Path) -> TyreTable:
-    """Table in a file, by its ending; raises InputError for what it does not hold."""
+    """Tyre table from a file whose extension gives the format; raises InputError if the file holds no such table."""
     if path.suffix.lower() not in READERS:
         raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READERS))
     return READERS[path.suffix.lower()](path)
 
 
 def named(name: str, rear: bool = False) -> TyreTable:
-    """Table of a surface; the one of the rear tyre if there is one of its own and it is wanted."""
+    """Tyre table of a named surface; with ``rear``, the rear tyre's table if the surface has a separate one."""
     rear_name = f"{name}/rear"
     return surface(rear_name if rear and rear_name in PACEJKA else name)
 

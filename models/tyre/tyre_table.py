@@ -101,7 +101,7 @@ class TyreTable:
         return float((self.g[1].max() * self.h[1].max()) / self.angles[1])
 
     def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
-        """The tyre's functions on nodes that include these tables' own: linear interpolation loses nothing."""
+        """The same tyre on finer nodes that include its own nodes; linear interpolation keeps its values."""
         mu_x, g, h = self._at_nodes(angles, slips, loads)
         return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
 
@@ -110,12 +110,12 @@ class TyreTable:
         return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
 
     def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
-        """mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
+        """Friction coefficients mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
         mu_x, g, h = self._at_nodes(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
     def figures(self, load: float) -> dict[str, float]:
-        """The main figures of a tyre under one load (N), by name and unit."""
+        """Characteristic values of a tyre under one load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
         return {
@@ -129,7 +129,7 @@ class TyreTable:
         }
 
     def _at_nodes(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
-        """mu_x, g and h at other nodes."""
+        """Values of mu_x, g and h, interpolated at other nodes."""
         mu_x = _interpolate_axis(
             _interpolate_axis(_interpolate_axis(self.mu_x, 0, self.angles, angles), 1, self.loads, loads),
             2,
@@ -163,7 +163,8 @@ class Tables(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where a slip angle and a load lie in the tables: the cells of both, and the share of each cell below it."""
+    """Location of a slip angle and a load in the tables: the cells of both, and their relative positions in these
+    cells."""
 
     angle: int
     angle_share: float
@@ -172,7 +173,7 @@ class Cells(NamedTuple):
 
 
 def stacked(tables: Sequence[TyreTable]) -> Tables:
-    """Tables brought to the union of their nodes, which changes no value of theirs."""
+    """Tables brought to the union of their nodes, which does not change their interpolated values."""
     if not tables:
         raise InputError("", "tyres", [], "needs at least one table")
     nodes = [np.unique(np.concatenate([getattr(t, name) for t in tables])) for name in ("angles", "slips", "loads")]
@@ -182,7 +183,8 @@ def stacked(tables: Sequence[TyreTable]) -> Tables:
 
 @lean
 def cell_and_share(nodes, value):
-    """Cell at which a value lies, and the share of that cell below it; held at the ends."""
+    """Index of the table cell that contains a value, and the value's relative position in the cell; clamped at the
+    ends."""
     last = nodes.size - 1
     if last == 0 or value <= nodes[0]:
         return 0, 0.0
@@ -200,7 +202,7 @@ def cell_and_share(nodes, value):
 
 @lean
 def lateral_adhesion(table, cells, k, w, g, h):
-    """mu_y of one table at a slip angle and a load in these ``cells``, and in cell k of slip with its share w."""
+    """mu_y of one table at the slip angle and load of ``cells``, and at the slip in cell k with relative position w."""
     i, p, j, q = cells
     i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
     by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
@@ -214,7 +216,7 @@ def lateral_adhesion(table, cells, k, w, g, h):
 
 @lean
 def longitudinal_adhesion(table, cells, k, mu_x):
-    """mu_x of one table at slip node k, at a slip angle and a load in these ``cells``."""
+    """mu_x of one table at the slip angle and load of ``cells``, and at slip node k."""
     i, p, j, q = cells
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
     if q == 0.0:

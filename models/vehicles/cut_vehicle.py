@@ -48,18 +48,18 @@ class Element:
     friction_rate: float = 1.0
 
     def gauge(self) -> "Element":
-        """An element whose force is the travel d of this one."""
+        """A copy of the element whose force equals its travel d, so that a run records the travel."""
         straight = replace(self, travel_force=None, rate_force=None, friction=0.0)
         return replace(straight, stiffness=1.0, damping=0.0, held=0.0)
 
     @property
     def design(self) -> float:
-        """axis . (second_point - first_point) in the design position."""
+        """Value of axis . (second_point - first_point) in the design position."""
         return float(self.axis @ (self.second_point - self.first_point))
 
     @property
     def unit(self) -> str:
-        """Unit of the force."""
+        """Unit of the element's force: N or N m."""
         return "N" if np.isclose(np.linalg.norm(self.axis), 1.0) else "N m"
 
 
@@ -81,17 +81,18 @@ class CutVehicle:
 
     @property
     def hubs(self) -> tuple[str, ...]:
-        """Names of the tyres that were cut off."""
+        """Names of the tyres that were removed, one per hub."""
         return tuple(tyre.name for tyre in self.uncut.tyres)
 
     @property
     def size(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return len(self.tree.coordinates())
 
 
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
-    """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
+    """Remove the tyres of a vehicle whose body ``chassis`` has all six freedoms; InputError if the vehicle cannot be
+    cut."""
     _check(vehicle, chassis)
     sprung = sliding_springs(guided(vehicle, chassis))
     whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis)
@@ -101,7 +102,7 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
 
 
 def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, ...]:
-    """Springs, then bars, of a vehicle whose parts all name their frames; held : what they bear at rest."""
+    """Springs, then bars, of a vehicle whose springs and bars all name their frames; held : their static forces."""
 
     def element(part: SpringDamper | AntiRollBar, first_body: str, second_body: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
@@ -130,7 +131,8 @@ def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, .
 
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
-    """Heading and pitch on carriers without mass, roll on the chassis, all others behind it."""
+    """Bodies in tree order: massless carriers for heading and pitch, the chassis with roll, and all other bodies behind
+    it."""
     body = vehicle.body(chassis)
     carriers = (
         Body(f"{chassis} heading", 0.0, body.position, ("x", "y", "z", "rz")),
@@ -166,7 +168,7 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
 
 @dataclass(frozen=True)
 class Rigid:
-    """The cut vehicle as one rigid body: what its drift follows when its springs have settled.
+    """The cut vehicle as one rigid body, which describes its drift when the springs have settled.
 
     mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it (kg m^2), arms (h, 3) of the hubs.
 
@@ -184,27 +186,29 @@ class Rigid:
     arms: np.ndarray
 
     def moments(self, wrenches: np.ndarray) -> np.ndarray:
-        """Moments (m, 3) about the centre, N m, of wrenches (m, 6 h) in the chassis' axes."""
+        """Moments (m, 3) about the centre of mass, N m, of hub wrenches (m, 6 h) in the chassis' axes."""
         parts = wrenches.reshape(len(wrenches), -1, 6)
         return (np.cross(self.arms, parts[:, :, :3]) + parts[:, :, 3:]).sum(axis=1)
 
     def turning(self, deviation: np.ndarray) -> np.ndarray:
-        """Covariance (3, 3) of the angular accelerations, rad^2/s^4, that samples of noise (6 h,), N and N m, make."""
+        """Covariance (3, 3) of the angular accelerations, rad^2/s^4, caused by noise with standard deviations (6 h,), N
+        and N m, of the hub samples."""
         rows = self.moments(np.eye(len(deviation)))
         inverse = np.linalg.inv(self.inertia)
         return inverse @ (rows.T * deviation**2) @ rows @ inverse
 
     def toppling(self) -> np.ndarray:
-        """Growth rates (2,) of roll and pitch, 1/s, under forces that keep their directions in the space."""
+        """Growth rates (2,) of roll and pitch, 1/s, under forces whose directions are fixed in space."""
         loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
         return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
 
     def angle_variance(self, deviation: np.ndarray, period: float, times: np.ndarray) -> np.ndarray:
-        """Variances (m, 3) of roll, pitch, heading (rad^2) at times (m,) from rest."""
+        """Variances (m, 3) of roll, pitch and heading (rad^2) by noise, at times (m,) after a start from rest."""
         return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
 
     def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray, frame: str) -> np.ndarray:
-        """Variances (m, 3) of x, y, z (m^2) at times (m,) from rest, forces in a frame."""
+        """Variances (m, 3) of x, y, z (m^2) by noise at times (m,) after a start from rest; ``frame`` : of the
+        forces."""
         force = period * (deviation.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
         variances = np.outer(times**3 / 3, force)
         if frame != "inertial":
@@ -214,7 +218,7 @@ class Rigid:
 
 
 def rigid(vehicle: CutVehicle) -> Rigid:
-    """All bodies in the design position as one."""
+    """``Rigid`` of all bodies, combined in the design position."""
     bodies = vehicle.uncut.bodies
     mass = sum(body.mass for body in bodies)
     centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass

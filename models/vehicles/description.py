@@ -26,7 +26,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a body, ``x`` (m) ahead of its centre of mass; ``body`` None is the ground."""
+    """A point on a body, ``x`` (m) ahead of the body's centre of mass; ``body`` None means the ground."""
 
     body: str | None
     x: float = 0.0
@@ -65,7 +65,7 @@ class PitchSpring:
 
 @dataclass(frozen=True)
 class Axle:
-    """Where the road or a wheel force acts: the wheel body and its place ahead of the chassis' centre (m)."""
+    """Where the road or a wheel force acts: the wheel body, and its position ahead of the chassis' centre (m)."""
 
     name: str
     wheel: str
@@ -85,11 +85,11 @@ class Vehicle:
 
     @property
     def tyres(self) -> tuple[Strut, ...]:
-        """The struts to the ground, in the order of ``struts``."""
+        """The struts that end on the ground, in the order of ``struts``."""
         return tuple(strut for strut in self.struts if strut.lower.body is None)
 
     def coordinates(self) -> tuple[tuple[str, str], ...]:
-        """Degrees of freedom in the order of the state, as (body, "z" or "pitch")."""
+        """Coordinates in the order of the state, as (body, "z" or "pitch")."""
         heave = [(body.name, "z") for body in self.bodies]
         return (*heave, *((body.name, "pitch") for body in self.bodies if body.pitch_inertia is not None))
 
@@ -117,7 +117,7 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _vertical(point: Point, coordinates: tuple[tuple[str, str], ...]) -> np.ndarray:
-    """Row that turns small coordinates into the vertical displacement of a point: z - x pitch."""
+    """Row that maps small coordinates to the vertical displacement of a point: z - x pitch."""
     row = np.zeros(len(coordinates))
     for i, (body, kind) in enumerate(coordinates):
         if body == point.body:

@@ -26,7 +26,7 @@ RESTING_COORDINATES: tuple[Freedom, ...] = ("z", "rx", "ry")
 def free_vehicle(
     vehicle: SpatialVehicle, gravity: float = 9.81, spin_inertia: float = 0.0, fixed: tuple[str, ...] = ()
 ) -> SpatialVehicle:
-    """The vehicle on a carrier, bodies in the order of a walk through their tree, without side forces, drag, outputs.
+    """The vehicle on a carrier body, without side forces, drag and outputs; its bodies are in tree order.
 
     gravity : m/s^2; spin_inertia : kg m^2 of each wheel about its axle where its tyre names none, 0 for wheels that do
     not spin; fixed : tyres whose wheels do not spin. Raises InputError unless the vehicle's chassis has all six
@@ -56,7 +56,7 @@ def free_vehicle(
 
 
 def spinning(tyre: Tyre, spin_inertia: float) -> float:
-    """Inertia (kg m^2) of a wheel about its axle; ``spin_inertia`` where its tyre names none."""
+    """Inertia (kg m^2) of a wheel about its axle: the tyre's own value, else ``spin_inertia``."""
     return spin_inertia if tyre.spin_inertia is None else tyre.spin_inertia
 
 
@@ -65,7 +65,8 @@ def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
 
 
 def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
-    """The vehicle with all that had no parent on its chassis, in whose axes it moves."""
+    """The vehicle in which the chassis becomes the parent of every body that had none, so that these move in its
+    axes."""
     return replace(
         vehicle,
         bodies=tuple(
@@ -93,7 +94,8 @@ def chassis_of(vehicle: SpatialVehicle) -> Body:
 
 
 def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
-    """Refuse an axle that takes its tyres to another heading than what carries it: forces keep to that."""
+    """Refuse an axle with a heading of its own, relative to the body that carries it, since tyre forces follow that
+    body's heading."""
     hitches = {vehicle.body(name).parent for name in vehicle.towed}
     for tyre in vehicle.tyres:
         for name in vehicle.chain(tyre.body):
@@ -106,12 +108,13 @@ def _check_headings(vehicle: SpatialVehicle, chassis: str) -> None:
 
 
 def rotor(tyre: str) -> str:
-    """Name of the body that spins with a tyre."""
+    """Name of the rotating body of a wheel."""
     return f"{tyre} {ROTOR}"
 
 
 def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
-    """Last coordinate that moves a body, -1 if none does, and where (m) its joint lies in the design position."""
+    """Index of the last coordinate that moves a body, -1 if none does, and position (m) of its joint in the design
+    position."""
     given_body = vehicle.body(body)
     last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
     if last:
@@ -120,8 +123,8 @@ def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
 
 
 def joints(vehicle: SpatialVehicle) -> np.ndarray:
-    """(n, 5) of every coordinate: its kind (place in FREEDOMS), the coordinate below it (-1: none), the arm (m) from
-    the joint of that one to its own in the design position."""
+    """Table (n, 5) with a row per coordinate: its kind (index in FREEDOMS), the coordinate below it (-1: none), and the
+    vector (m) from that one's joint to its own in the design position."""
     rows = []
     for body in vehicle.bodies:
         below, origin = (-1, (0.0, 0.0, 0.0)) if body.parent is None else anchor(vehicle, body.parent)
@@ -132,7 +135,7 @@ def joints(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def frames(vehicle: SpatialVehicle) -> np.ndarray:
-    """(n, 3, 3) of every coordinate: the axes of its body's freedoms in the design position, as columns."""
+    """Axes (n, 3, 3), as columns, of the freedoms of each coordinate's body in the design position."""
     axes = [vehicle.body(name).axes for name, _ in vehicle.coordinates()]
     return np.array(axes, float).reshape(-1, 3, 3).transpose(0, 2, 1)
 
@@ -142,7 +145,7 @@ def _swaying(bar: AntiRollBar) -> AntiRollBar:
 
 
 def _bodies_before_riders(bodies: list[Body]) -> tuple[Body, ...]:
-    """Every body right before all that ride on it: the order in which engines number them."""
+    """Bodies in tree order: each one is followed directly by all bodies that it carries, as engines number them."""
     walked: list[Body] = []
 
     def walk(parent: str | None) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class WheelPosition:
-    """Where a wheel meets the road: x (m) forward, y (m) to the left, and its axle, 0 the frontmost."""
+    """Position of a wheel on the road: x (m) forward, y (m) to the left, and the number of its axle, 0 the
+    frontmost."""
 
     name: str
     x: float
@@ -19,7 +20,7 @@ class WheelPosition:
 
 @dataclass(frozen=True)
 class Output:
-    """One thing that an engineer reads: a linear function of motion and road.
+    """One output quantity: a linear function of the vehicle's motion and of the road.
 
     acceleration_factors, rate_factors, displacement_factors (n,): of q'', q', q. road_factors, road_rate_factors (w,):
     of the heights under the wheels (m) and of their rates (m/s). ``kind`` says what it is ("acceleration", "travel",
@@ -37,7 +38,7 @@ class Output:
 
 
 class OutputRows(NamedTuple):
-    """Rows of all outputs' matrices, as ``Output`` has them of one output: (p, n), those by the road (p, w)."""
+    """Factors of all outputs as matrices, each row one ``Output``: (p, n), and (p, w) for those of the road."""
 
     acceleration_factors: np.ndarray
     rate_factors: np.ndarray
@@ -48,7 +49,7 @@ class OutputRows(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearVehicle:
-    """M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
+    """Linear vehicle M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
 
     mass, damping, stiffness (n, n); road_stiffness R (n, w) in N/m, road_damping S (n, w) in N s/m. ``coordinates``
     names the n freedoms as (body, freedom). ``source`` says who linearised ("analytic", "exudyn", "mujoco") and where.
@@ -66,7 +67,7 @@ class LinearVehicle:
 
     @property
     def axles(self) -> tuple[float, ...]:
-        """Places x (m) of the axles, from the front."""
+        """Positions x (m) of the axles, the front one first."""
         places = {wheel.axle: wheel.x for wheel in self.wheels}
         return tuple(places[i] for i in sorted(places))
 
@@ -77,14 +78,15 @@ class LinearVehicle:
 
     @cached_property
     def read(self) -> OutputRows:
-        """Factors of all outputs."""
+        """``OutputRows`` of all outputs."""
         return OutputRows(
             *(np.array([getattr(output, factor) for output in self.outputs]) for factor in OutputRows._fields)
         )
 
 
 def poles(vehicle: LinearVehicle) -> np.ndarray:
-    """Eigenvalues (2 n,) in 1/s, slow ones first; of a pair the one with the negative imaginary part first."""
+    """Eigenvalues (2 n,) in 1/s in order of increasing magnitude; of a conjugate pair, the one with negative imaginary
+    part comes first."""
     n = len(vehicle.mass)
     motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
     values = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), motion]))
@@ -92,9 +94,9 @@ def poles(vehicle: LinearVehicle) -> np.ndarray:
 
 
 def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
-    """Shift of every eigenvalue (2 n,) of the unloaded vehicle by its load, complex, in 1/s.
+    """Complex change (1/s) of each eigenvalue (2 n,) of the unloaded vehicle by the load.
 
-    The eigenvalues of the two are paired so that the sum of all distances is the least.
+    Eigenvalues of both vehicles are paired such that the sum of all distances is smallest.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -24,7 +24,7 @@ from models.vehicles.pitch_plane import Parameters
 
 
 def numbers(p: Parameters, vehicle: Vehicle) -> np.ndarray:
-    """Numbers that the compiled equations read: the parameters (15,), then stiffness, damping and dead band of each
+    """Array for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each pitch
     spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
     return np.concatenate((p.array(), *springs))
@@ -58,7 +58,7 @@ def tyres(y, u, p):
 
 @register_jitable
 def pushing_tyres(y, u, p):
-    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). What is not a number stays so."""
+    """Rates of the vehicle on tyres that never pull (the effect ``lift_off``). NaN in the states gives NaN."""
     e1, e2 = y[0] - u[0], y[1] - u[1]
     f1 = max(min(p[6] * e1 + p[10] * (y[4] - u[2]), 2.0 * p[6] * e1), 0.0)
     f2 = max(min(p[7] * e2 + p[11] * (y[5] - u[3]), 2.0 * p[7] * e2), 0.0)
@@ -67,7 +67,8 @@ def pushing_tyres(y, u, p):
 
 @register_jitable
 def newton_euler(y, wheels, struts, cosine, p, dy):
-    """Balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel), suspension forces f3, f4."""
+    """Accelerations from the balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel),
+    suspension forces f3, f4."""
     (f1, f2), (f3, f4) = wheels, struts
     for i in range(4):
         dy[i] = y[4 + i]
@@ -148,7 +149,7 @@ def pitch_linear(y, u, p, dy):
 
 @register_jitable
 def heave_pitch_exact(y, u, p, dy):
-    """Two wheels under a chassis whose heave and pitch are prescribed, read from u."""
+    """Rates of two wheels under a chassis whose heave and pitch are prescribed in u."""
     sine, cosine = math.sin(u[3]), math.cos(u[3])
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
     newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
@@ -181,7 +182,7 @@ RIGHT_HAND_SIDES = {
 
 @register_jitable
 def pitch_springs(y, u, p, dy):
-    """Rotational springs and dampers to the ground: from p[15] on, N m/rad, N m s/rad and dead band (rad) of each."""
+    """Add rotational springs and dampers to the ground; their N m/rad, N m s/rad and dead band (rad) begin at p[15]."""
     for i in range(15, len(p), 3):
         beyond = abs(y[3]) - p[i + 2]
         if beyond >= 0.0:
@@ -190,7 +191,7 @@ def pitch_springs(y, u, p, dy):
 
 @register_jitable
 def pitch_moment(y, u, p, dy):
-    """A moment on the chassis (N m, nose up), the last channel of the input."""
+    """Add a moment on the chassis (N m, nose up), which is the last channel of the input."""
     dy[7] += u[-1] / p[5]
 
 

@@ -47,45 +47,45 @@ UPRIGHT = 0.3
 
 @dataclass(frozen=True)
 class VehicleFigures:
-    """Figures of a vehicle that several checks use."""
+    """Quantities of a vehicle that several plausibility checks use."""
 
     vehicle: SpatialVehicle
 
     @cached_property
     def wheels(self) -> dict[str, tuple[Tyre, ...]]:
-        """Names of the bodies that carry tyres, with their tyres; without the carried body."""
+        """Bodies that carry tyres, by name, with their tyres; empty if all bodies do."""
         names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
         tyres_of = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
         return tyres_of if len(tyres_of) < len(self.vehicle.bodies) else {}
 
     @cached_property
     def carried(self) -> Body:
-        """The heaviest body that is no wheel or axle."""
+        """The sprung body: the heaviest body that carries no tyre."""
         return max((b for b in self.vehicle.bodies if b.name not in self.wheels), key=lambda body: body.mass)
 
     @cached_property
     def total(self) -> float:
-        """Mass of everything, kg."""
+        """Mass of the whole vehicle, kg."""
         return sum(body.mass for body in self.vehicle.bodies)
 
     @cached_property
     def held(self) -> dict[str, float]:
-        """Static force of every tyre and part, N: InputError where nothing carries a weight."""
+        """Static forces of all tyres, springs and bars, N; InputError if a weight is not supported."""
         preloaded = preloads(replace(self.vehicle, gravity=GRAVITY))
         return preloaded.parts | preloaded.tyres
 
     @cached_property
     def wheelbase(self) -> float:
-        """m; 0 of a single axle."""
+        """Wheelbase, m; 0 for a single axle."""
         return max(self.vehicle.axles) - min(self.vehicle.axles)
 
     @cached_property
     def track(self) -> float:
-        """m, the widest; 0 of a vehicle without width."""
+        """Largest track width, m; 0 for a vehicle without width."""
         return float(np.ptp([tyre.point[1] for tyre in self.vehicle.tyres]))
 
     def struts(self, wheel: str) -> list[SpringDamper]:
-        """Springs and dampers that hold a wheel or an axle up to another body."""
+        """Nearly vertical springs and dampers between a wheel or an axle and another body."""
         return [
             s
             for s in self.vehicle.springs
@@ -93,13 +93,14 @@ class VehicleFigures:
         ]
 
     def on_joints(self, wheel: str) -> bool:
-        """Whether a spring along coordinates holds a wheel or an axle."""
+        """Whether a joint element acts on a wheel or an axle."""
         chain = self.vehicle.chain(wheel)
         return any(e.stiffness and body in chain for e in self.vehicle.joint_elements for body, _ in e.coordinates)
 
 
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """All queries about a vehicle, in SI, but for those of checks that the user accepts; empty for a usual one."""
+    """Queries on implausible values of a vehicle, in SI, without those that the user has accepted; empty for an
+    ordinary vehicle."""
     whole = VehicleFigures(vehicle)
     queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
     return tuple(query for query in queries if query.check not in accept)
@@ -160,8 +161,7 @@ def _sizes(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on the inertia of the carried body: its freedoms of turning, and that no mass is negative anywhere in
-    it."""
+    """Findings on the inertia of the sprung body: its rotations, and whether the tensor would need negative mass."""
     body, spans = figures.carried, {"rx": figures.track, "ry": figures.wheelbase, "rz": figures.wheelbase}
     about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
     for freedom, usual in GYRATION.items():
@@ -191,7 +191,7 @@ def _inertias(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _struts(figures: VehicleFigures) -> Iterator[Finding]:
-    """Corners without a strut, and struts far from their wheels."""
+    """Findings on wheels without a strut, and on struts far from their wheels."""
     for wheel, tyres in figures.wheels.items():
         struts = figures.struts(wheel)
         if figures.on_joints(wheel):
@@ -220,14 +220,15 @@ def _struts(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _distance_from_wheel(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...]) -> float:
-    """Distance (m) of a strut's point on a wheel from the line between its tyres, seen from above."""
+    """Horizontal distance (m) of a strut's end on a wheel from the line between the wheel's tyres."""
     x, y, _ = strut.first_point if strut.first_body == wheel else strut.second_point
     beside = [tyre.point[1] for tyre in tyres]
     return float(np.hypot(x - tyres[0].point[0], max(min(beside) - y, y - max(beside), 0.0)))
 
 
 def _statics(figures: VehicleFigures) -> Iterator[Finding]:
-    """Static loads and what follows from them; nothing where masses or lengths are beyond all vehicles already."""
+    """Findings on static loads and the values that follow from them; empty if masses or lengths are already
+    implausible."""
     if any(_masses(figures)) or any(_sizes(figures)):
         return
     try:
@@ -278,8 +279,8 @@ def _loads(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
-    """Findings on frequencies: of the carried body from how far it sinks, of every wheel between road and body, and how
-    far tyres give way."""
+    """Findings on the frequencies of the sprung body, from its static deflection, and of each wheel between road and
+    body, and on the tyres' static deflections."""
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
     sunk = _sunk(figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
@@ -317,7 +318,7 @@ def _frequencies(figures: VehicleFigures) -> Iterator[Finding]:
 
 
 def _sunk(figures: VehicleFigures) -> float:
-    """Distance (m) by which the carried body sinks under the weights, springs and tyres together."""
+    """Static deflection (m) of the sprung body under the weights, with springs and tyres in series."""
     vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
@@ -326,7 +327,8 @@ def _sunk(figures: VehicleFigures) -> float:
 
 
 def _hop(figures: VehicleFigures, wheel: str) -> float | None:
-    """Frequency (Hz) of a wheel's or an axle's own z with everything else at rest; None where it has none."""
+    """Frequency (Hz) of the vertical motion of a wheel or an axle with all other bodies fixed; None if it cannot move
+    so."""
     vehicle, motion = figures.vehicle, Kinematics(figures.vehicle)
     row = motion.coordinate(wheel, "z")
     if not row.any() or wheel == figures.carried.name:
@@ -336,7 +338,7 @@ def _hop(figures: VehicleFigures, wheel: str) -> float | None:
 
 
 def _dampers(figures: VehicleFigures) -> Iterator[Finding]:
-    """Dampers of struts by the critical damping of what rests on them, and springs of one axle that differ."""
+    """Findings on damping ratios of the struts with the mass above them, and on different springs on one axle."""
     struts = {strut.name: strut for wheel in figures.wheels for strut in figures.struts(wheel)}
     for name, strut in struts.items():
         stiffness, load = slopes_at_rest(strut)[0], figures.held[name]

@@ -11,13 +11,14 @@ UP = (0.0, 0.0, 1.0)
 
 
 def plausible_plane(p: Parameters, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """All queries about a parameter set, each at the symbols of its parameters, as ``plausible`` gives them."""
+    """Queries on implausible values of a pitch-plane parameter set, as ``plausible`` gives them, under the parameters'
+    symbols."""
     return plausible(in_space(p), accept)
 
 
 def in_space(p: Parameters) -> SpatialVehicle:
-    """The vehicle of a parameter set without a width, wheels 0.3 m and chassis 0.6 m above the ground (which is of no
-    account); entries are called after the parameters."""
+    """Spatial vehicle without width that equals a parameter set. Its wheels are 0.3 m and its chassis 0.6 m above the
+    ground, which has no influence. Its parts have the names of the parameters."""
     chassis, still = "chassis: m3, I", ((0.0,) * 3,) * 3
     ends = (
         ("front", p.b, p.m1, p.k1, p.d1, p.k3, p.d3, "m1", "k1, d1", "k3, d3"),

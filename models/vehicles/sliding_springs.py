@@ -13,7 +13,7 @@ from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Spri
 
 
 def sliding_springs(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with spring-dampers for all joint elements; InputError where one has no such equal."""
+    """The vehicle with spring-dampers in place of all joint elements; InputError if one cannot be replaced."""
     springs = tuple(_spring(vehicle, element) for element in vehicle.joint_elements)
     return replace(vehicle, springs=(*vehicle.springs, *springs), joint_elements=())
 
@@ -42,7 +42,7 @@ def _spring(vehicle: SpatialVehicle, element: JointElement) -> SpringDamper:
 
 
 def _row(element: JointElement, body: str) -> np.ndarray:
-    """Factors (3,) of the slides of one body."""
+    """Factors (3,) of a joint element for the translations of one body."""
     row = np.zeros(3)
     for (name, freedom), factor in zip(element.coordinates, element.factors, strict=True):
         if name == body:

@@ -78,7 +78,7 @@ class JointElement:
 
 @dataclass(frozen=True)
 class Curve:
-    """Force (N) over travel (m) or over its rate (m/s): straight between points, the outer pieces go on beyond.
+    """Force (N) over travel (m) or over its rate (m/s), piecewise linear; the outer pieces extend to infinity.
 
     ``arguments`` rise strictly, at least two; the curve passes through (0, 0), so that it changes no equilibrium.
     """
@@ -92,14 +92,15 @@ class Curve:
         return self.forces[i] + self._slopes[i] * (argument - self.arguments[i])
 
     def slope_at_rest(self) -> float:
-        """Slope at 0; in a corner the mean of its two sides, which is what a central difference sees."""
+        """Slope at 0. At a corner it is the mean of both sides, as a central difference gives."""
         slopes, at = self._slopes, self._piece_of(0.0)
         if self.arguments[at] == 0.0 and at > 0:
             return 0.5 * (slopes[at - 1] + slopes[at])
         return slopes[at]
 
     def hinges(self) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
-        """Offset (N), first slope, corners and bends of force = offset + slope x + sum of bend max(x - corner, 0)."""
+        """Equivalent form of the curve, force = offset + slope x + sum of bend max(x - corner, 0): offset (N), first
+        slope, corners, bends."""
         slopes, x = self._slopes, self.arguments
         bends = tuple(after - before for before, after in pairwise(slopes))
         return self.forces[0] - slopes[0] * x[0], slopes[0], x[1:-1], bends
@@ -110,7 +111,7 @@ class Curve:
         return [(f[i + 1] - f[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
 
     def _piece_of(self, argument: float) -> int:
-        """Index of the piece that holds the argument, the outer ones for all beyond."""
+        """Index of the straight piece for the argument; outer pieces extend to infinity."""
         return bisect_right(self.arguments, argument, 1, len(self.arguments) - 1) - 1
 
 
@@ -148,7 +149,7 @@ class SpringDamper:
 
     @property
     def bent(self) -> bool:
-        """Whether it has curves or friction."""
+        """Whether the spring is nonlinear: it has curves or dry friction."""
         return bool(self.travel_force or self.rate_force or self.friction)
 
 
@@ -246,7 +247,8 @@ class PointOutput:
 
 @dataclass(frozen=True)
 class TurnOutput:
-    """Turning of a body about ``axis``: its angular acceleration (rad/s^2), velocity (rad/s), or small angle (rad)."""
+    """Rotation of a body about ``axis``: its angular acceleration (rad/s^2), angular velocity (rad/s), or small angle
+    (rad)."""
 
     name: str
     kind: TurnKind
@@ -256,7 +258,8 @@ class TurnOutput:
 
 @dataclass(frozen=True)
 class PartOutput:
-    """Travel d (m), its rate (m/s), or force less preload (N) of a spring-damper; e, e', moment of a bar."""
+    """Output of a spring-damper: travel d (m), its rate (m/s), or force less preload (N); of a bar: e, e' or its
+    moment."""
 
     name: str
     kind: PartKind
@@ -265,7 +268,8 @@ class PartOutput:
 
 @dataclass(frozen=True)
 class TyreOutput:
-    """Tyre force less its static part (N, positive when it presses harder), or deflection zeta - h (m)."""
+    """Output of a tyre: force less static load (N, positive when the tyre presses harder), or deflection zeta - h
+    (m)."""
 
     name: str
     kind: TyreKind
@@ -328,15 +332,15 @@ class SpatialVehicle:
 
     @property
     def lifts(self) -> bool:
-        """Whether any tyre may leave the road."""
+        """Whether at least one tyre may leave the road."""
         return any(tyre.pushes_only for tyre in self.tyres)
 
     def with_tyres(self, pushes_only: bool) -> "SpatialVehicle":
-        """The vehicle with all tyres so."""
+        """The vehicle with ``pushes_only`` set to this value for all tyres."""
         return replace(self, tyres=tuple(replace(tyre, pushes_only=pushes_only) for tyre in self.tyres))
 
     def in_frame(self, frame: str) -> "SpatialVehicle":
-        """The vehicle with this body as the frame of all springs and bars that name none."""
+        """The vehicle in which every spring and bar without a frame gets the body ``frame``."""
         return replace(
             self,
             springs=tuple(replace(spring, frame=spring.frame or frame) for spring in self.springs),
@@ -344,24 +348,24 @@ class SpatialVehicle:
         )
 
     def body(self, name: str) -> Body:
-        """The body of that name; KeyError if there is none."""
+        """The body with a given name; KeyError if there is none."""
         return {body.name: body for body in self.bodies}[name]
 
     def chain(self, name: str | None) -> tuple[str, ...]:
-        """A body and all that it rides on, down to the one without parent; nothing for None, the ground."""
+        """A body and all bodies that carry it, down to the one without parent; empty for None, the ground."""
         return () if name is None else (name, *self.chain(self.body(name).parent))
 
     def towed_under(self, name: str | None) -> str | None:
-        """The towed body that carries a body, or is it; None where no towed body does."""
+        """The towed body that is, or carries, the given body; None if there is none."""
         return next((body for body in self.chain(name) if body in self.towed), None)
 
     def turns(self, name: str | None) -> bool:
-        """Whether a body may turn, by a freedom of its own or of what it rides on."""
+        """Whether a body can rotate, by its own freedoms or by those of bodies that carry it."""
         return any(freedom.startswith("r") for body in self.chain(name) for freedom in self.body(body).freedoms)
 
 
 def hitch_of(towed: str) -> str:
-    """Name of the massless body at the hitch of a towed one."""
+    """Name of the massless body at the hitch of a towed body."""
     return f"{towed} hitch"
 
 

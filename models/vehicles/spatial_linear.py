@@ -40,7 +40,7 @@ TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
 
 
 class Kinematics:
-    """Where the points of a vehicle go when its coordinates are small: exact to second order.
+    """Displacements of a vehicle's points as functions of small coordinates, exact to second order.
 
     A body moves by its own coordinates after those of the bodies it rides on, so that an outer turn also turns every
     inner motion: d2p / dq_a dq_b = e_a x dp/dq_b for an outer (or the same) turn a about e_a, 0 for an outer shift.
@@ -55,14 +55,14 @@ class Kinematics:
         self._shifts = _shifts_of(tuple(bodies))
 
     def coordinate(self, body: str, freedom: str) -> np.ndarray:
-        """Row (n,) that picks one coordinate out of q, zeros where the body does not have it."""
+        """Row (n,) that selects one coordinate from q; zeros if the body does not have it."""
         row = np.zeros(self.size)
         if (body, freedom) in self._index:
             row[self._index[body, freedom]] = 1.0  # type: ignore[index]
         return row
 
     def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n): displacement of a point (m) by the coordinates, read-only; zeros on the ground, None."""
+        """Displacement (3, n) of a point (m) per coordinate, read-only; zeros on the ground, None."""
         x, y, z = point
         place = body, (x, y, z)
         if place not in self._shifts:
@@ -78,7 +78,7 @@ class Kinematics:
         return columns
 
     def turn(self, body: str) -> np.ndarray:
-        """(3, n): small rotation of a body (rad) by the coordinates."""
+        """Small rotation (3, n) of a body (rad) per coordinate."""
         columns = np.zeros((3, self.size))
         for _, freedom, i in self._motions(body):
             along = FREEDOMS.index(freedom)
@@ -87,7 +87,7 @@ class Kinematics:
         return columns
 
     def bend(self, body: str | None, point: Vector) -> np.ndarray:
-        """(3, n, n): second derivatives of a point (m) by the coordinates."""
+        """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
         first = self.shift(body, point)
         second = np.zeros((3, self.size, self.size))
         motions = self._motions(body)
@@ -99,7 +99,7 @@ class Kinematics:
         return second
 
     def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
-        """(3, n): change of an axis that is fixed in a body, by the coordinates; zeros for the space, None."""
+        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for the space, None."""
         return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
 
     def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
@@ -114,7 +114,7 @@ class Kinematics:
         return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], first[1]), bent, 1))
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
-        """Coordinates that move a body, from the ground outwards: (the body that has it, freedom, index)."""
+        """Coordinates that move a body, from the ground outwards: (body that has the coordinate, freedom, index)."""
         if body is None:
             return []
         rider = self._bodies[body]
@@ -124,13 +124,13 @@ class Kinematics:
 
 @lru_cache(maxsize=16)
 def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[End, np.ndarray]:
-    """Displacements (3, n) of points that were asked for, shared by all vehicles of these ``bodies``: name, parent,
-    position and freedoms."""
+    """Cache of points' displacements (3, n), shared by all vehicles with the same ``bodies``: name, parent, position
+    and freedoms."""
     return {}
 
 
 def _check_parallel(vehicle: SpatialVehicle) -> None:
-    """InputError for what the linear equations do not have."""
+    """InputError for features of the vehicle that the linear equations do not support."""
     turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
     if turned is not None:
         raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")
@@ -175,12 +175,13 @@ def linearise(
 
 
 def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
-    """Where the tyres meet the road."""
+    """Positions of the tyres' contacts with the road."""
     return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
 def outputs(vehicle: SpatialVehicle, motion: Kinematics) -> tuple[Output, ...]:
-    """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
+    """``Output`` of every output: from the ``motion`` of points (possibly an engine's), and the slopes of the springs
+    at rest."""
     parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
@@ -199,7 +200,7 @@ def mass(vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def slopes_at_rest(spring: SpringDamper) -> Gains:
-    """Stiffness (N/m) and damping (N s/m) of small motion: the lines, the curves' slopes and the friction's."""
+    """Stiffness (N/m) and damping (N s/m) for small motion: linear terms, and slopes of curves and friction at rest."""
     travel, rate = spring.travel_force, spring.rate_force
     return (
         spring.stiffness + (travel.slope_at_rest() if travel else 0.0),
@@ -208,8 +209,8 @@ def slopes_at_rest(spring: SpringDamper) -> Gains:
 
 
 class Preloads(NamedTuple):
-    """F0 of every spring-damper (N), bar (N m) and joint element (N, N m) by name, and of every tyre (N) by name: 0
-    without gravity."""
+    """Static forces F0 by name: of spring-dampers (N), bars (N m), joint elements (N, N m) and tyres (N); all 0 without
+    gravity."""
 
     parts: dict[str, float]
     tyres: dict[str, float]
@@ -252,7 +253,7 @@ def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
 
 
 def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
-    """Spring-dampers, bars and joint elements by name."""
+    """Rows and gains of spring-dampers, bars and joint elements, by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
         ends = motion.shift(spring.second_body, spring.second_point) - motion.shift(
@@ -268,13 +269,13 @@ def _parts_by_name(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[s
 
 
 def _joint_row(motion: Kinematics, element: JointElement) -> np.ndarray:
-    """Row (n,) of a joint element's d, which is linear in the coordinates."""
+    """Row (n,) of factors in the displacement d of a joint element, which is linear in the coordinates."""
     places = zip(element.coordinates, element.factors, strict=True)
     return np.asarray(sum(factor * motion.coordinate(*place) for place, factor in places))
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
-    """Row of the angle of a bar, whose upright turns with its frame."""
+    """Row (n,) of factors in the twist angle of a bar, whose vertical direction turns with its frame."""
     risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
     turning = np.subtract(bar.point_right, bar.point_left) @ motion.turned_axis(bar.frame, (0.0, 0.0, 1.0))
     rolls = 0.0 if bar.frame == bar.body else motion.coordinate(bar.body, "rx")
@@ -298,7 +299,8 @@ def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
 
 
 def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
-    """Stiffness that weights and preloads have because their arms turn: -sum of force times second derivative."""
+    """Geometric stiffness (n, n) from weights and preloads whose lever arms change: -sum of force times second
+    derivative."""
     total = np.zeros((motion.size, motion.size))
     if not vehicle.gravity:
         return total
@@ -319,7 +321,7 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
 def _speed_forces(
     vehicle: SpatialVehicle, motion: Kinematics, speed: float | None, damping: np.ndarray, stiffness: np.ndarray
 ) -> None:
-    """Add side forces and drag in place."""
+    """Add the contributions of side forces and drag to damping and stiffness in place."""
     if not vehicle.side_forces and not vehicle.drags:
         return
     if speed is None or not speed > 0:
@@ -387,9 +389,9 @@ def _is_angle(element: JointElement) -> bool:
 
 
 def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> LinearVehicle:
-    """M, D, K and outputs in what coordinates r are left, q = N r, of a vehicle without limits; M may be singular.
+    """Linear vehicle in the remaining coordinates r with q = N r; the mass matrix may be singular.
 
-    mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where nothing is left that could move.
+    mass_matrix : (n, n) of ``massless``; N : (n, r) of ``free``. InputError where no coordinate is left.
     """
     if not N.size:
         raise InputError("", "effects", None, "nothing is left that could move")
@@ -411,7 +413,7 @@ def limited(linear: LinearVehicle, mass_matrix: np.ndarray, N: np.ndarray) -> Li
 
 
 def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
-    """The mass matrix (n, n) without that of these bodies; rounding leaves no trace of them."""
+    """Mass matrix (n, n) without the given bodies; no rounding residue of them remains."""
     light = tuple(
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
     )
@@ -419,7 +421,8 @@ def massless(vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
 
 
 def free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
-    """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
+    """Matrix N (n, r) of the remaining motions: unit vectors where only coordinates are locked, else a basis of motions
+    that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()
     kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
     if not limits.rigid:

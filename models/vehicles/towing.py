@@ -5,16 +5,17 @@ from models.vehicles.spatial_linear import Preloads
 
 
 def hitch_load(vehicle: SpatialVehicle, preloads: Preloads, towed: str) -> float:
-    """Static load (N, downwards) of a towed body, and of all that it carries and tows, on its hitch.
+    """Static load (N, downwards) on the hitch from a towed body and all bodies that it carries and tows.
 
-    preloads : of the vehicle under its gravity, whose tyres bear the rest of their weight.
+    preloads : of the vehicle under its gravity; tyres carry the other part of the weight.
     """
     weight = sum(body.mass for body in vehicle.bodies if towed in vehicle.chain(body.name)) * vehicle.gravity
     return weight - sum(preloads.tyres[tyre.name] for tyre in vehicle.tyres if towed in vehicle.chain(tyre.body))
 
 
 def hitch_line(vehicle: SpatialVehicle, preloads: Preloads, towed: str) -> str:
-    """Text on a towed body: what tows it, where and how it turns there, and what it weighs on its hitch (N)."""
+    """Text on a towed body: which body tows it, position and freedoms of its hitch, and static load on the hitch
+    (N)."""
     hitch, load = vehicle.body(hitch_of(towed)), hitch_load(vehicle, preloads, towed)
     x, y, z = hitch.position
     towing = vehicle.chain(towed)[2]

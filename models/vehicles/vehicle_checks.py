@@ -12,7 +12,7 @@ GROUND = "the ground"
 
 
 def check(vehicle: SpatialVehicle, file: str) -> None:
-    """Raise InputError that names the entry which makes the vehicle impossible."""
+    """Raise InputError with the name of the entry that makes the vehicle impossible."""
     _bodies(vehicle, file)
     _connected(vehicle, file)
     _inert(vehicle, file)
@@ -35,7 +35,8 @@ def _bodies(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _connected(vehicle: SpatialVehicle, file: str) -> None:
-    """Every body reaches the ground through springs, tyres and bars, and none that moves hangs on its joint alone."""
+    """Require that springs, tyres and bars connect every body to the ground, and that no moving body is held by its
+    joint alone."""
     beside = defaultdict[str, set[str]](set)
     for first, two in _links(vehicle):
         beside[first].add(two)
@@ -66,7 +67,8 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
 
 
 def _inert(vehicle: SpatialVehicle, file: str) -> None:
-    """Every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive definite."""
+    """Require that every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
+    definite."""
     matrix, coordinates = mass(vehicle), vehicle.coordinates()
     for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
         if inertia <= 0:
@@ -81,7 +83,7 @@ def _inert(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _movable(vehicle: SpatialVehicle, file: str) -> None:
-    """A tyre moves up and down, a chassis with side forces sideways."""
+    """Require that every tyre can move vertically, and a chassis with side forces laterally."""
     motion = Kinematics(vehicle)
     for tyre in vehicle.tyres:
         if not motion.shift(tyre.body, tyre.point)[2].any():
@@ -93,7 +95,7 @@ def _movable(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _towed(vehicle: SpatialVehicle, file: str) -> None:
-    """Towed bodies have wheels, and so has the vehicle that tows them."""
+    """Require that every towed body, and the vehicle that tows it, has wheels."""
     on_wheels = {vehicle.towed_under(tyre.body) for tyre in vehicle.tyres}
     for name in vehicle.towed:
         if name not in on_wheels:

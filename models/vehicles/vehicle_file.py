@@ -76,7 +76,7 @@ def load_vehicle(
 
 
 def vehicle_path(name: str, folder: str | Path = ".", file: str = "", place: str = "") -> Path:
-    """Where the file of a vehicle is, which ``load_vehicle`` reads; raises InputError."""
+    """Path of the file that ``load_vehicle`` reads for a vehicle; raises InputError."""
     if not name.endswith(".toml"):
         if name not in shipped():
             raise InputError(file, place, name, "no such vehicle; a file of your own ends in .toml or .xml", shipped())
@@ -90,7 +90,7 @@ def build_vehicle(table: Mapping[str, Any], file: str) -> SpatialVehicle:
 
 
 def _read(table: Mapping[str, Any], file: str) -> VehicleTable:
-    """The tables; a fault within a list of tables is told with the entry's own name."""
+    """The checked tables. An error inside a list of tables is reported with the name of the entry."""
     try:
         return read(VehicleTable, table, file)
     except InputError as error:
@@ -109,7 +109,7 @@ def _place_of_key(table: str, entry: object, key: str = "") -> str:
 
 
 class _Builder:
-    """Turns the tables of one file into the parts of a vehicle."""
+    """Builds the parts of a vehicle from the tables of one file."""
 
     def __init__(self, tables: VehicleTable, file: str) -> None:
         self.tables, self.file = tables, file
@@ -159,7 +159,7 @@ class _Builder:
         return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
 
     def _require(self, right: Any, place: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
-        """InputError unless something is right."""
+        """Raise InputError unless the condition ``right`` holds."""
         if not right:
             raise InputError(self.file, place, value, allowed, tuple(choices))
 
@@ -178,7 +178,8 @@ class _Builder:
         return self._known_name(place, name, "body", tuple(self.bodies))
 
     def _bodies(self) -> dict[str, Body]:
-        """Parents before their children, otherwise as the file has them, then the occupants of the seats."""
+        """Bodies with parents before their children, otherwise in the order of the file; then the occupants of the
+        seats."""
         waiting = {body.name: body for body in self.tables.bodies}
         names, done = tuple(waiting), dict[str, Body]()
         for body in self.tables.bodies:
@@ -202,7 +203,7 @@ class _Builder:
         return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
 
     def _hitch(self, body: Body, point: Vector) -> Body:
-        """The massless body with the turns of a towed one, about the point where its parent tows it."""
+        """Massless body with the rotations of a towed one, at the point where its parent tows it."""
         place, name = _place_of_key("bodies", body.name), hitch_of(body.name)
         self._require(
             body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
@@ -214,13 +215,13 @@ class _Builder:
         return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, name: str | None) -> str | None:
-        """The towed body that carries a body, or is it."""
+        """The towed body that is, or carries, the given body."""
         while name is not None and name not in self.towed:
             name = self.bodies[name].parent
         return name
 
     def _axles(self) -> dict[str, AxleTable]:
-        """Axles by name: each behind the one before, and with a tyre."""
+        """Axles by name, in order from the front; each must have a tyre."""
         axles = {axle.name: axle for axle in self.tables.axles}
         for before, axle in pairwise(axles.values()):
             allowed = f"axles are listed from the front: must lie behind {before.name!r}, below {before.x:g} m"
@@ -255,14 +256,14 @@ class _Builder:
         )
 
     def _frame(self, place: str, name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
-        """The body that a table names as its frame, or else the towed one that carries both ends, if any."""
+        """The frame: the body that the table names, else the towed body that carries both ends, if any."""
         if name is not None:
             return self._body(f"{place}.frame", name)
         first, second = map(self._towed_under, end_bodies)
         return first if first == second else None
 
     def _two_bodies(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
-        """The two bodies, None for the ground."""
+        """The two bodies that a part connects; None for the ground."""
         (first, second), place = bodies, f"{place}.bodies"
         self._require(first != second, place, bodies, "connects a body with itself")
         self._require(first != GROUND, place, bodies, "name the ground second")
@@ -275,7 +276,7 @@ class _Builder:
         return _vector(first), _vector(second)
 
     def _axis(self, place: str, spring: SpringTable, points: tuple[Vector, Vector]) -> Vector:
-        """Unit direction: as given, or from the second point to the first, or up."""
+        """Unit vector of the axis: the given one, else from the second point to the first, else upwards."""
         if spring.direction is not None:
             return self._unit(f"{place}.direction", spring.direction)
         apart = np.subtract(*points)
@@ -310,7 +311,8 @@ class _Builder:
                 yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat: SeatTable) -> SpringDamper:
-        """Carrier below, occupant above: turned round so that force is positive in compression."""
+        """Spring of a seat, with the occupant as first and the carrier as second body, so that force is positive in
+        compression."""
         carrier = self._body(_place_of_key("seats", seat.name, "body"), seat.body)
         at = _vector(seat.position)
         law, frame = (seat.stiffness, seat.damping), self._towed_under(carrier)
@@ -338,7 +340,7 @@ class _Builder:
         return AntiRollBar(bar.name, bar.body, *ends, bar.stiffness, bar.damping, frame)
 
     def _side_forces(self) -> tuple[SideForce, ...]:
-        """Side forces of the tyres on the chassis, which guides the wheels sideways."""
+        """Side forces of the tyres. They act on the chassis, which guides the wheels laterally."""
         rolling, chassis = [tyre for tyre in self.tables.tyres if tyre.cornering], self.tables.chassis
         for axle in (axle for axle in self.tables.axles if axle.roll_steer):
             place = _place_of_key("axles", axle.name, "roll_steer")

@@ -51,7 +51,8 @@ FIRST = 0
 
 
 def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
-    """Sign of the way in which the wheel's acceleration (m/s^2) ends a phase, and the level at which it does."""
+    """Sign and level (m/s^2) of the threshold that ends a phase: +1 if the wheel's acceleration must rise to it, -1 if
+    fall."""
     if phase in (1, 2):
         return 1.0, settings.e1 if phase == 1 else settings.e2
     return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
@@ -79,7 +80,8 @@ class _Logic:
         return self._pressure
 
     def _rolls_on(self, slip: float, gains: float) -> bool:
-        """Whether a wheel gains speed no more, or rolls with no pressure left."""
+        """Whether the wheel no longer gains speed in phase 2, or has no brake pressure left and little slip in phase
+        1."""
         if self._phase == 1:
             return self._pressure == 0.0 and slip <= self._settings.deep
         return self._phase == 2 and gains <= self._settings.e4

@@ -80,7 +80,7 @@ class Frozen:
 
     @cached_property
     def driven(self) -> Driven:
-        """The frozen vehicle as compiled functions take it."""
+        """The wheel as a ``Driven``, the form that compiled functions take."""
         tables, (j, q) = stacked([self.tyre]), cell_and_share(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
@@ -102,7 +102,8 @@ def rim(state, driven):
 
 @njit(cache=True, error_model="numpy")
 def go_on(state, rate, time, driven):
-    """The state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
+    """State after a time (s) in which pressure changes at a constant rate (bar/s) and reaches no corner of the
+    hysteresis loop."""
     pressure = max(state.pressure + rate * time, 0.0)
     after = torque(0, pressure, state.torque, driven.brakes)
     drive = StepInput(driven.vehicle_speed, driven.vehicle_speed, state.torque, after, time)
@@ -112,7 +113,8 @@ def go_on(state, rate, time, driven):
 
 @njit(cache=True, error_model="numpy")
 def corner(state, rate, brakes):
-    """Time (s) to the next corner of the brake's loop, or until there is no pressure; infinite if there is none."""
+    """Time (s) until the pressure reaches the next corner of the brake's hysteresis loop, or zero pressure; else
+    infinite."""
     first = math.inf
     if rate > 0.0:
         first = (brakes.push_out[0] + state.torque / brakes.rising[0] - state.pressure) / rate
@@ -127,15 +129,16 @@ def corner(state, rate, brakes):
 
 @njit(cache=True, error_model="numpy")
 def ended(state, sign, level, back, driven):
-    """MET where sign (rim's acceleration - level) is 0 or more, BACK where it is at most ``back`` (m/s^2), else -1."""
+    """MET if the rim's acceleration has passed ``level`` in the direction ``sign``, BACK if it is at most ``back``
+    (m/s^2), else -1."""
     now = rim(state, driven)
     return MET if sign * (now - level) >= 0.0 else BACK if now <= back else -1
 
 
 @njit(cache=True, error_model="numpy")
 def phase(state, rate, sign, level, back, step, driven):
-    """The state at the end of a phase from this one, at a rate of pressure (bar/s), by steps (s), and how it
-    ``ended``.
+    """Integrate one phase from ``state`` at a constant rate of pressure (bar/s) in steps (s): the last state, and how
+    the phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
@@ -163,8 +166,8 @@ def phase(state, rate, sign, level, back, step, driven):
 
 @dataclass(frozen=True)
 class Cycle:
-    """A limit cycle: period (s), durations (5,) of phases 1 to 5 (s), mean force by the tyre's largest one, and the
-    slips (6,) at the start of every phase and at the end."""
+    """A limit cycle: period (s), durations (5,) of phases 1 to 5 (s), ratio of the mean tyre force to the largest one,
+    and slips (6,) at the start of each phase and at the end of the cycle."""
 
     period: float
     durations: tuple[float, ...]
@@ -173,13 +176,13 @@ class Cycle:
 
 
 def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most: int = 60) -> Cycle:
-    """Limit cycle of the continuous controller from a rolling wheel, by steps of at most ``step`` (s).
+    """Limit cycle of the continuous controller, reached from a wheel that rolls freely, in steps of at most ``step``
+    (s).
 
-    The brake is applied fast, as the driver does, and so the first release is another one than those of the cycle: a
-    phase 2 in which the wheel gains speed no more goes over to phase 5, as the controller does, and a wheel that this
-    locks is released.
+    The driver applies the brake fast, so the first release differs from later ones. If the wheel stops gaining speed in
+    phase 2, phase 5 follows, as in the controller; a wheel that locks by this is released.
 
-    Raises RunFailed if a phase does not end, the wheel locks while it is not released, or ``most`` cycles do not close.
+    Raises RunFailed if a phase does not end, a wheel locks while it is not released, or no cycle closes among ``most``.
     """
     state, _ = _state_at_end(frozen.rolling(), 0, controller, step, frozen)
     for _ in range(most):
@@ -196,7 +199,7 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
 
 
 def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
-    """The ``Cycle`` of the states at its six switches."""
+    """The ``Cycle`` computed from the wheel's states at the six switches between phases."""
     last, slips = switch_states[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in switch_states]
     durations = tuple(np.diff([state.time for state in switch_states]).tolist())
     return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
@@ -205,7 +208,7 @@ def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
 def _state_at_end(
     state: WheelState, number: int, controller: FivePhase, step: float, frozen: Frozen
 ) -> tuple[WheelState, int]:
-    """The state at the end of a phase, and whether that is MET or BACK; raises RunFailed."""
+    """State at the end of a phase, and whether it ended as MET or as BACK; raises RunFailed."""
     sign, level = end_of_phase(number, controller)
     back = controller.e4 if number == CLIMB else -math.inf
     state, end = phase(state, rate(number, controller), sign, level, back, step, frozen.driven)
@@ -216,7 +219,8 @@ def _state_at_end(
 
 
 def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5) -> Cycle:
-    """Mean of ``cycles`` cycles after ``skip`` others of the controller as it runs; durations and slips are empty.
+    """Mean over ``cycles`` cycles of the sampled controller, after the first ``skip`` ones; no durations and slips are
+    given.
 
     Raises RunFailed if it does not cycle.
     """

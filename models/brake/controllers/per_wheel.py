@@ -23,11 +23,11 @@ SLIP = (0.0, 1.0)
 
 
 class Logic(Protocol):
-    """Decides for one wheel, or for one axle by the slower of its wheels."""
+    """Decides for one wheel, or for one axle on the basis of its slower wheel."""
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        """State of a valve, or a pressure (bar), from the wheel's slip, its acceleration less that of the vehicle
-        (m/s^2), the vehicle's speed (m/s) and the supply (bar)."""
+        """Valve state or pressure (bar), from the wheel's slip, its acceleration relative to the vehicle's (m/s^2), the
+        vehicle's speed (m/s) and the supply pressure (bar)."""
         ...
 
 
@@ -46,7 +46,8 @@ class Common:
     period: float = SAMPLE
 
     def governed_by(self, logic: Callable[[Any], Logic], pressures: bool = False) -> None:
-        """Have a logic of its own decide for each wheel or axle; ``pressures`` tells whether it answers with those."""
+        """Set up one ``logic`` per wheel or axle; ``pressures`` is whether it answers with pressures instead of valve
+        states."""
         self._loop = PerWheel(self.wheels, self, logic, pressures)
 
     def sample(self, sample: Sample) -> Command:
@@ -54,9 +55,10 @@ class Common:
         return self._loop.command(sample)
 
     def check(self, **bounds: tuple[float, float]) -> None:
-        """Refuse what is no number, or is outside the bounds of its name: above the first, up to the second.
+        """Refuse a parameter that is no number or outside its bounds: it must be above the first and at most the
+        second.
 
-        Raises InputError; for axles that are none, ``PerWheel`` does.
+        Raises InputError. Axles that do not exist are refused by ``PerWheel``.
         """
         for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST_FLOAT, 100.0), **bounds}.items():
             value, place = getattr(self, name), f"controller.parameters.{name}"
@@ -70,7 +72,8 @@ class Common:
 
 
 class PerWheel:
-    """The loop over wheels of every controller; ``pressures`` tells whether its logics answer with those."""
+    """The loop over wheels that all controllers share; ``pressures`` is whether they answer with pressures, not valve
+    states."""
 
     def __init__(self, wheels: int, common: Common, logic: Callable[[Any], Logic], pressures: bool) -> None:
         for axle in common.select_low:
@@ -105,7 +108,7 @@ class PerWheel:
         return self._said(out)
 
     def _mean_slowing(self, speed: float) -> float:
-        """Acceleration of the vehicle (m/s^2), its mean over the last ``MEMORY`` seconds or so."""
+        """Mean acceleration of the vehicle (m/s^2), smoothed over about ``MEMORY`` seconds."""
         if self._speed == self._speed:
             latest = (speed - self._speed) / self._common.period
             self._slowing += (latest - self._slowing) * min(self._common.period / MEMORY, 1.0)
@@ -123,7 +126,7 @@ class PerWheel:
 
 @dataclass
 class SpeedEstimate:
-    """Estimate of the vehicle's speed (m/s) by samples of the wheel speeds.
+    """Estimate of the vehicle's speed (m/s) from sampled wheel speeds.
 
     sample : s between two of them; first : slope (m/s^2) until one is learnt, chosen: with 10 a slip bang-bang takes
     10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry road, as it lets
@@ -145,7 +148,7 @@ class SpeedEstimate:
         self._peak = math.nan
 
     def after(self, wheels: Sequence[float]) -> float:
-        """Estimate at one more sample of the wheels' speeds (m/s)."""
+        """Estimated speed (m/s) of the vehicle after one more sample of the wheels' speeds (m/s)."""
         fastest = max(wheels)
         if self._speed != self._speed:
             self._speed = self._peak = fastest
@@ -154,7 +157,7 @@ class SpeedEstimate:
         return self._speed
 
     def _learn(self, fastest: float) -> None:
-        """Take the slope from the last two moments at which the fastest wheel turned fastest."""
+        """Determine the slope of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
         if self._rising and fastest < self._fastest and self._since >= self.apart:
             slope = self.margin * (self._peak - self._fastest) / self._since

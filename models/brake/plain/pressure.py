@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 
 @dataclass(eq=False)
 class Pressures:
-    """All that was commanded, and what ``air`` holds meanwhile, moved in place; sample (s)."""
+    """The brake's air system: commands so far, and its state ``air``, which is updated in place; sample (s)."""
 
     chambers: Chambers
     brakes: Brakes
@@ -29,7 +29,7 @@ class Pressures:
     commands: list[np.ndarray] = field(default_factory=list)
 
     def by_valves(self, valves: np.ndarray, torques: np.ndarray) -> None:
-        """Fill ``torques`` (n + 1, W), those at the ends of the n steps of the next sample under valves (W,)."""
+        """Fill ``torques`` (n + 1, W), at the ends of the n steps of the next sample, for valve states (W,)."""
         self.commands.append(valves.copy())
         torques[0], steps = self.air.torque, len(torques) - 1
         step = self.sample / steps
@@ -40,23 +40,23 @@ class Pressures:
             torques[n + 1] = self.air.torque
 
     def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
-        """Pressures (W,) in bar at once, for the next sample."""
+        """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``torques``."""
         self.air.pressure[:] = pressures
         self._follow()
         torques[:] = self.air.torque
 
     def _arrivals(self, time: float) -> list[float]:
-        """Times (s) at which commands reach the chambers, from a time (s) in the latest sample on."""
+        """Times (s) at which each command reaches the chambers, counted from ``time`` (s) in the latest sample."""
         latest = len(self.commands) - 1
         return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
     def _reached(self, time: float) -> np.ndarray:
-        """The command that holds at a time (s) in the latest sample."""
+        """The command that is effective in the chambers at a time (s) in the latest sample."""
         known = [arrived for arrived, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
     def _press(self, valves: np.ndarray, time: float) -> None:
-        """Go on for a time (s) with valves (W,) as they are."""
+        """Update pressures and torques over a time (s) with constant valve states (W,)."""
         chambers, supply, before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
         fills = valves >= APPLY
         to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, before))
@@ -70,7 +70,7 @@ class Pressures:
             self.air.supply[0] -= max(taken, 0.0) / chambers.reservoir
 
     def _follow(self) -> None:
-        """Torques stay between the line on which they rise and that on which they fall."""
+        """Update the torques: each stays between the lines of rising and of falling pressure in the hysteresis loop."""
         pressure, brakes = self.air.pressure, self.brakes
         rising = brakes.rising * np.maximum(pressure - brakes.push_out, 0.0)
         falling = brakes.falling * np.maximum(pressure - brakes.release, 0.0)

@@ -16,7 +16,7 @@ FADING_SPEED, DAMPING, SLOWEST_SPEED = 1.0, 0.7, 1e-9
 def lag_on(
     angle: np.ndarray, speeds: np.ndarray, time: float, length: np.ndarray, slope: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lagging tan of the slip angles (W,) after a time (s), and with the damper's part (W,).
+    """Lagging tan of the slip angles (W,) after a time (s), without and with the damper's part.
 
     angle (W,) : before, NaN where it is to begin as in steady motion; speeds (2, W) : along and across (m/s); length
     (W,) : m; slope : largest cornering coefficient (1/rad).
@@ -29,15 +29,15 @@ def lag_on(
 
 
 def _lagging_slip(angle: float, speed: float, across: float, length: float, time: float) -> float:
-    """sigma a' = v - |u| a over a time (s)."""
+    """Solution of sigma a' = v - |u| a after a time (s), for the lagging slip a and the relaxation length sigma."""
     rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
     return float((expm(rates) @ (angle, 1.0))[0])
 
 
 @dataclass(eq=False)
 class LaggingTyres:
-    """Tyres that lag: lengths (W,) in m, slope (1/rad), angles (W,) as tan, the time (s) by which they are behind the
-    motion, and what slip angles are taken by, the damper's part included."""
+    """Tyres with relaxation: lengths (W,) in m, slope (1/rad), lagging angles (W,) as tan, and the time (s) by which
+    these lie behind the motion. ``taken`` holds the tan of the slip angles that forces use, with the damper's part."""
 
     length: np.ndarray
     slope: float
@@ -46,11 +46,13 @@ class LaggingTyres:
     taken: np.ndarray | None = None
 
     def reach(self, speeds: np.ndarray, half: float) -> None:
-        """Move on to half a step (s) after the speeds (2, W) along and across (m/s)."""
+        """Advance the lagging angles to half a step (s) after the motion with speeds (2, W) along and across the wheels
+        (m/s)."""
         self.angle, self.taken = lag_on(self.angle, speeds, self.behind + half, self.length, self.slope)
         self.behind = half
 
     def across(self, i: int, forwards: float) -> float:
-        """Speed (m/s) across wheel i at which it would have its slip angle at a speed (m/s) along it."""
+        """Speed (m/s) across wheel i that corresponds to its lagging slip angle at the speed ``forwards`` (m/s) along
+        it."""
         assert self.taken is not None
         return float(self.taken[i]) * forwards

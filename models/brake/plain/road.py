@@ -7,8 +7,8 @@ from models.brake.surfaces import Road
 
 
 def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surface]:
-    """Surface under each wheel; ways (W, 2, 2) : x, y (m) at the start and at the end of the step, straight between;
-    kinds (W,) : of tyres."""
+    """Surface under each wheel. ways (W, 2, 2) : x, y (m) at the start and at the end of the step, joined by a straight
+    line; kinds (W,) : kind of each wheel's tyre."""
     return [_surface_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
 
 
@@ -28,12 +28,13 @@ def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
 
 
 def _stretch(road: Road, x: float) -> int:
-    """Number of the stretch at x (m): the last that begins at or before it."""
+    """Number of the stretch of road at x (m): the last one that begins at or before x."""
     return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
 
 
 def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) -> np.ndarray:
-    """(W, 2, 2) m: where points of a vehicle are on the ground at both ends of a step (s), if each goes straight on.
+    """Positions (W, 2, 2) in m of a vehicle's points on the ground at both ends of a step (s); each point moves on a
+    straight line.
 
     place, rates (3,) : x, y and heading, and their rates; points (W, 2) : along and across the vehicle (m).
     """
@@ -44,7 +45,8 @@ def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) 
 
 
 def in_row(place: np.ndarray, rates: np.ndarray, reach: np.ndarray, unit: int) -> tuple[np.ndarray, np.ndarray]:
-    """x, y and heading (3,) of a unit's centre, and their rates, from those (2 + U,) of a row of units.
+    """Position x, y and heading (3,) of a unit's centre, and their rates, from the coordinates (2 + U,) of a row of
+    units.
 
     reach (U,) : m, from the first centre to this one along each unit.
     """

@@ -28,8 +28,8 @@ BLINK = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Course of a vehicle over a step: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below
-    which slip angles are those at it."""
+    """What a step of a vehicle needs: its wheels, tyres and road, steer angles (W,) in rad, and the speed ``regular``
+    (m/s) that replaces lower speeds in slip angles."""
 
     on: OnRoad
     steer: np.ndarray
@@ -38,8 +38,8 @@ class Course:
 
 @dataclass(eq=False)
 class Moving:
-    """A vehicle on its way, all moved in place: state (2, n), turning (W,) in rad/s, changes (W,) of the speeds along
-    the wheels (m/s^2), reports (W, 7), accelerations (2 + U,) of its units, and what lags of its tyres."""
+    """State of a moving vehicle, updated in place: state (2, n), wheel rotation ``turning`` (W,) in rad/s, changes (W,)
+    of the speeds along the wheels (m/s^2), reports (W, 7), accelerations (2 + U,) of its units, and the tyres' lag."""
 
     state: np.ndarray
     turning: np.ndarray
@@ -50,7 +50,7 @@ class Moving:
 
 
 class Steps:
-    """Steps (s) of a vehicle on its suspension along a course."""
+    """Time steps (s) of a vehicle on its suspension along a course."""
 
     def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
         self.vehicle, self.course, self.step = vehicle, course, step
@@ -80,7 +80,7 @@ class Steps:
         return self._status(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
@@ -97,11 +97,12 @@ class Steps:
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
 
     def _of_units(self, all_values: np.ndarray) -> np.ndarray:
-        """(2 + U,) of all coordinates' values: x and y, and headings, of what is towed with all yaws before it."""
+        """Values (2 + U,) of the units, x, y and headings, from those of all coordinates. The heading of a towed unit
+        is the sum of the yaw coordinates up to it."""
         return np.concatenate((all_values[:2], np.cumsum([all_values[2], *all_values[self.vehicle.turns]])))
 
     def _under(self, state: np.ndarray, time: float) -> list[Surface]:
-        """Surfaces under the wheels, which go straight on for a time (s)."""
+        """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
         plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
@@ -121,7 +122,7 @@ class Steps:
         torques: np.ndarray,
         time: float,
     ) -> WheelForces:
-        """Forces over a time (s) by loads and motion at contacts; the reports are filled."""
+        """Constant wheel forces over a time (s), from loads and motion at the contacts; fills the wheels' reports."""
         course = self.course
         for i, contact in enumerate(contacts):
             motion = WheelMotion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
@@ -134,7 +135,8 @@ class Steps:
         return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
 
     def rests(self, moving: Moving) -> float | None:
-        """Time (s) within the step at which the plane motion has least energy, where it was about to end in it."""
+        """Time (s) within the step at which the kinetic energy of the plane motion is least, if the vehicle is about to
+        stop; else None."""
         plane, v, a = self.course.on.plane, self._of_units(moving.state[1]), moving.accelerations
         weights = np.array([plane.masses.sum(), plane.masses.sum(), *plane.inertias])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))

@@ -21,7 +21,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def round_the_vertical(vector: np.ndarray) -> np.ndarray:
-    """(3,) the upward unit vector x a vector."""
+    """Vector product (3,) of the upward unit vector and a vector."""
     return np.array([-vector[1], vector[0], 0.0])
 
 
@@ -76,12 +76,12 @@ class Suspension:
         return self.bodies.size
 
     def contacts(self, motion: PlainMotion, steer: np.ndarray) -> list[TyreContact]:
-        """Contact of every tyre, whose wheels are steered (W,) in rad."""
+        """``TyreContact`` of every tyre, for wheels steered by angles (W,) in rad."""
         hubs = motion.at(self._hubs)
         return [self._contact(i, hub, motion, float(steer[i])) for i, hub in enumerate(hubs)]
 
     def _heading(self, i: int, motion: PlainMotion) -> np.ndarray:
-        """Axes (3, 3) of the body to whose heading a wheel keeps: the carrier, or a towed body, about the vertical."""
+        """Axes (3, 3) that define a wheel's heading: those of the carrier, or a towed body's turned upright."""
         if not self._towed[i]:
             carrier: np.ndarray = motion.axes(self._carrier)[PLACE]
             return carrier
@@ -102,7 +102,7 @@ class Suspension:
         return TyreContact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
 
     def _load(self, i: int, hub: np.ndarray) -> float:
-        """Load (N) of a tyre that never pulls, neither by its spring nor by its damper."""
+        """Load (N) of a tyre whose spring and damper together never pull."""
         tyre = self.tyres[i]
         elastic = self.loads[i] - tyre.stiffness * (hub[PLACE, 2] - tyre.point[2])
         return float(max(elastic - tyre.damping * hub[RATE, 2], 0.0)) if elastic > 0.0 else 0.0
@@ -120,14 +120,16 @@ class Suspension:
         return accelerations
 
     def _by_air(self, motion: PlainMotion) -> np.ndarray:
-        """Generalised forces (n,) of drag at the chassis' centre, against its speed where the vehicle heads."""
+        """Generalised forces (n,) of aerodynamic drag at the chassis' centre, opposite to its speed along the vehicle's
+        heading."""
         centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
         speed = float(centre[RATE] @ ahead)
         forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
         return forces
 
     def _by_tyres(self, motion: PlainMotion, constant: WheelForces) -> np.ndarray:
-        """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to what carries them."""
+        """Generalised forces (n,) of all tyres; torques of brakes and locked wheels act on the bodies that carry the
+        wheels."""
         hubs, total = motion.at(self._hubs), np.zeros(self.size)
         for i, contact in enumerate(self.contacts(motion, constant.steer)):
             creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
@@ -139,8 +141,8 @@ class Suspension:
         return total
 
     def liveliness(self) -> float:
-        """Largest rate (m/s^2) at which side forces of slope 1 at a speed of 1 m/s damp a motion in the design
-        position."""
+        """Largest damping rate (m/s^2) of a motion in the design position by side forces of cornering coefficient 1 at
+        a speed of 1 m/s."""
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
         across = np.array([[sliding.sliding for sliding in self.contacts(motion, straight)] for motion in motions])

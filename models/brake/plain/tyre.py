@@ -17,7 +17,7 @@ NEARLY = 0.98
 
 
 def weights(nodes: np.ndarray, value: float) -> np.ndarray:
-    """Weight (n,) of each node at a value, the end's one beyond it."""
+    """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
     inside = float(np.clip(value, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
     weights_at = np.zeros(nodes.size)
@@ -31,7 +31,7 @@ def weights(nodes: np.ndarray, value: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface under a wheel: numbers of two tables, and the share of the second."""
+    """Surface under a wheel: numbers of two friction tables, and the share of the second one in the mixture."""
 
     first: int
     second: int
@@ -48,19 +48,19 @@ class Friction:
     load: float
 
     def mixed(self, values: np.ndarray) -> np.ndarray:
-        """Values on the surface, mixed from values (t, ...) of all tables."""
+        """Values on the surface, a mixture of the two tables' values among those of all tables (t, ...)."""
         share = self.under.share
         mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
         return mixed
 
     def ahead(self) -> Force:
-        """Force along the wheel by slip."""
+        """Force along the wheel as a function of slip."""
         t = self.tables
         mu = np.einsum("a,f,tafs->ts", weights(t.angles, self.angle), weights(t.loads, self.load), t.mu_x)
         return Force(t.slips, self.load * self.mixed(mu))
 
     def aside(self, slip: float) -> float:
-        """Size (N) of the force across the wheel at a slip."""
+        """Magnitude (N) of the force across the wheel at a slip."""
         t, by_angle = self.tables, weights(self.tables.angles, self.angle)
         g = np.einsum("a,s,tas->t", by_angle, weights(t.slips, abs(slip)), t.g)
         h = np.einsum("a,f,taf->t", by_angle, weights(t.loads, self.load), t.h)
@@ -69,9 +69,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class WheelMotion:
-    """Motion of a wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds
-    along and across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those
-    at it."""
+    """Motion of a wheel's centre: speed along the wheel at the start of a step and its mean rate of change (m/s,
+    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``regular`` (m/s) that
+    replaces lower ones."""
 
     start: float
     rate: float
@@ -81,17 +81,17 @@ class WheelMotion:
 
     @property
     def sense(self) -> float:
-        """1 forwards, -1 backwards."""
+        """Direction of motion at the step's start: 1 forwards, -1 backwards."""
         return 1.0 if self.start >= 0.0 else -1.0
 
     @property
     def forwards(self) -> float:
-        """Speed (m/s) in the sense in which it started, at least 0."""
+        """Speed (m/s) in the direction in which the wheel started, at least 0."""
         return max(self.sense * self.along, 0.0)
 
     @property
     def angle(self) -> float:
-        """Size (rad) of the slip angle."""
+        """Magnitude (rad) of the slip angle."""
         return math.atan2(abs(self.across), max(self.forwards, self.regular))
 
 
@@ -108,8 +108,8 @@ class Braked:
 
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
-    """(7,) mean forces along and across (N), load (N), mean slip, slip angle (rad), time locked (s), turning (rad/s)
-    at the end: the columns of ``plane_step``."""
+    """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
+    mean slip, slip angle (rad), time locked (s), rotation (rad/s) at the end."""
     friction, sense = Friction(tables, surface, motion.angle, load), motion.sense
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
@@ -121,7 +121,8 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
 
 
 def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
-    """Sizes (2,) of the forces along and across, turned against the sliding of a wheel that is nearly locked."""
+    """Sizes (2,) of the forces along and across the wheel, turned towards its sliding direction as the wheel comes near
+    to locking."""
     sliding = np.array([motion.forwards, abs(motion.across)])
     speed = float(np.hypot(*sliding))
     if slip <= NEARLY or speed == 0.0:

@@ -20,7 +20,8 @@ LOCKED = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """Tyre force by slip: slips (s,) from 0 to 1 and forces (s,) in N there; odd in the slip."""
+    """Tyre force as a function of slip: slips (s,) from 0 to 1, and the forces (s,) in N at these; the force is odd in
+    the slip."""
 
     slips: np.ndarray
     forces: np.ndarray
@@ -37,8 +38,8 @@ class Force:
 
 @dataclass(frozen=True)
 class WheelStep:
-    """Drive of a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
-    on, linear in time) at both ends, step (s), radius (m), inertia (kg m^2)."""
+    """Input of a wheel over a step: at both ends, speeds of its centre and torques of its brake (linear in time), in
+    m/s and N m, from 0 on; step (s), radius (m), inertia (kg m^2)."""
 
     speeds: tuple[float, float]
     torques: tuple[float, float]
@@ -66,7 +67,7 @@ class WheelStep:
 
     @property
     def gain(self) -> float:
-        """Change of the speed of the centre (m/s^2)."""
+        """Acceleration of the centre (m/s^2), constant over the step."""
         return (self.speed(self.step) - self.speed(0.0)) / self.step
 
 
@@ -113,13 +114,13 @@ def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[floa
 
 
 def _pass(progress: WheelProgress, time: float, force: float, slip: float) -> None:
-    """Let a time (s) pass at a constant force (N) and slip."""
+    """Advance the wheel's progress by a time (s) at a constant force (N) and slip."""
     progress.time, progress.slip = progress.time + time, slip
     progress.impulse, progress.area = progress.impulse + force * time, progress.area + slip * time
 
 
 def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
-    """Whether the brake holds a wheel that stands, now or on the mean of what is left."""
+    """Whether the brake holds a locked wheel, by its torque now or by its mean torque over the remaining step."""
     holds = (
         max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius >= force.sliding
     )
@@ -127,7 +128,7 @@ def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -
 
 
 def _lock(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
-    """A wheel stands until the torque falls below what the road turns it with."""
+    """Advance a locked wheel until the brake torque falls below the torque of the sliding force, or the step ends."""
     needed, time = force.sliding * step_data.radius, step_data.step - progress.time
     if step_data.torques[1] < needed:
         time = (
@@ -138,7 +139,7 @@ def _lock(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
 
 
 def _excess(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
-    """Rate (m/s^2) at which the rim gains on twice the speed of the centre while the road slows it by sliding."""
+    """Rate (m/s^2) of rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
         -step_data.radius
         * (step_data.radius * force.sliding + step_data.mean_torque(progress.time))
@@ -148,12 +149,13 @@ def _excess(step_data: WheelStep, progress: WheelProgress, force: Force) -> floa
 
 
 def _spins(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
-    """Whether the rim is, and stays, more than twice as fast as the centre."""
+    """Whether the rim's speed is above twice the centre's and stays there."""
     return progress.slip < -1.0 or (progress.slip == -1.0 and _excess(step_data, progress, force) > 0.0)
 
 
 def _spin(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
-    """A wheel slides at a slip that counts as -1, to the step's end or until it has this slip; its turning then."""
+    """Advance a wheel that spins at a slip counted as -1, until the step ends or that slip is reached; returns its
+    rotation (rad/s)."""
     turning, excess = (
         step_data.speed(progress.time) * (1.0 - progress.slip) / step_data.radius,
         _excess(step_data, progress, force),
@@ -168,8 +170,8 @@ def _spin(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
 
 
 def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
-    """A wheel turns at a slip between -1 and 1, to the step's end or until it has one of both; momentum gives the mean
-    force."""
+    """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
+    follows from the wheel's momentum."""
     before, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED)
     nodes, forces = force.both_ways()
     kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
@@ -190,7 +192,8 @@ def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
 
 
 def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:
-    """Time (s) that passes, slip then and integral of the slip (s), for ``remaining`` seconds or until the last node.
+    """Time (s) that passes, slip at its end and integral of slip (s), over ``remaining`` seconds or until the last node
+    is reached.
 
     nodes, rates (k,) : the rate (1/s) of the slip is linear between the nodes.
     """

@@ -38,8 +38,8 @@ LONGEST_ERROR_TEXT = 500
 
 
 class ControllerFailed(RunFailed):
-    """A controller did not answer, or not with what can be done. name : one of ``NAMES``; number : of the sample;
-    why : the fault, as a phrase."""
+    """A controller gave no answer, or one that cannot be used. name : one of ``NAMES``; number : of the sample; why :
+    the fault, as a phrase."""
 
     def __init__(self, sample: Sample, name: str, reason: str) -> None:
         reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST_ERROR_TEXT]
@@ -50,7 +50,7 @@ class ControllerFailed(RunFailed):
 def ask(
     controller: Controller, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
-    """A controller's answer, checked; most : largest pressure (bar).
+    """A controller's answer after checks; maximum_pressure : largest pressure (bar) allowed.
 
     Raises ControllerFailed, whatever the controller raises.
     """
@@ -64,7 +64,8 @@ def ask(
 
 
 def raised(error: BaseException) -> str:
-    """Kind and text of an error, and the line of the user's file that raised it or led there."""
+    """Type and text of an exception, and the line of the user's file in which it was raised, or which called the code
+    that raised it."""
     lines = [
         frame
         for frame in extract_tb(error.__traceback__)
@@ -76,7 +77,7 @@ def raised(error: BaseException) -> str:
 
 @dataclass
 class CheckedController:
-    """A controller whose answers are checked before anything is done with them."""
+    """A controller whose answers are checked before they are used."""
 
     inner: Controller
     states: frozenset[int] = STATES
@@ -89,7 +90,7 @@ class CheckedController:
 def checked_answer(
     command: Command, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
-    """The controller's answer, returned if each wheel has one state of its valve or one pressure; raises
+    """The controller's answer, if it has exactly one valve state or one pressure per wheel; else raises
     ControllerFailed."""
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(sample, "wrong frame", "needs either valves or pressures")

@@ -12,7 +12,8 @@ from models.core.errors import InputError
 
 
 def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str, Any], file: str = "") -> Controller:
-    """Controller that ``name`` makes of the number of wheels and its parameters; raises InputError.
+    """Controller made by calling the class or function ``name`` with the number of wheels and parameters; raises
+    InputError.
 
     name : "module:Name", or "file.py:Name" with a path from ``folder``.
     """

@@ -11,7 +11,7 @@ from models.brake.port.socket_port import LOOPBACK
 
 
 def serve(controller: Controller, port: int) -> int:
-    """Answer every question at a port of this machine until the connection is closed; the number of answers."""
+    """Answer every question at a port of this machine until the connection closes; returns the number of answers."""
     count = 0
     with socket.create_connection((LOOPBACK, port)) as link, link.makefile("rb") as reader:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -23,7 +23,7 @@ def serve(controller: Controller, port: int) -> int:
 
 
 def main(name: str, port: str, wheels: str = "4") -> None:
-    """Serve the controller of a name."""
+    """Serve the controller ``name`` at a port of this machine."""
     serve(named_controller(name, Path(), int(wheels), {}), int(port))
 
 

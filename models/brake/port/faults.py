@@ -47,7 +47,7 @@ class Fault(Strict):
 
 @dataclass
 class Faulty:
-    """A controller whose signals and commands pass through faults; fresh for every run."""
+    """A controller whose signals and commands pass through faults; a new one is made for every run."""
 
     inner: Controller
     faults: list[Fault]
@@ -59,7 +59,7 @@ class Faulty:
         self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for signals with faults, themselves with faults."""
+        """The controller's commands for faulty signals; the commands themselves also get their faults."""
         time = 1e-9 * sample.time
         here = [fault for fault in self.faults if fault.holds(time)]
         command = self.inner.sample(sample._replace(wheels=self._signals(sample.wheels, here)))

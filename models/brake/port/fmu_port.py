@@ -20,7 +20,7 @@ from models.core.errors import InputError
 
 @contextmanager
 def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
-    """The controller of an FMU file, unpacked to a folder, for as long as the block lasts; sample: s.
+    """The controller of an FMU file, unpacked into a folder, as a context manager; sample: s.
 
     Raises InputError.
     """
@@ -40,7 +40,7 @@ def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["Fm
 
 @contextmanager
 def _slave(description: Any, folder: str, file: str) -> Iterator[Any]:
-    """The FMU ready for its first step."""
+    """The FMU, instantiated and initialised, as a context manager that frees it."""
     from fmpy.fmi2 import FMU2Slave
 
     try:
@@ -82,7 +82,7 @@ class FmuPort:
         self._get = slave.getInteger if names[f"{self._mode}_1"][1] == "Integer" else slave.getReal
 
     def sample(self, sample: Sample) -> Command:
-        """Outputs after one step."""
+        """The controller's commands: the FMU's outputs after one step."""
         self._slave.setReal(
             self._references, sample.wheels.tolist() + [getattr(sample, name) for _, name in self._extra]
         )
@@ -98,7 +98,7 @@ def _references(names: dict[str, tuple[int, str]], kind: str, wheels: int) -> li
 
 
 def _names(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:
-    """Variables by name; raises InputError if one is missing or of a type that does not fit."""
+    """Value reference and type of each variable, by name; raises InputError if one is missing or has the wrong type."""
     names = {variable.name: (variable.valueReference, variable.type) for variable in description.modelVariables}
     kind = "valve" if "valve_1" in names else "pressure"
     wanted: dict[str, tuple[str, ...]] = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}

@@ -40,7 +40,7 @@ SWITCH, REQUEST_GIVEN = 1, 2
 
 
 class WrongFrame(ValueError):
-    """Bytes that are no frame of this port; name : as in ``ask.NAMES``."""
+    """Bytes that do not form a frame of this port; name : as in ``ask.NAMES``."""
 
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
@@ -48,7 +48,7 @@ class WrongFrame(ValueError):
 
 
 def question(sample: Sample) -> bytes:
-    """Frame of one sample."""
+    """Frame that carries one sample to the controller."""
     flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
     return QUESTION.pack(
         b"TRQ1",
@@ -73,14 +73,14 @@ def sample(frame: bytes) -> Sample:
 
 
 def answer(number: int, command: Command) -> bytes:
-    """Frame of what a controller answers to a sample."""
+    """Frame that carries a controller's answer to a sample."""
     mode, values = (b"P", command.pressures) if command.valves is None else (b"V", command.valves)
     assert values is not None
     return ANSWER.pack(b"TRA1", number, mode[0], len(values), *_eight(values))
 
 
 def command(frame: bytes, number: int) -> Command:
-    """The commands in an answer frame to the sample of this number; raises WrongFrame."""
+    """The commands in the answer frame; raises WrongFrame if the frame does not answer the sample ``number``."""
     magic, answered, mode, wheels, *values = ANSWER.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
@@ -93,5 +93,5 @@ def command(frame: bytes, number: int) -> Command:
 
 
 def _eight(values: np.ndarray) -> list[float]:
-    """Values of all wheels, filled up with zeros."""
+    """Eight values, one per possible wheel: the given ones, then zeros."""
     return [*np.asarray(values, dtype=float).tolist(), *[0.0] * (MOST_WHEELS - len(values))]

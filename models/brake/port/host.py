@@ -24,7 +24,7 @@ HEAD = struct.Struct("<4sI")
 
 
 class Guest(NamedTuple):
-    """The controller that a process of its own is to make: name "module:Name" or "file.py:Name" of a callable, or else
+    """Description of a controller that a separate process creates: "module:Name" or "file.py:Name" of a callable, or
     the path of an FMU.
 
     folder : of the callable's path, or to which the FMU is unpacked; wheels : their number; sample : s; parameters : of
@@ -42,7 +42,7 @@ class Guest(NamedTuple):
 
 @contextmanager
 def made_controller(guest: Guest) -> Iterator[Controller]:
-    """The controller, for as long as the block lasts; raises InputError."""
+    """The controller described by ``guest``, as a context manager; raises InputError."""
     if guest.fmu is not None:
         from models.brake.port.fmu_port import opened
 
@@ -55,13 +55,13 @@ def made_controller(guest: Guest) -> Iterator[Controller]:
 
 
 def failure_frame(**what: Any) -> bytes:
-    """Frame that reports a failure."""
+    """Frame that reports the exception now being handled."""
     text = json.dumps(what, default=str).encode()
     return HEAD.pack(TOLD, len(text)) + text
 
 
 def serve(link: socket.socket) -> None:
-    """Make the controller that is asked for, and answer until the connection is closed."""
+    """Make the controller that the other side asks for, and answer samples until the connection closes."""
     with link.makefile("rb") as reader:
         guest = pickle.loads(reader.read(LENGTH.unpack(reader.read(LENGTH.size))[0]))
         if guest.fmu is not None:
@@ -75,7 +75,7 @@ def serve(link: socket.socket) -> None:
 
 
 def main(port: int) -> None:
-    """Serve at a port of this machine; whatever is raised is told, as far as it can be."""
+    """Serve at a port of this machine; any exception is reported to the other side if possible."""
     with socket.create_connection((LOOPBACK, port)) as link:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:

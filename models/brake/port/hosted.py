@@ -30,7 +30,7 @@ STARTUP = 30.0
 
 
 class Failed(Exception):
-    """Failure that the controller's process reported; what : its table."""
+    """Failure reported by the controller's process; what : its details as a table."""
 
     def __init__(self, what: dict[str, Any]) -> None:
         self.what = what
@@ -39,14 +39,14 @@ class Failed(Exception):
 
 @dataclass
 class Hosted:
-    """A controller in a process of its own; each answer must be there within ``timeout`` seconds."""
+    """A controller in its own process; each answer must arrive within ``timeout`` seconds."""
 
     link: socket
     process: subprocess.Popen[bytes] | None
     timeout: float
 
     def begin(self, guest: Guest, start: float) -> None:
-        """Have the controller made within so many seconds; raises InputError, RunFailed."""
+        """Have the process make the controller within ``start`` seconds; raises InputError, RunFailed."""
         text = pickle.dumps(guest)
         try:
             self._got(LENGTH.pack(len(text)) + text, HEAD.size, READY, STARTUP)
@@ -74,8 +74,7 @@ class Hosted:
             raise ControllerFailed(sample, "crash", lost) from None
 
     def _got(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
-        """The bytes that the process sends back within so many seconds; raises Failed, TimeoutError, OSError,
-        EOFError."""
+        """The bytes that the process sends back within ``seconds``; raises Failed, TimeoutError, OSError, EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
@@ -88,7 +87,7 @@ class Hosted:
         return got
 
     def _more(self, received: bytes, size: int, end: float) -> bytes:
-        """Receive up to ``size`` bytes in all; fewer if the process reports a failure in fewer."""
+        """Receive until ``size`` bytes are there, or until a complete, shorter frame reports a failure."""
         while len(received) < size and not (
             received[:4] == TOLD and HEAD.size <= len(received) == _failure_length(received)
         ):
@@ -105,7 +104,7 @@ class Hosted:
 
 
 def _failure_length(received: bytes) -> int:
-    """Length of a frame that tells what went wrong."""
+    """Length of the frame that reports a failure, read from its head."""
     return HEAD.size + int(HEAD.unpack_from(received)[1])
 
 
@@ -117,7 +116,7 @@ def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
 
 @contextmanager
 def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
-    """The controller of a guest for as long as the block lasts; start : seconds for making it.
+    """The controller of a guest in a separate process, as a context manager; start : seconds allowed for making it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """

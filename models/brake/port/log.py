@@ -20,13 +20,13 @@ RECORD = QUESTION.size + ANSWER.size
 
 
 def name_of(scene: str) -> str:
-    """64 hexadecimal digits that name a scene by its text."""
+    """Hash of a scene's text, 64 hexadecimal digits, that identifies the scene."""
     return sha256(scene.encode()).hexdigest()
 
 
 @dataclass
 class Logged:
-    """A controller whose exchanges are written as they happen."""
+    """A controller whose exchanges are written to a log as they happen."""
 
     inner: Controller
     file: BinaryIO
@@ -41,14 +41,14 @@ class Logged:
 
 @contextmanager
 def logged(inner: Controller, path: Path, scene: str) -> Iterator[Logged]:
-    """A controller with its log for as long as the block lasts; scene: of ``name_of``."""
+    """The controller ``inner``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
     with path.open("wb") as file:
         file.write(TITLE + scene.encode() + b"\n")
         yield Logged(inner, file)
 
 
 def refusal(path: Path) -> str:
-    """Why no log can be written to a path, "" if one can: a log of before is written anew, no other file is."""
+    """Why no log can be written to a path, or "" if one can. An older log is overwritten, any other file is not."""
     if path.is_dir():
         return "is a folder: name a file"
     if not path.parent.is_dir():
@@ -61,7 +61,8 @@ def refusal(path: Path) -> str:
 
 
 class Replay:
-    """Answers as a log does, as long as it is asked as the log was; raises InputError for the log of another scene."""
+    """Gives the logged answers as long as the questions equal the logged ones; raises InputError for another scene's
+    log."""
 
     def __init__(self, path: Path, scene: str) -> None:
         try:
@@ -75,7 +76,8 @@ class Replay:
         self._records, self._path = records, path
 
     def sample(self, sample: Sample) -> Command:
-        """The logged answer; raises RunFailed if the log has none, or if the question was another one."""
+        """The logged answer to a sample; raises RunFailed if the log has ended, or if its question differs from this
+        one."""
         start = sample.number * RECORD
         record, place = self._records[start : start + RECORD], f"sample {sample.number}: {self._path.name}"
         if len(record) < RECORD:

@@ -21,7 +21,8 @@ class WallClock:
     _start: float | None = None
 
     def sample(self, sample: Sample) -> Command:
-        """The controller's commands for a sample, asked for no sooner than at the sample's time on the wall clock."""
+        """The controller's commands for a sample. The controller is asked only when the wall clock has reached the
+        sample's time."""
         now = time.perf_counter()
         if self._start is None:
             self._start = now - 1e-9 * sample.time
@@ -35,5 +36,5 @@ class WallClock:
         return command
 
     def report(self) -> str:
-        """One line on overruns."""
+        """One line of text on overruns."""
         return f"{self.overruns} overruns, the worst by {1e3 * self.worst:.3f} ms"

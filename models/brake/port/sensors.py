@@ -34,7 +34,8 @@ class Conversion(Strict):
 
 
 class Channels:
-    """A conversion of several signals, sample by sample from 0 on. source: of the noise, see ``models.core.noise``."""
+    """Conversion of several signals by sensors, sample by sample from 0 on. source: of the noise, see
+    ``models.core.noise``."""
 
     def __init__(self, conversion: Conversion, count: int, source: int) -> None:
         self.conversion, self._count, self._source = conversion, count, source
@@ -53,7 +54,7 @@ class Channels:
         return values
 
     def _drawn(self, number: int) -> np.ndarray:
-        """Standard normal numbers (count,) of a sample, from the block that holds it."""
+        """Standard normal numbers (count,) for a sample's noise, taken from the block of numbers that contains them."""
         block, place = divmod(number, BLOCK)
         if block != self._block:
             first = block * BLOCK
@@ -64,7 +65,8 @@ class Channels:
 
 @dataclass
 class Sensed:
-    """A controller that sees wheels through sensors, and whose pressures are measured; fresh for every run.
+    """A controller that receives wheel speeds through sensors, and whose pressures are measured; a new one is made for
+    every run.
 
     teeth : counts the wheels' teeth first; None: their speed is known.
     """

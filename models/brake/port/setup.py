@@ -56,7 +56,7 @@ class PortTable(Strict):
 
     @property
     def patience(self) -> float:
-        """Time (s) until the controller must be there."""
+        """Time (s) within which the controller must be ready."""
         if self.start is not None:
             return self.start
         return self.timeout if self.port is None else BY_HAND
@@ -75,10 +75,9 @@ class PortTable(Strict):
 
 @dataclass(frozen=True)
 class ControllerRun:
-    """Facts of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
-    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
-    slow: whether valves can apply slowly.
-    """
+    """Data of a run that the port needs. radius (W,): of the wheels, m; sample: s; scene: its text, which identifies
+    logs; folder: from which paths start; file: name of the scene, for messages; procedure, engine: names that file
+    names may contain; slow: whether valves can apply slowly."""
 
     radius: np.ndarray
     sample: float
@@ -90,7 +89,7 @@ class ControllerRun:
     slow: bool = False
 
     def path(self, name: str) -> Path:
-        """A file that the table names."""
+        """Path of a file that the table names."""
         return self.folder / name.replace("{procedure}", self.procedure).replace("{engine}", self.engine)
 
 
@@ -98,7 +97,7 @@ class ControllerRun:
 def opened(
     table: PortTable, run: ControllerRun, controller: Controller
 ) -> Iterator[tuple[Controller, WallClock | None]]:
-    """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
+    """The controller of one run as a context manager, and its wall clock if it is paced by one.
 
     controller : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
     """
@@ -121,7 +120,8 @@ def opened(
 
 @contextmanager
 def _possible_controllers(table: PortTable, run: ControllerRun, controller: Controller) -> Iterator[Controller]:
-    """The controllers that can answer at the port for this table."""
+    """The controller that the table names, as a context manager: behind a socket, in a hosted process or a replayed
+    log; else ``controller``."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
             with _told_of_scene(table, run):
@@ -145,7 +145,8 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
 
 @contextmanager
 def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
-    """Turn errors of a named controller into errors of the scene's key; errors within a file name that file."""
+    """Context that converts errors about a named controller into errors about the scene's key; errors inside a file
+    name that file."""
     try:
         yield
     except InputError as error:
@@ -155,7 +156,7 @@ def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
 
 
 def check_port(table: PortTable, run: ControllerRun) -> None:
-    """Refuse files that are not there or must stay as they are, and faults of wheels or teeth that are not."""
+    """Refuse files that do not exist or would be overwritten, and faults of wheels or teeth that do not exist."""
     for key in ("fmu", "replay"):
         name = getattr(table, key)
         if name is not None and not run.path(name).is_file():

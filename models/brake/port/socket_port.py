@@ -53,7 +53,7 @@ class SocketPort:
             ) from None
 
     def _frame(self, sample: Sample, end: float) -> bytes:
-        """Exactly one answer; bytes beyond it would belong to a question not yet asked."""
+        """Receive exactly one answer; further bytes would answer a question that has not been asked yet."""
         got = b""
         while len(got) < ANSWER.size:
             try:
@@ -98,7 +98,7 @@ def _received_bytes(received: bytes) -> str:
 
 @contextmanager
 def listening(address: int = 0) -> Iterator[socket.socket]:
-    """A socket that waits for a controller at a port of this machine, any free one if 0; raises InputError."""
+    """A socket that waits for a controller at a port of this machine (0 for any free port); raises InputError."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -113,7 +113,7 @@ def listening(address: int = 0) -> Iterator[socket.socket]:
 def connected(
     words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
 ) -> Iterator[SocketPort]:
-    """The controller that a command starts, or that connects by itself, for as long as the block lasts.
+    """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
 
     words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
     else starts; start : seconds until it must have connected; folder : in which the command runs. However the block
@@ -127,7 +127,7 @@ def connected(
 
 
 def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
-    """The first connection within ``start`` seconds."""
+    """The first connection to ``server`` within ``start`` seconds, while the process runs."""
     end = time.perf_counter() + start
     server.settimeout(min(0.05, start))
     while time.perf_counter() < end:
@@ -142,7 +142,7 @@ def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, st
 
 @contextmanager
 def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[subprocess.Popen[bytes] | None]:
-    """The process of a command, ended with the block at the latest."""
+    """The running process of a command, as a context manager that ends the process."""
     if words is None:
         yield None
         return
@@ -160,7 +160,7 @@ def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[s
 
 
 def _ended(process: subprocess.Popen[bytes], grace: float) -> None:
-    """Wait for it for some seconds, then end it with all that it started."""
+    """Wait ``grace`` seconds for the process to end; then kill it and all processes that it started."""
     with suppress(subprocess.TimeoutExpired):
         process.wait(grace)
     with suppress(ProcessLookupError):

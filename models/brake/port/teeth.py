@@ -26,7 +26,8 @@ class Teeth(Strict):
 
 
 class Counted:
-    """Teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s): whether one is missing."""
+    """Speed signals from the teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s):
+    whether a tooth is missing."""
 
     def __init__(self, teeth: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
         self._teeth, self._missing = teeth, missing
@@ -35,7 +36,7 @@ class Counted:
         self._before = 0.0
 
     def __call__(self, sample: Sample) -> np.ndarray:
-        """Signals (W,) in m/s."""
+        """Speed signals (W,) in m/s at a sample."""
         speeds, now = np.abs(sample.wheels).tolist(), 1e-9 * sample.time
         if not self._wheels:
             self._wheels = [_Wheel(speed) for speed in speeds]
@@ -46,7 +47,7 @@ class Counted:
         return np.array([wheel.shown for wheel in self._wheels])
 
     def _go_on(self, i: int, wheel: "_Wheel", speed: float, time: float) -> None:
-        """One sample of wheel i, from the sample before to now."""
+        """Advance the tooth counter of wheel i from the last sample to ``time``."""
         way, step = self._way[i], time - self._before
         turned = wheel.turned + 0.5 * (wheel.speed + speed) * step / way
         edges = [
@@ -66,7 +67,7 @@ class Counted:
 
 
 class _Wheel:
-    """State of a toothed wheel's sensor: in teeth since the start, s, m/s."""
+    """State of a toothed wheel's sensor, in units of teeth since the start, s, and m/s."""
 
     def __init__(self, speed: float) -> None:
         self.turned, self.speed, self.shown = 0.5, speed, speed
@@ -74,7 +75,7 @@ class _Wheel:
 
 
 def _instant(distance: float, speed_before: float, speed_after: float, step: float) -> float:
-    """Time after which a way is covered by a speed that goes linearly from one to another over a step."""
+    """Time (s) in which a distance is covered, while speed changes linearly between two values over a step."""
     slope = (speed_after - speed_before) / step
     root = math.sqrt(max(speed_before * speed_before + 2.0 * slope * distance, 0.0))
     return min(2.0 * distance / (speed_before + root), step)

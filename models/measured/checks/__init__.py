@@ -61,7 +61,7 @@ def check(
 
 
 def findings(evidence: Evidence) -> tuple[Finding, ...]:
-    """Findings of all checks on a recording, from evidence that is also used for figures."""
+    """Findings of all checks on a recording; the caller can use the same evidence for figures."""
     said = list(evidence.recording.noticed)
     for look in CHECKS:
         said += [finding for finding in look(evidence) if not _already_named(finding, said)]
@@ -69,7 +69,7 @@ def findings(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def _already_named(finding: Finding, earlier_findings: list[Finding]) -> bool:
-    """Whether what is wrong with one of these channels is what an earlier finding of no less weight has said."""
+    """Whether an earlier finding, at least as severe, already explains the fault of one of this finding's channels."""
     return finding.weight != "note" and any(
         ORDER.index(other.weight) <= ORDER.index(finding.weight)
         and FAMILIES[other.check] & FAMILIES[finding.check]

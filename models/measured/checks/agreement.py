@@ -39,8 +39,8 @@ SMOOTHED = 9
 
 @dataclass(frozen=True)
 class SignalGroup:
-    """Signals that are wrong together. forces : whether of hubs; members : their numbers among those or the
-    readings."""
+    """Signals that share a fault. forces : whether they are hub forces, not readings; members : their indices among the
+    forces or the readings."""
 
     name: str
     forces: bool
@@ -49,11 +49,12 @@ class SignalGroup:
 
 @dataclass(frozen=True)
 class MeasurementFault:
-    """late : size in s; factor : recorded by true value; swapped, of hubs, and crossed, of two channels : size is the
-    share that is explained only then; lever : size in m by which the point that moments are about lies above the hub.
+    """One fault. late : size in s; factor : size is the ratio of recorded to true value; swapped (hubs) and crossed
+    (two channels) : size is the share that only the exchange explains; lever : size is the height (m) above the hub of
+    the point to which moments refer.
 
-    error : standard error of the size, of random errors alone; of swapped and crossed the share that is left when they
-    are put right. fall : of chi square. exchanged : hubs, each with the one whose channels it has.
+    error : standard error of the size from random errors alone; for swapped and crossed, the unexplained share after
+    correction. fall : decrease of chi square. exchanged : hubs, each with the one whose channels it has.
     """
 
     kind: Kind
@@ -72,7 +73,7 @@ class MeasurementFault:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Cross spectra and the vehicle between them, at frequencies (f,) in Hz.
+    """Measured cross spectra of forces and readings, compared with the vehicle's response, at frequencies (f,) in Hz.
 
     between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
     (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean. noise
@@ -91,34 +92,34 @@ class Agreement:
 
     @cached_property
     def hubs(self) -> tuple[str, ...]:
-        """Where the forces act."""
+        """Names of the hubs at which the forces act."""
         return tuple(dict.fromkeys(s.at for s in self.inputs))
 
     @cached_property
     def places(self) -> dict[tuple[str, str, str], int]:
-        """Number of a force by its hub, quantity and component."""
+        """Index of each force, by its hub, quantity and component."""
         return {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
 
     @cached_property
     def expected(self) -> np.ndarray:
-        """Powers (f, k) of the expected readings."""
+        """Powers (f, k) of the readings that the forces predict."""
         return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
     @property
     def left(self) -> np.ndarray:
-        """Powers (f, k) that stay unexplained."""
+        """Powers (f, k) of the residual: the measured readings less the prediction."""
         shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
         return np.maximum(self.readings - 2 * shared + self.expected, 0.0)
 
     @property
     def unexplained(self) -> np.ndarray:
-        """Root of the share (k,) of every reading's power that neither forces nor noise explain."""
+        """Square root (k,) of the share of each reading's power, without noise, that the forces do not explain."""
         noise = len(self.frequencies) * self.noise
         share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT)
         return np.sqrt(np.maximum(share, 0.0))
 
     def typical(self) -> float:
-        """Share of the readings that stays unexplained, the median over them."""
+        """Median over the readings of the unexplained share."""
         return float(np.median(self.unexplained))
 
     @property
@@ -128,8 +129,8 @@ class Agreement:
 
     @property
     def weights(self) -> np.ndarray:
-        """Weights of the frequencies by the unexplained power, smoothed, so that a line that nobody explains counts for
-        little."""
+        """Weights of the frequencies: inverse of the smoothed unexplained power, so that a line that no force explains
+        counts little."""
         kernel = np.ones(SMOOTHED) / SMOOTHED
         known = VEHICLE_ERROR**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
         padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
@@ -137,7 +138,7 @@ class Agreement:
         return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
-        """All faults, the worst first, and the disagreement that remains after their correction."""
+        """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
         now, faults = self, list[MeasurementFault]()
         while len(faults) < FAULTS:
             worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
@@ -148,8 +149,8 @@ class Agreement:
         return now, tuple(faults)
 
     def without(self, fault: MeasurementFault) -> "Agreement":
-        """The agreement with a fault put right: true by recorded forces, or recorded by true readings, in the
-        response."""
+        """The agreement after a fault is corrected. The response is divided by the fault of a force, or multiplied by
+        the fault of a reading."""
         response = self.response.copy()
         if fault.kind == "swapped":
             to = dict(fault.exchanged)
@@ -167,13 +168,13 @@ class Agreement:
         return replace(self, response=response)
 
     def _indices_of(self, signals: tuple[Signal, ...]) -> tuple[bool, Any]:
-        """Whether signals are forces, and the index of what is theirs in the response (f, k, c)."""
+        """Whether the signals are forces, and the index of their rows or columns in the response (f, k, c)."""
         forces = signals[0] in self.inputs
         pick = [(self.inputs if forces else self.outputs).index(s) for s in signals]
         return forces, (slice(None), slice(None), pick) if forces else (slice(None), pick)
 
     def _explaining_faults(self) -> Iterator[MeasurementFault]:
-        """Every single fault that would explain more and is large enough to be named."""
+        """Every single fault whose correction would reduce the residual and whose size is large enough to be named."""
         weights = self.weights
         for group in self.groups():
             for fault in (*self._delay_faults(group, weights), *self._factor_faults(group, weights)):
@@ -184,7 +185,8 @@ class Agreement:
         yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
-        """Every signal alone, those of one hub or sensor, of one file, and all readings: the fewer the earlier."""
+        """Groups that may share a fault, small ones first: each signal, all of one hub or sensor, of one file, all
+        readings."""
         for forces, signals in ((True, self.inputs), (False, self.outputs)):
             keys = [[s.name for s in signals], [f"all channels of {s.at}" for s in signals]]
             if not forces:
@@ -200,16 +202,17 @@ class Agreement:
 
     @cached_property
     def _expected_times_forces(self) -> np.ndarray:
-        """Expected readings times conj(forces), (f, k, c)."""
+        """Cross spectra (f, k, c): predicted readings times conj(forces)."""
         return self.response @ self.forces
 
     @cached_property
     def _delay_factors(self) -> np.ndarray:
-        """exp(i omega t) (t, f) of all delays."""
+        """Phase factors exp(i omega t) (t, f) of all trial delays t."""
         return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
 
     def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
-        """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
+        """Cross power (f, k) of the readings less all other predictions with the group's prediction; power (f, k) of
+        the latter."""
         pick = list(group.members)
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
@@ -222,7 +225,8 @@ class Agreement:
         return cross, power.real
 
     def delay_of(self, group: SignalGroup, weights: np.ndarray) -> tuple[float, float, float]:
-        """Delay (s) of a group, its standard error, infinite if nothing tells, and the fall of chi square."""
+        """Delay (s) of a group, its standard error (infinite if the data do not determine it), and the fall of chi
+        square."""
         cross, power = self.share(group)
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
@@ -251,7 +255,7 @@ class Agreement:
             )
 
     def _moment_point_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Moments about another point than the hub, above or below, of one hub, of two, or of all alike."""
+        """Faults of hub moments that refer to a point above or below the hub: at one hub, at two, or equally at all."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
             levers = self._levers(some)
@@ -279,7 +283,7 @@ class Agreement:
         return out
 
     def _swapped(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Faults of hubs with exchanged channels: two hubs, or two pairs."""
+        """Faults in which hubs have exchanged their channels: two hubs, or two pairs of hubs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
@@ -292,14 +296,14 @@ class Agreement:
                     yield replace(fault, size=self.rms, error=other.rms, fall=fall)
 
     def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
-        """Pairs of channels whose signals may be exchanged."""
+        """Pairs of channels whose signals may be exchanged with each other."""
         for pair, other in self._exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
                 yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
     def blind(self) -> list[tuple[Signal, ...]]:
-        """Pairs of forces or moments of one axis that might be exchanged without being named."""
+        """Pairs of forces or moments along one axis whose exchange this recording could not reveal."""
         alike = ((pair, other) for pair, other in self._exchanges() if len({s.component for s in pair}) == 1)
         return [
             pair
@@ -308,7 +312,8 @@ class Agreement:
         ]
 
     def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
-        """Pairs of channels of one quantity, of one place or of one axis, and this with them exchanged."""
+        """Pairs of channels of one quantity with a common place or axis, each with the agreement after their
+        exchange."""
         for side in (self.inputs, self.outputs):
             for pair in combinations(side, 2):
                 what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
@@ -316,18 +321,19 @@ class Agreement:
                     yield pair, self._crossed(pair)
 
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
-        """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
+        """Fall of chi square from this agreement to the corrected one; 0 if it is not significant, or too small to be
+        named."""
         fall = float((weights * (self.left - corrected.left)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
     def _crossed(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
-        """The agreement with two channels exchanged, both of the forces or both of the readings."""
+        """The agreement with two channels exchanged; both are forces, or both are readings."""
         response = self.response.copy()
         response[self._indices_of(channel_pair)[1]] = self.response[self._indices_of(channel_pair[::-1])[1]]
         return replace(self, response=response)
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
-        """Fault of exchanged pairs of hubs; None where they do not have the same channels."""
+        """The fault that describes exchanged pairs of hubs; None if the hubs have different channels."""
         both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
         signals = tuple(s for s in self.inputs if s.at in dict(both))
         keys = {(s.at, s.quantity, s.component) for s in signals}
@@ -338,7 +344,8 @@ class Agreement:
         )
 
     def seen(self) -> dict[str, tuple[float, float]]:
-        """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
+        """By signal name: the smallest delay (s) and the smallest error of the factor that the search would detect in
+        that signal alone."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
         rest, smallest = EXPLAINED_SHARE * self._unexplained_power(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -352,17 +359,18 @@ class Agreement:
         return smallest
 
     def factor(self, signal: Signal) -> tuple[float, float]:
-        """Recorded by true value of a force by the motion alone, as it is now, and its standard error."""
+        """Ratio of a force's recorded to its true value as the motion shows it, and its standard error."""
         group = SignalGroup(signal.name, True, (self.inputs.index(signal),))
         cross, power = ((self.weights * part).sum() for part in self.share(group))
         return (float(power / cross.real), float(2 * power) ** -0.5) if power > 0 else (1.0, float("inf"))
 
     def _unexplained_power(self, weights: np.ndarray) -> np.ndarray:
-        """Weighted power (k,) of every reading that neither forces nor noise explain."""
+        """Weighted power (k,) of each reading that neither the forces nor noise explain."""
         return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)
 
     def _is_worth_correcting(self, corrected: "Agreement", weights: np.ndarray) -> bool:
-        """Whether a correction takes a good part of what is unexplained out of some reading, not a little of all."""
+        """Whether a correction removes much of the residual of at least one reading, not merely a little of every
+        one."""
         return bool(
             np.any(
                 ((self.left - corrected.left) * weights).sum(axis=0)
@@ -375,7 +383,8 @@ class Agreement:
 
 
 def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) -> float:
-    """Smallest size that is certain and worth its name, where (k,) power times its square falls on (k,) readings."""
+    """Smallest significant and noteworthy size of a fault, if each reading's residual (k,) falls by ``power`` times
+    size^2."""
     if not power.sum() > 0:
         return float("inf")
     return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
@@ -386,6 +395,6 @@ def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
 
 
 def _vertex(left: float, middle_value: float, right: float) -> float:
-    """Where the parabola through three values at -1, 0, 1 has its vertex."""
+    """Position of the vertex of the parabola through three values at -1, 0 and 1."""
     bend = left - 2 * middle_value + right
     return 0.5 * (left - right) / bend if bend < 0 else 0.0

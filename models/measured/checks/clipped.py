@@ -21,7 +21,8 @@ ROUNDED = 1e-9
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are shares of samples, in %, and s for a channel that stands still."""
+    """Findings on channels that are clipped or keep one value. Sizes are shares of samples in %, or for a constant
+    value its duration in s."""
     findings = [finding for signal in evidence.recording.signals for finding in _signal(evidence, signal)]
     return findings or [Finding(NAME, "note", "", "No channel is clipped or stands still.")]
 
@@ -41,13 +42,14 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
 
 
 def _largest_of_quantity(evidence: Evidence, signal: Signal) -> float:
-    """Largest value of any channel of the signal's quantity."""
+    """Largest value among all channels with the signal's quantity."""
     alike = [other for other in evidence.recording.signals if other.quantity == signal.quantity]
     return max(float(np.nanmax(np.abs(evidence.recording.samples(other)), initial=0.0)) for other in alike)
 
 
 def clipping_extremes(values: np.ndarray) -> list[float]:
-    """Extremes of a channel (n,), NaN where nothing was measured, at which it is clipped: where values pile up."""
+    """Extreme values at which a channel (n,), NaN where not measured, is clipped, because many samples lie exactly
+    there."""
     good = values[np.isfinite(values)]
     if not len(good) or good.min() == good.max():
         return []
@@ -77,7 +79,7 @@ def _clipped(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, 
 
 
 def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
-    """The longest time at one value, of a channel that otherwise changes."""
+    """Finding on the longest time for which a channel keeps one value, though it changes otherwise."""
     same = true_runs(np.diff(values) == 0)
     if not len(same):
         return []

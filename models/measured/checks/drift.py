@@ -21,7 +21,8 @@ LEAST_CLOCK_DRIFT = 1e-3
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are the part by which a file's clock is fast against that of the hub forces."""
+    """Findings on clocks that drift. Sizes are the relative rate by which a file's clock runs faster than that of the
+    hub forces."""
     clocks = {s.file for s in evidence.forces}
     others = dict.fromkeys(s.file for s in evidence.inertial if s.file not in clocks)
     if not others:
@@ -38,7 +39,8 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
-    """Middle (s) and agreement of stretches of the recording, with all corrections of the whole."""
+    """Middle (s) and ``Agreement`` of parts of the recording, each with the corrections found from the whole
+    recording."""
     assert evidence.searched is not None
     now, recording = evidence.searched[0], evidence.recording
     length = round(WINDOW / recording.period)
@@ -83,7 +85,8 @@ def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: s
 
 
 def _slope(times: np.ndarray, late: np.ndarray, errors: np.ndarray) -> tuple[float, float]:
-    """Slope of delays (n,) and its standard error, by their own errors or their scatter, whichever is more."""
+    """Slope of delays (n,) over time and its standard error, from the delays' own errors or from their scatter,
+    whichever is larger."""
     weights = 1 / errors**2
     middle = times - weights @ times / weights.sum()
     steep = float(weights @ middle**2)

@@ -24,9 +24,10 @@ INERTIAL = ("acceleration", "angular rate", "angle")
 
 @dataclass(frozen=True)
 class Evidence:
-    """places : of accelerometers and gyros by name; claimed : white noise (SI) that is stated, by name of signal.
+    """Data on which the checks work. places : of accelerometers and gyros by name; claimed : stated white noise (SI),
+    by name of signal.
 
-    plane : of the pitch-plane vehicle, where the recording drives that and no vehicle in space.
+    plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
     """
 
     recording: Recording
@@ -37,23 +38,23 @@ class Evidence:
 
     @cached_property
     def forces(self) -> tuple[Signal, ...]:
-        """Components of the hubs of the vehicle."""
+        """Signals of the forces and moments at the vehicle's hubs."""
         hubs, signals = self.vehicle.hubs if self.vehicle else (), self.recording.signals
         acting = [s for s in signals if s.quantity in ("force", "moment") and s.component in ("x", "y", "z")]
         return tuple(s for s in acting if s.at in hubs)
 
     @cached_property
     def inertial(self) -> tuple[Signal, ...]:
-        """Accelerations, rates and angles whose place on the vehicle is known."""
+        """Accelerations, angular rates and angles measured at a known place on the vehicle."""
         moving = [s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES]
         return tuple(s for s in moving if self.place(s) is not None)
 
     def vertical(self) -> dict[str, Signal]:
-        """Vertical force of every hub that has one."""
+        """Signal of the vertical force at each hub that has one."""
         return {s.at: s for s in self.forces if s.quantity == "force" and s.component == "z"}
 
     def place(self, signal: Signal) -> TransducerPlace | None:
-        """Where a signal is measured; None where neither the scene nor the vehicle says."""
+        """Position at which a signal is measured; None where neither the scene nor the vehicle gives it."""
         if signal.at in self.places or self.vehicle is None:
             return self.places.get(signal.at)
         bodies = {body.name: body for body in self.vehicle.uncut.bodies}
@@ -63,7 +64,7 @@ class Evidence:
 
     @cached_property
     def lacking(self) -> str:
-        """Data that are missing for a comparison of forces and motion; empty if none."""
+        """Text on which data are missing for comparing forces with motion; empty if none is."""
         if self.vehicle is None:
             return "a vehicle in space"
         bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
@@ -77,16 +78,16 @@ class Evidence:
 
     @cached_property
     def constant_signals(self) -> tuple[str, ...]:
-        """Names of forces and inertial signals all of whose measured samples are one value."""
+        """Names of force and inertial signals whose measured samples all have the same value."""
         samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial))
         known = ((name, values[np.isfinite(values)]) for name, values in samples)
         return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
     def coarse(self) -> dict[Signal, float]:
-        """Recorded by true value where the mean says by itself that sign or unit are wrong.
+        """Ratio of recorded to true value for signals whose mean alone shows a wrong sign or unit.
 
-        Of vertical forces against the static loads, of vertical accelerometers with gravity against that.
+        Means of vertical forces are compared with static loads, and those of vertical accelerometers with gravity.
         """
         loads = dict(zip(self.vehicle.hubs, self.vehicle.loads, strict=True)) if self.vehicle else {}
         ratios = {s: self.mean(s) / loads[hub] for hub, s in self.vertical().items() if not self.empty(s)}
@@ -98,11 +99,11 @@ class Evidence:
         }
 
     def mean(self, signal: Signal) -> float:
-        """Mean of all samples, under a window."""
+        """Mean of all samples, weighted by a window."""
         return float(windowed_means([partial(self.recording.samples, signal)])[0][0])
 
     def empty(self, signal: Signal) -> bool:
-        """Whether a force varies by more than its mean, which then says nothing of sign and unit."""
+        """Whether a force varies more than its mean, which then does not reveal its sign or unit."""
         return abs(self.mean(signal)) <= float(np.nanstd(self.recording.samples(signal)))
 
     @cached_property
@@ -112,7 +113,8 @@ class Evidence:
 
     @cached_property
     def agreement(self) -> Agreement | None:
-        """Forces and motion as they were recorded, less what means say of them; None where something is lacking."""
+        """Comparison of recorded forces and motion, after correcting signs and units that means show; None where data
+        are lacking."""
         if self.lacking:
             return None
         assert self.vehicle is not None and self._spectra is not None
@@ -135,26 +137,26 @@ class Evidence:
 
     @property
     def frame(self) -> str:
-        """Frame of the hub forces."""
+        """Frame in which the hub forces are given."""
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
     def searched(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
-        """The agreement after its faults are taken out, and the faults, the worst first."""
+        """The agreement after correction of its faults, and these faults, the worst one first."""
         return self.agreement.search() if self.agreement else None
 
     @property
     def faults(self) -> tuple[MeasurementFault, ...]:
-        """Faults between forces and motion; none where they cannot be set against each other."""
+        """Faults found by comparing forces with motion; empty if they cannot be compared."""
         return self.searched[1] if self.searched else ()
 
     @cached_property
     def seen(self) -> dict[str, tuple[float, float]]:
-        """Smallest delay (s) and error of the factor of every signal that would be named; none where nothing is."""
+        """By signal name: smallest detectable delay (s) and error of the factor; empty if nothing could be compared."""
         return self.searched[0].seen() if self.searched else {}
 
     def hub(self, signal: Signal) -> str:
-        """Hub that a force belongs to when exchanged hubs are put right."""
+        """Hub at which a force acts after exchanged hubs are corrected."""
         for fault in self.faults:
             if fault.kind == "swapped" and signal.at in dict(fault.exchanged):
                 return dict(fault.exchanged)[signal.at]

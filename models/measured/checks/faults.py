@@ -20,7 +20,8 @@ PATCH = 0.2, 0.6
 
 
 def factors(evidence: Evidence) -> list[Finding]:
-    """Sizes are shares in %, or recorded by true value where sign or unit is wrong: a doubt if a spike may say so."""
+    """Findings on wrong factors. Sizes are shares in %, or the ratio of recorded to true value where sign or unit is
+    wrong. A finding is only a doubt where a spike may be the cause."""
     if evidence.lacking:
         what = "Signs, units and factors were not checked by the motion of the vehicle"
         return [Finding("factor", "note", "", f"{what}: this needs {evidence.lacking}.")]
@@ -44,7 +45,8 @@ def _factor(evidence: Evidence, fault: MeasurementFault) -> Finding:
 
 
 def shifts(evidence: Evidence) -> list[Finding]:
-    """Sizes are in s, positive where a channel is late; by the motion that the hub forces should cause."""
+    """Findings on time shifts, from the motion that the hub forces predict. Sizes are in s, positive where a channel is
+    late."""
     if evidence.agreement is None:
         what = "Shifts in time were not checked by the motion of the vehicle"
         return [Finding("shift", "note", "", f"{what}: this needs {evidence.lacking}.")]
@@ -68,7 +70,8 @@ def _shift(fault: MeasurementFault) -> Finding:
 
 
 def levers(evidence: Evidence) -> list[Finding]:
-    """Sizes are in m, the height of the point above the hub; by the motion that the hub forces should cause."""
+    """Findings on hub moments that refer to another point than the hub, from the motion that the hub forces predict.
+    Sizes are the point's height above the hub, m."""
     return [_lever(fault) for fault in evidence.faults if fault.kind == "lever"]
 
 

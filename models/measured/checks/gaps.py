@@ -11,7 +11,8 @@ NAME = "gaps"
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """One finding for each set of channels that miss the same samples; its size is the longest gap in s."""
+    """Findings on missing samples: one for each set of channels that miss the same ones. Its size is the longest gap in
+    s."""
     recording = evidence.recording
     sets: dict[tuple[tuple[int, int], ...], list[Signal]] = {}
     for signal in recording.signals:

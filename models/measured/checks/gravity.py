@@ -14,7 +14,8 @@ LEVEL = 3.0
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are in m/s^2, or recorded by true value where sign or unit is wrong."""
+    """Findings on gravity in accelerometers. Sizes are in m/s^2, or the ratio of recorded to true value where sign or
+    unit is wrong."""
     signals = [s for s in evidence.recording.find("acceleration") if s.component in ("x", "y", "z")]
     if not signals:
         return [Finding(NAME, "note", "", "Not looked at: no accelerometer.")]

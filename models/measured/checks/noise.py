@@ -13,7 +13,7 @@ NOISE_RATIO = 1.5
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """A doubt for every channel whose stated noise is wrong, and a note for each quantity."""
+    """Findings on noise: a doubt for each channel whose stated noise is wrong, and a note for each quantity."""
     doubts, sizes = list[Finding](), dict[Quantity, list[float]]()
     for signal in evidence.recording.signals:
         size, stated, unit = (

@@ -24,12 +24,12 @@ AXES = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 
 
 def number(signal: Signal, hub: int) -> int:
-    """Number of a force's component among those of all hubs, of which it is at the ``hub``-th."""
+    """Index of a force's component among the components of all hubs; ``hub`` is the index of its hub."""
     return WRENCH * hub + 3 * (signal.quantity == "moment") + AXES[signal.component]
 
 
 class SensorResponse:
-    """The linear vehicle: q'' = stiff q + damped q' + pushed u, u (6 h,) in N and N m, in a frame."""
+    """Linear vehicle q'' = stiff q + damped q' + pushed u with hub forces u (6 h,) in N and N m, given in a frame."""
 
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
@@ -42,7 +42,8 @@ class SensorResponse:
         self.pushed = np.column_stack([(at((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in hubs])
 
     def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
-        """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
+        """Transfer functions (f, signals, 6 h) from hub forces to the signals, each at its place, at frequencies (f,)
+        in Hz."""
         laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(
             laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)
@@ -51,7 +52,7 @@ class SensorResponse:
         return np.asarray(rows @ q)
 
     def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
-        """(f, n): reading by coordinates, at own = i omega (f, 1)."""
+        """Row (f, n) that maps the coordinates to the sensor's reading, at i_omega = i omega (f, 1)."""
         axis, turn = AXES[signal.component], self.motion.turn(transducer.body)
         if signal.quantity == "angle":
             return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
@@ -64,7 +65,8 @@ class SensorResponse:
 
 
 def _built(vehicle: CutVehicle, frame: str) -> HubModel:
-    """A model that at half step 0 carries its static loads, and at half step i + 1 also a push on component i."""
+    """A model with static loads alone at half step 0. At half step i + 1 a push on component i is added to the static
+    loads."""
     hubs = WRENCH * len(vehicle.hubs)
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads

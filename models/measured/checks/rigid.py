@@ -17,14 +17,15 @@ Axes = Sequence[Signal]
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """One finding for each body with at least three tri-axial accelerometers; its size is the share in %."""
+    """Findings on bodies with three or more tri-axial accelerometers, one per body. Its size is the share of the
+    readings, in %, that no rigid motion explains."""
     findings = [_body(evidence, body, sensors) for body, sensors in _bodies(evidence).items() if len(sensors) > 2]
     lacks = "Not looked at whether the body is rigid: this needs four tri-axial accelerometers on it, of known places."
     return findings or [Finding(NAME, "note", "", lacks)]
 
 
 def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[TransducerPlace, Axes]]]:
-    """Complete sensors by body and name."""
+    """Tri-axial accelerometers with all three channels, by body and by sensor name."""
     bodies: dict[str, dict[str, tuple[TransducerPlace, Axes]]] = {}
     for name in dict.fromkeys(s.at for s in evidence.recording.find("acceleration")):
         axes = [evidence.recording.find("acceleration", name, axis) for axis in "xyz"]

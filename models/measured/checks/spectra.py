@@ -31,7 +31,7 @@ SIDE_LINES = range(2, 5)
 
 @dataclass(frozen=True)
 class Spectra:
-    """Means over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
+    """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
 
     averages : how many independent ones; segments with a sample that is missing are left out. white : power in every
     line of white noise of variance 1.
@@ -46,8 +46,8 @@ class Spectra:
 def spectra(
     recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
 ) -> Spectra | None:
-    """Cross spectra in a band (Hz), in SI units squared by window sums squared; None where too little is unbroken, or
-    the band has no line.
+    """Cross spectra in a band (Hz), in SI units squared by window sums squared; None if too few segments are complete,
+    or if the band contains no frequency line.
 
     stretch : first sample and number of samples that are looked at; else all.
     """
@@ -70,7 +70,7 @@ def spectra(
 
 
 def noise(recording: Recording, signal: Signal) -> float:
-    """Standard deviation (SI) of white noise on every sample; NaN where no segment is unbroken.
+    """Standard deviation (SI) of white noise on every sample; NaN if no segment is complete.
 
     By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
     channels it is too small: what was there is gone.
@@ -88,7 +88,8 @@ def noise(recording: Recording, signal: Signal) -> float:
 
 
 def windowed_means(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Means (k,) under a Hann window of what each of these reads, (n,), and the covariance (k, k) of their errors.
+    """Means (k,), weighted by a Hann window, of the columns (n,) that the k functions read, and the covariance (k, k)
+    of the means' errors.
 
     Samples that are NaN in any are left out; one column at a time is in memory. The window takes away what a plain mean
     owes to where the record happens to begin and end. The covariance is the power of the lines just above the window's

@@ -16,7 +16,7 @@ USUAL_SHARE = 0.99
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are those of the highest spike, in the channel's unit."""
+    """Findings on spikes of single samples. The size is the height of the highest spike, in the channel's unit."""
     recording = evidence.recording
     findings = [_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
     return [finding for finding in findings if finding] or [
@@ -25,7 +25,8 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First samples (k,) of the spikes in values (n,), NaN where not measured, and their heights (k,), with sign."""
+    """Index (k,) of the first sample of each spike in values (n,), NaN where not measured, and the spikes' signed
+    heights (k,)."""
     steps = np.diff(values)
     known = np.abs(steps[np.isfinite(steps)])
     if not len(known):

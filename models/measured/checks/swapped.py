@@ -13,7 +13,8 @@ unexplained: typically a half of right recordings of 1.5 s (angles and rates alo
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are the share of the inertial readings, in %, that stays unexplained as the channels are mapped."""
+    """Findings on exchanged hubs or channels. Sizes are the share of the inertial readings, in %, that the forces do
+    not explain with the given channel map."""
     if evidence.searched is None:
         return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
     findings = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
@@ -39,7 +40,7 @@ def _pair(fault: MeasurementFault) -> Finding:
 
 
 def _indistinguishable_hubs(evidence: Evidence) -> Finding:
-    """Finding on pairs of hubs that move the vehicle too much alike to be told apart."""
+    """Finding on pairs of hubs whose forces move the vehicle so similarly that an exchange could not be seen."""
     assert evidence.searched is not None
     pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
     if not pairs:
@@ -52,7 +53,7 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
 
 
 def _remaining_disagreement(evidence: Evidence) -> Finding:
-    """Finding on how well forces and motion agree once all faults are taken out."""
+    """Finding on the disagreement of forces and motion that remains after all faults are corrected."""
     assert evidence.searched is not None
     left = evidence.searched[0]
     share = left.unexplained

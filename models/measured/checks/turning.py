@@ -20,7 +20,8 @@ LEAST_SHIFT, FEWEST_LINES = 1e-3, 8
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are the rate by the derivative of the angle, or s by which the rate is late."""
+    """Findings on angles compared with their angular rates. Sizes are the ratio of the rate to the angle's derivative,
+    or the delay of the rate in s."""
     recording = evidence.recording
     pairs = [
         (angle, rate)
@@ -82,13 +83,15 @@ def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
 
 
 def _rate_ratio(transfer: np.ndarray, weight: np.ndarray) -> float:
-    """Part of what a rate has at coherent lines that is in phase with the derivative of the angle, by one factor."""
+    """Share of the rate's power at coherent lines that the derivative of the angle explains, scaled by one real
+    factor."""
     whole = float(weight.sum() * (weight @ np.abs(transfer) ** 2))
     return float((weight @ transfer).real ** 2) / whole if whole > 0 else 0.0
 
 
 def _delay_by_phase(transfer: np.ndarray, omega: np.ndarray, weight: np.ndarray, ratio: float) -> tuple[float, float]:
-    """Delay (s) by the slope of the phase through 0 Hz, and its standard error by the scatter of the lines."""
+    """Delay (s) from the slope of a phase line through 0 Hz, and its standard error from the scatter of the frequency
+    lines."""
     phase = np.angle(transfer * np.sign(ratio))
     steep = float(weight @ omega**2)
     late = -float(weight @ (omega * phase)) / steep

@@ -33,24 +33,25 @@ CHI_SQUARE_FALL = 25.0
 
 @dataclass(frozen=True)
 class Balance:
-    """Residual of the equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
-
-    columns (e, h) : of an excess that is a whole load at one hub. inverse (e, e) : of the covariance.
-    """
+    """Residual of the equilibrium, (e,): vertical force (N), moments about x and y (N m), and conditions from
+    elasticity alone. columns (e, h) : residual that an excess of one whole load at a hub would cause. inverse (e, e) :
+    of the covariance of the residual."""
 
     left: np.ndarray
     columns: np.ndarray
     inverse: np.ndarray
 
     def fit(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """Shares (p,) of columns (e, p) in what is left, their covariance, and the fall of chi square."""
+        """Fit columns (e, p) to the residual by generalised least squares: their shares (p,), the covariance of these,
+        and the fall of chi square."""
         normal = columns.T @ self.inverse @ columns
         share = np.linalg.solve(normal, columns.T @ self.inverse @ self.left)
         return share, np.linalg.inv(normal), float(share @ normal @ share)
 
 
 def check(evidence: Evidence) -> list[Finding]:
-    """Sizes are shares of the load, in %, or recorded by true value where sign or unit is wrong."""
+    """Findings on vertical forces compared with the weight. Sizes are shares of the load in %, or the ratio of recorded
+    to true value where sign or unit is wrong."""
     if evidence.plane is not None:
         forces = axles(evidence.recording, evidence.plane)
         return axle_forces.check(forces) if forces else []
@@ -68,8 +69,9 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def moments(evidence: Evidence) -> np.ndarray:
-    """Moments (2,) of the hub forces about x and y, N m, on average, that the measured rates of roll and pitch do not
-    bear out: of offsets, gains, or a load that is not in the vehicle file; 0 where they may be chance, or not known."""
+    """Mean moments (2,) of the hub forces about x and y, N m, that the measured rates of roll and pitch contradict.
+    They come from offsets, gains, or a load missing in the vehicle file. Both are 0 if they may be chance, or are
+    unknown."""
     vehicle, none = evidence.vehicle, np.zeros(2)
     if vehicle is None or evidence.frame == "inertial" or not _angular_acceleration_readers(evidence, vehicle):
         return none
@@ -79,13 +81,14 @@ def moments(evidence: Evidence) -> np.ndarray:
 
 
 def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
-    """Readers of all hub forces, and of the angular accelerations."""
+    """Functions that read all hub forces, and the angular accelerations of roll and pitch."""
     forces: list[Callable[[], np.ndarray]] = [partial(evidence.recording.samples, s) for s in evidence.forces]
     return forces + _angular_acceleration_readers(evidence, vehicle)
 
 
 def _angular_acceleration_readers(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
-    """Readers of the angular accelerations of roll and pitch by the chassis' gyros; none where one is missing."""
+    """Functions that read the angular accelerations of roll and pitch from the chassis' gyros; empty if a gyro is
+    missing."""
     recording = evidence.recording
 
     def slope(gyro: Signal) -> np.ndarray:
@@ -96,7 +99,7 @@ def _angular_acceleration_readers(evidence: Evidence, vehicle: CutVehicle) -> li
 
 
 def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
-    """Numbers (k,) of the components among all hubs'."""
+    """Indices (k,) of the measured components among the components of all hubs."""
     return [number(s, vehicle.hubs.index(evidence.hub(s))) for s in evidence.forces]
 
 
@@ -112,8 +115,8 @@ def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static:
 
 
 def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
-    """Equilibrium of mean signals (k,), or (k + 2,) with the angular accelerations of roll and pitch, which moments owe
-    to the motion."""
+    """Equilibrium from mean signals (k,), or (k + 2,) with the mean angular accelerations of roll and pitch, whose
+    inertia moments are then taken into account."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
     unit = np.eye(WRENCH * hubs)[numbers]
     turning = whole.moments(unit)[:, :2].T
@@ -134,7 +137,7 @@ def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread
 def _single_channel_error(
     evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray
 ) -> Finding:
-    """Offset or calibration of single channels, or another weight than the file's."""
+    """Finding on an offset or a wrong factor of one channel, or on a weight that differs from the vehicle file."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
@@ -173,7 +176,8 @@ def _single_channel_error(
 
 
 def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
-    """Whether the motion of the vehicle says that a channel's factor is right, and not wrong by this share."""
+    """Whether the vehicle's motion shows that a channel's factor is right, although the mean suggests an error of this
+    share."""
     if evidence.searched is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
         return False
     ratio, error = evidence.searched[0].factor(signal)
@@ -181,7 +185,7 @@ def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
 
 
 def _offset(signal: Signal, size: float, sure: float) -> Finding:
-    """A constant error (N) of one channel."""
+    """Finding on a constant error (N) of one channel."""
     zero = size / (signal.sign * signal.factor)
     word = "much" if size > 0 else "little"
     text = (

@@ -38,7 +38,7 @@ from models.measured.formats.opened import Opened, Span, distinct_names, notice,
 
 @dataclass(frozen=True)
 class CsvFile(Opened):
-    """Rows of numbers; ``rows[k]`` is the byte where row 1000 k begins, the last one the end of the rows used.
+    """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, its last element the end of the used rows.
 
     clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
     of the channels, among those of numbers.
@@ -51,7 +51,7 @@ class CsvFile(Opened):
     columns: tuple[int, ...]
 
     def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Read the rows of each span and part its columns."""
+        """Read the rows of each span and split them into times and channels."""
         columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in spans:
@@ -59,7 +59,7 @@ class CsvFile(Opened):
                 yield self.factor * table[:, self.clock] if times is None else times, table[:, columns]
 
     def _lines(self, file: io.BufferedReader, first: int, count: int) -> bytes:
-        """Bytes of some rows."""
+        """Bytes of ``count`` rows from row ``first`` on."""
         low, high = first // STRIDE, min(-(-(first + count) // STRIDE), len(self.rows) - 1)
         file.seek(int(self.rows[low]))
         text = file.read(int(self.rows[high] - self.rows[low]))
@@ -120,7 +120,8 @@ def open_csv(path: Path) -> CsvFile:
 
 
 def unit_of(text: str) -> str:
-    """Unit of a heading, in brackets, or in parentheses where it is the unit of something that can be mapped."""
+    """Unit in a heading: in brackets, or in parentheses if the text there is a unit of a quantity that can be
+    mapped."""
     unit = heading(text)[1]
     bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
     if bracketed is None:
@@ -151,7 +152,7 @@ def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, l
 
 
 def _factor(path: Path, header: Head, clock: int, unit: str) -> float:
-    """Factor of times to seconds."""
+    """Factor that converts the column of times to seconds."""
     name, given = clock_heading(header.names[clock])
     if (given or unit).casefold() not in TIME_UNITS:
         place = f"line {header.header.number} (header), column {name!r}, unit"

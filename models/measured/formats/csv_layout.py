@@ -84,7 +84,7 @@ NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, a
 
 @dataclass
 class Top:
-    """Format facts from the first lines of a file.
+    """Facts about the format of a file from its first lines.
 
     lines : those that are neither empty nor comments. hashed : comments that begin with ``#``. separator : as a line
     ``sep=`` says. foreign : numbers of lines that are no UTF-8. unit : of characters. stopped : number of the line
@@ -101,7 +101,7 @@ class Top:
 
 @dataclass
 class Remarks:
-    """Facts from the comments of a file."""
+    """Facts that the comments of a file state."""
 
     comments: list[str] = field(default_factory=list)
     start: str = ""
@@ -109,7 +109,7 @@ class Remarks:
     of_channels: dict[str, list[str]] = field(default_factory=dict)
 
     def add(self, path: Path, line_number: int, text: str) -> None:
-        """Take one comment line, without its ``#``."""
+        """Evaluate one comment line, given without its ``#``."""
         key, _, value = text.partition(":")
         if key == "start":
             self.start = value.strip()
@@ -124,7 +124,7 @@ class Remarks:
 
 
 def _text(path: Path, line_number: int, quoted: str) -> str:
-    """Return a name in quotes, as JSON writes it."""
+    """A name read from a JSON string in quotes."""
     try:
         return str(json.loads(quoted))
     except ValueError:
@@ -132,7 +132,7 @@ def _text(path: Path, line_number: int, quoted: str) -> str:
 
 
 def read_first_lines(path: Path) -> Top:
-    """First lines of a file; InputError where it has none that are text."""
+    """First lines of a file; InputError where no line is text."""
     with path.open("rb") as file:
         data = file.read(FIRST_ROWS_BYTES)
     codec, mark = next(
@@ -157,7 +157,7 @@ def read_first_lines(path: Path) -> Top:
 
 
 def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
-    """Whole lines of text, until one that holds a zero character or has no end."""
+    """Complete lines of text, up to the first one that contains a zero character or has no line end."""
     size = top.unit.itemsize
     ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
     for number, end in enumerate(ends[:FIRST_ROWS_LINES].tolist(), start=1):
@@ -177,7 +177,7 @@ def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
 
 
 def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Finding]]:
-    """The headings above the numbers, the column of time, the comments, and what is said of these lines."""
+    """Headings above the numbers, column of time, and facts in the comments; findings on these lines are included."""
     head, known = _head(path, top)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
@@ -209,7 +209,8 @@ Known = Callable[[str], bool]
 
 
 def _head(path: Path, top: Top) -> tuple[Head, Known]:
-    """The headings above the numbers, by the first reading that makes sense of it; numpy writes headings behind #."""
+    """Headings above the numbers, found by the first method that gives exactly one result. Lines behind # count too,
+    since numpy writes headings there."""
     signs = (top.separator,) if top.separator else tuple(SEPARATORS)
     bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.hashed]
     every = sorted((*top.lines, *bare))
@@ -228,7 +229,7 @@ def _head(path: Path, top: Top) -> tuple[Head, Known]:
 
 
 def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
-    """Why no line is one of headings, and what to write."""
+    """Error that says why no line can be the headings, and what the user has to write."""
     lines = top.lines or top.hashed
     first = next((line for line in lines if any(sign in line.text for sign in signs)), lines[0])
     place, text = f"line {first.number} (header)", first.text.strip()
@@ -262,21 +263,22 @@ def is_clock(text: str) -> bool:
 
 
 def is_other_clock(text: str) -> bool:
-    """Whether a heading can be that of the column of time where none is called so."""
+    """Whether a heading can mean the column of time, in a file where no heading is a usual name of it."""
     name = clock_heading(text)[0]
     parted = (name, re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
     return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
 def first_rows(top: Top, header: Head) -> list[list[str]]:
-    """Cells of each column in the first rows of numbers; a row of another width is told when it is read."""
+    """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
     lines = [line for line in top.lines if line.number > header.line]
     rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
     return [[row[i] for row in rows] for i in range(len(header.names))]
 
 
 def find_layout(path: Path, top: Top, header: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
-    """How the rows of a CSV file are written, from the first ones; InputError where two readings make sense."""
+    """How the rows of a CSV file are written, from the first rows; InputError where two interpretations are
+    possible."""
     columns = first_rows(top, header)
     first = next(iter(columns[clock]), "")
     stamps = find_stamps(path, first, header.line + 1, header.names[clock]) if is_stamp(first) else None
@@ -301,7 +303,7 @@ def find_layout(path: Path, top: Top, header: Head, clock: int, units: tuple[str
 
 
 def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
-    """Sentences on whatever is not commas between columns of numbers with decimal points."""
+    """Sentences on every deviation from the usual form: commas between columns of numbers with decimal points."""
     stamps = layout.stamps
     if stamps is not None:
         wraps = "; they go on past midnight" if stamps.form == "hh:mm:ss.fff" else ""
@@ -318,18 +320,18 @@ def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
 
 
 def is_stamp(cell: str) -> bool:
-    """Whether a cell is a time of the clock."""
+    """Whether a cell is a time of day or a date with time."""
     return not is_number(cell) and TIMED.fullmatch(cell) is not None
 
 
 def _is_text(cells: list[str]) -> bool:
-    """Whether a column holds texts or dates: nothing in it can be meant as a number."""
+    """Whether a column holds text or dates, so that no cell in it can be a number."""
     said = [cell for cell in cells if not MARKS.fullmatch(cell)]
     return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell) for cell in said)
 
 
 def find_units(path: Path, top: Top, header: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
-    """Units of the columns from a row beneath the headings; empty where there is none."""
+    """Units of the columns from a row below the headings; empty if there is no such row."""
     stamped = any(map(is_stamp, first_rows(top, header)[clock][:1]))
     rows = [(line, [_bare(cell) for cell in header.cells(line)]) for line in header.between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
@@ -348,6 +350,6 @@ def find_units(path: Path, top: Top, header: Head, clock: int) -> tuple[tuple[st
 
 
 def _bare(cell: str) -> str:
-    """A unit without the brackets around it."""
+    """A unit without its surrounding brackets."""
     brackets = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
     return (brackets[1] if brackets else cell).strip()

@@ -57,12 +57,12 @@ class Layout:
 
     @property
     def start(self) -> datetime | None:
-        """When time was 0; None where the rows do not say."""
+        """Date and time at time 0; None where the rows do not give it."""
         return self.stamps.start if self.stamps else None
 
     @property
     def numbers(self) -> list[int]:
-        """Columns of numbers."""
+        """Columns that hold numbers."""
         return [i for i in range(len(self.names)) if i not in self.texts]
 
 
@@ -75,7 +75,8 @@ def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
 
 
 def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
-    """Byte of every thousandth row and of their end, number of rows, bytes left over after the last line end."""
+    """Byte position of every thousandth row and of the end, number of rows, and number of bytes after the last line
+    end."""
     begin, size = layout.begin, layout.unit.itemsize
     marks, count, place, last = [begin], 0, begin, begin
     with path.open("rb") as file:
@@ -94,7 +95,7 @@ def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
 
 
 def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
-    """Bytes where lines without a value begin that end the file, of at most a thousand characters."""
+    """Byte positions of the empty lines at the end of the file; only its last thousand characters are searched."""
     size = layout.unit.itemsize
     begin = max(layout.begin, last - TAIL * size)
     with path.open("rb") as file:
@@ -107,8 +108,8 @@ def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
 
 
 def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Table (rows, columns of numbers) of some rows, the first of which is row ``first``; seconds (rows,) since the
-    first stamp where times are those of the clock."""
+    """Table (rows, columns of numbers) of some rows, from row ``first`` on; also the seconds (rows,) since the first
+    stamp, if times are clock times."""
     line = layout.line + 1 + first
     text = _unquoted(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
@@ -127,7 +128,8 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
 
 
 def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndarray:
-    """Numbers (rows, columns) of the columns of numbers and of those beyond the last heading, NaN for marks."""
+    """Numbers (rows, columns) of the columns of numbers and of any beyond the last heading; NaN where a mark means "no
+    value"."""
     columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
     if text.translate(None, _PLAIN + layout.separator.encode()):
         wrong = _culprit(path, layout, text, line_number)
@@ -142,7 +144,8 @@ def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndar
 
 
 def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
-    """Some columns of rows without quotes, as numbers or as text; ValueError for what is no number and no mark."""
+    """Some columns of rows without quotes, as numbers or text; ValueError for cells that are neither numbers nor marks
+    of missing data."""
     import pandas
 
     return pandas.read_csv(
@@ -162,7 +165,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
 
 
 def _unquoted(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
-    """Rows without quotes; a comma within them is a decimal sign where the numbers have it."""
+    """Text of rows with quotes removed; a comma inside quotes is a decimal sign where numbers are written so."""
     if b'"' not in text:
         return text
     codes = np.frombuffer(text, np.uint8).copy()
@@ -220,7 +223,7 @@ def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> Input
 
 
 def _remedy(layout: Layout, cell: str) -> str:
-    """Advice on what to write in place of a cell that is no number."""
+    """Advice on what to write instead of a cell that is not a number."""
     if _THOUSANDS.fullmatch(cell):
         return "write numbers without separators of thousands"
     if ("." if layout.decimal == "," else ",") in cell:
@@ -229,7 +232,7 @@ def _remedy(layout: Layout, cell: str) -> str:
 
 
 def _error_at_byte(path: Path, line_number: int, text: bytes, offset: int, allowed: str) -> InputError:
-    """Error at one byte of some rows."""
+    """Error at one byte within some rows."""
     begin, end = text.rfind(b"\n", 0, offset) + 1, text.find(b"\n", offset)
     row = text[begin : len(text) if end < 0 else end].decode("utf-8", errors="backslashreplace")
     return InputError(path, f"line {line_number + text[:offset].count(10)}", row, allowed)

@@ -23,7 +23,7 @@ DAY = 86_400_000_000_000
 
 @dataclass(frozen=True)
 class Stamps:
-    """Times of the clock in one notation; ``zero`` is the first one, ns since 1970 or since midnight."""
+    """Times of the clock, all in one notation; ``zero`` is the first time, in ns since 1970 or since midnight."""
 
     form: str
     zone: str
@@ -32,14 +32,14 @@ class Stamps:
 
     @property
     def start(self) -> datetime | None:
-        """When time was 0; None where the file names no zone."""
+        """Date and time at time 0; None where the file names no time zone."""
         if not self.zone:
             return None
         text = str(np.datetime64(self.zero, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
     def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
-        """Seconds (n,) since the first stamp, of the cells of some rows, the first of which is ``line_number``.
+        """Seconds (n,) since the first stamp, for the cells of some rows, of which the first is line ``line_number``.
 
         Times of the day go on past midnight, for a day at most. Raises InputError at the first one that is none.
         """
@@ -74,7 +74,8 @@ class Stamps:
 
 
 def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
-    """Notation of a column of times, from its first cell; InputError, with what to write, where it has two meanings."""
+    """Notation of a column of times, from its first cell; InputError, with advice, where the cell can be read in two
+    ways."""
     cell = cell.strip()
     for form, pattern in FORMS.items():
         matched = pattern.fullmatch(cell)

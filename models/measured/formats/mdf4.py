@@ -45,7 +45,7 @@ LINEAR = {3: 0, 4: 1}
 
 @dataclass(frozen=True)
 class MdfFile(Opened):
-    """``places`` (group, index) of every channel in the file."""
+    """A reader of an MDF file; ``places`` holds the group and index of every channel in the file."""
 
     places: tuple[tuple[int, int], ...]
 
@@ -61,7 +61,8 @@ class MdfFile(Opened):
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """Give asammdf's file, without a word on the terminal; InputError where it is damaged or the package missing."""
+    """asammdf's open file, with its terminal output suppressed; InputError where the file is damaged or the package
+    missing."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -87,7 +88,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Keep quiet what asammdf prints, and what it has to say when it takes down a file that it could not open."""
+    """Suppress what asammdf prints, also while it cleans up a file that it could not open."""
     kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         with redirect_stdout(io.StringIO()):
@@ -97,7 +98,8 @@ def unheard() -> Iterator[None]:
 
 
 def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of some records, loaded once: the public calls load them, or the file, anew for each channel."""
+    """Times and values of some records, loaded only once; the library's public functions would load them again for each
+    channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
     unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
@@ -107,7 +109,7 @@ def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> 
 
 
 def _values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
-    """Physical values (n,) of one channel in some records, NaN where they are marked as invalid.
+    """Physical values (n,) of one channel in some records; NaN where they are marked as invalid.
 
     What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
     """
@@ -174,7 +176,7 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
 
 
 def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
-    """Texts that can name a channel's group: as acquired, its source, the first line of its comment, the channel's
+    """Texts that can serve as the name of a channel's group: acquisition name, source, first comment line, channel's
     source."""
     sources = [
         f"{getattr(source, 'name', '')} {getattr(source, 'path', '')}".strip()
@@ -185,7 +187,7 @@ def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
 
 
 def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
-    """Why a group cannot be used; empty where it can."""
+    """Reason why a group cannot be used; empty if it can."""
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
@@ -199,7 +201,7 @@ def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
 
 
 def _why_channel_unusable(group: Any, i: int, version: int) -> str:
-    """Why a channel is no number per sample; empty where it is."""
+    """Reason why a channel does not give one number per sample; empty if it does."""
     channel = group.channels[i]
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
     if version == 4 and channel.flags & ALL_INVALID:
@@ -211,7 +213,8 @@ def _why_channel_unusable(group: Any, i: int, version: int) -> str:
 
 
 def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
-    """Whether a channel's bits are within its records: the library copies unchecked, and may take the process down."""
+    """Whether a channel's bits lie inside its records. The library copies without this check and could crash the
+    process."""
     records, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
@@ -226,7 +229,8 @@ def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
 
 
 def _resolution(channel: Any, version: int) -> float:
-    """Step between values of a channel of whole numbers, in its unit; 0 for floating point and curved conversions."""
+    """Step between values of a channel stored as whole numbers, in its unit; 0 for floating-point values and nonlinear
+    conversions."""
     if channel.data_type not in WHOLE[version]:
         return 0.0
     conversion = channel.conversion
@@ -236,7 +240,7 @@ def _resolution(channel: Any, version: int) -> float:
 
 
 def _plain(comment: str) -> str:
-    """Return a comment without the XML around it."""
+    """Text of a comment without XML tags."""
     if not comment.lstrip().startswith("<"):
         return comment.strip()
     try:
@@ -247,7 +251,7 @@ def _plain(comment: str) -> str:
 
 
 def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
-    """When time was 0; None, and a word about it, where the file does not say in which zone."""
+    """Date and time at time 0; None, with a finding, where the file does not give the time zone."""
     if not getattr(header, "abs_time", 0):
         return None, [notice(path, "note", "the file does not say when it was measured")]
     if version == 4 and header.time_flags & LOCAL:

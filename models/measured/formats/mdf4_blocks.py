@@ -26,7 +26,7 @@ VLSD = 1
 
 @dataclass(frozen=True)
 class MdfBlock:
-    """Kind, links and the bytes after the links (the first hundred)."""
+    """A block of the file: kind, links, and up to a hundred bytes after the links."""
 
     kind: bytes
     length: int
@@ -35,7 +35,8 @@ class MdfBlock:
 
 
 def check_blocks(path: Path) -> list[Finding]:
-    """Raise InputError at the byte where an MDF 4 file cannot be what it says; more records than announced are said."""
+    """Raise InputError at the byte where the structure of an MDF 4 file is inconsistent. Return findings where it has
+    more records than it announces."""
     size = path.stat().st_size
     if size < FIRST_BLOCK_OFFSET + HEAD_BYTES:
         raise InputError(path, f"byte {size}", None, "the file ends in its header")
@@ -52,7 +53,7 @@ def check_blocks(path: Path) -> list[Finding]:
 
 
 def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, MdfBlock]]:
-    """Every block that a link leads to, with its place."""
+    """Every block that a link points to, by its position in the file."""
     seen, ahead, cut = (
         {FIRST_BLOCK_OFFSET},
         [FIRST_BLOCK_OFFSET],
@@ -75,7 +76,7 @@ def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int
 
 
 def _chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
-    """Refuse a chain that leads back into itself."""
+    """Refuse a chain of links that leads back to one of its own blocks."""
     ended: set[int] = set()
     for place in blocks:
         chain: dict[int, None] = {}
@@ -88,7 +89,8 @@ def _chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
 
 
 def _records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
-    """Refuse channel groups that announce more records than their data group has bytes for; say where it has more."""
+    """Refuse channel groups that announce more records than their data group has bytes for; return findings where it
+    has more bytes."""
     there = sum(_length(path, at, blocks) for at in _data(path, group.links[2], blocks))
     id_size = group.data[0]
     needed, loose, at = 0, False, group.links[1]
@@ -109,7 +111,7 @@ def _records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock
 
 
 def _data(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
-    """Places of the data blocks behind a link to them or to a list of them."""
+    """Positions of the data blocks that a link leads to, directly or through a list."""
     places, ahead = list[int](), [place]
     while ahead:
         at = ahead.pop()
@@ -123,7 +125,7 @@ def _data(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
 
 
 def _length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
-    """Bytes of records in a data block, unpacked."""
+    """Number of bytes of records in a data block after unpacking."""
     block = blocks[place]
     if block.kind != b"##DZ":
         return block.length - HEAD_BYTES - 8 * len(block.links)

@@ -26,7 +26,7 @@ DATED = "2026-11-21T08:00:00+00:00"
 
 @dataclass(frozen=True)
 class Opened(ABC):
-    """A file whose channels are known; its samples are read when asked for, and no handle stays open between."""
+    """An open file with known channels. Samples are read on demand, and no file handle stays open between reads."""
 
     path: Path
     channels: tuple[Channel, ...]
@@ -35,7 +35,7 @@ class Opened(ABC):
     noticed: tuple[Finding, ...]
 
     def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[SampleBlock]:
-        """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
+        """Blocks of channels of one group, as specified in ``models.measured.channel.Source``."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
         spans = ((i, min(length, count - i)) for i in range(first, count, length))  # a damaged file may claim billions
@@ -43,10 +43,11 @@ class Opened(ABC):
 
     @abstractmethod
     def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Times (n,) in s and values (n, chosen) of each span, by the format; fewer where the file ends."""
+        """Times (n,) in s and values (n, chosen) of each span, read by the format's own method; fewer where the file
+        ends."""
 
     def _chosen(self, names: Sequence[str]) -> list[int]:
-        """Indices of channels, which must be of one group."""
+        """Indices of the named channels, which must belong to one group."""
         place = {channel.name: i for i, channel in enumerate(self.channels)}
         for name in names:
             if name not in place:
@@ -69,7 +70,7 @@ class Opened(ABC):
                 yield SampleBlock(first, times, values)
 
     def _finite(self, first: int, names: list[str], values: np.ndarray, valid: np.ndarray) -> None:
-        """Refuse the first value that is not a measured one."""
+        """Refuse the first value that is infinite and so cannot be measured."""
         if not valid.all():
             row, column = (int(i[0]) for i in np.nonzero(~valid))
             place = f"channel {names[column]!r}, sample {first + row}"
@@ -79,7 +80,7 @@ class Opened(ABC):
 
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """Whatever a reader raises on a damaged file becomes one message."""
+    """Convert any exception that a library raises on a damaged file into an InputError with one message."""
     try:
         yield
     except InputError:
@@ -92,22 +93,22 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
-    """Finding of a reader on a file that it could read all the same."""
+    """Finding on a flaw in a file that could be read nevertheless."""
     return Finding("file", weight, place or path.name, text)
 
 
 @dataclass
 class LeftOut:
-    """Names of channels that a reader skips, by reason; each reason is a single finding for all its channels."""
+    """Names of channels that a reader skips, grouped by reason; each reason gives a single finding."""
 
     names: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, why: str, name: str) -> None:
-        """One more."""
+        """Record one more channel that is skipped for the reason ``why``."""
         self.names[why].append(name)
 
     def findings(self, path: Path) -> list[Finding]:
-        """One sentence per reason."""
+        """One finding per reason, with the names of the skipped channels."""
         more = {
             why: f" and {len(names) - SHOWN_NAMES} more"
             for why, names in self.names.items()
@@ -118,13 +119,13 @@ class LeftOut:
 
 
 def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
-    """Error for a file that has no channel to read, with what was said of it."""
+    """Error for a file without a readable channel; it includes the findings made so far."""
     reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in findings)]
     return InputError(path, "channels", None, "; ".join(reasons))
 
 
 def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
-    """Names of which each occurs once, and what is to be said of repeated ones.
+    """Names made unique, and findings on the names that occurred more than once.
 
     A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that
     tells all its channels apart, and ``Fz (1)``, ``Fz (2)`` where none does.
@@ -146,7 +147,7 @@ def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> 
 
 
 def _number_repeated(names: Sequence[str]) -> list[str]:
-    """Names with a number behind those that are repeated."""
+    """Names of which repeated ones have a number appended."""
     uses, taken, unique = Counter(names), set(names), []
     for name in names:
         if uses[name] > 1:
@@ -158,7 +159,7 @@ def _number_repeated(names: Sequence[str]) -> list[str]:
 
 
 def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
-    """Start from text in ISO 8601; None, and a word about it, where it is no date or has no zone."""
+    """Start time from ISO 8601 text; None, with a finding, where the text is no date or has no time zone."""
     try:
         start = datetime.fromisoformat(text.strip())
     except ValueError:

@@ -30,7 +30,8 @@ HISTORIES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
 
 @dataclass(frozen=True)
 class Layout:
-    """Where samples are: byte of the first group, points of a group, channels in it, type, factor of each channel."""
+    """Where the samples are: byte of the first group, points in a group, number of channels, data type, factor of each
+    channel."""
 
     begin: int
     points: int
@@ -42,7 +43,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class RpcFile(Opened):
-    """Groups of equal length, read through a window of the file."""
+    """Groups of equal length, read through a memory window of the file."""
 
     layout: Layout
 
@@ -65,7 +66,7 @@ class RpcFile(Opened):
 
 
 def open_rpc(path: Path) -> RpcFile:
-    """Read the header and hold it against the length of the file; raises InputError."""
+    """Read the header, and compare it with the length of the file; raises InputError."""
     with readable(path):
         parameters = read_parameters(path)
         layout = _layout(path, parameters)
@@ -94,7 +95,7 @@ def open_rpc(path: Path) -> RpcFile:
 
 
 def read_parameters(path: Path) -> dict[str, str]:
-    """Parameters of the header by name; the first three are at fixed places and say how many follow."""
+    """Parameters of the header by name; the first three have fixed positions and give the number of the others."""
     with path.open("rb") as file:
         head = file.read(BLOCK)
         if len(head) < BLOCK:
@@ -114,7 +115,7 @@ def read_parameters(path: Path) -> dict[str, str]:
 
 
 def _record(record_bytes: bytes, i: int) -> tuple[str, str]:
-    """Name and value of one parameter, each ended by a zero byte."""
+    """Name and value of one header parameter; both are ended by a zero byte."""
     record = record_bytes[i * RECORD : (i + 1) * RECORD]
     key, value = (part.split(b"\0")[0] for part in (record[:KEY], record[KEY:]))
     try:
@@ -124,7 +125,7 @@ def _record(record_bytes: bytes, i: int) -> tuple[str, str]:
 
 
 def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int) -> int:
-    """A whole number from 1 to ``maximum``."""
+    """A parameter that must be a whole number from 1 to ``maximum``."""
     text = parameters.get(name, "").strip()
     if not re.fullmatch(r"\d{1,18}(\.0*)?", text) or not 1 <= int(float(text)) <= maximum:
         raise InputError(path, f"header, {name}", text, f"a whole number from 1 to {maximum} is needed")
@@ -132,7 +133,7 @@ def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int
 
 
 def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
-    """Return a finite number."""
+    """A parameter that must be a finite number."""
     try:
         value = float(parameters.get(name, ""))
     except ValueError:
@@ -164,7 +165,7 @@ def _layout(path: Path, parameters: dict[str, str]) -> Layout:
 
 
 def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
-    """Samples that can be used, and what is missing or too many."""
+    """Number of usable samples, and findings on missing or surplus ones."""
     frame = whole_number(path, parameters, "PTS_PER_FRAME", layout.points)
     announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
     size = layout.points * layout.width * layout.dtype.itemsize
@@ -191,7 +192,7 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
 
 
 def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
-    """Refuse names beyond the number of channels; say which channels have none."""
+    """Refuse names with a number above that of the channels; findings on channels without a name."""
     numbers = {int(matched[1]) for key in parameters if (matched := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
     if numbers and max(numbers) > width:
         raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")

@@ -32,7 +32,8 @@ EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 @dataclass(frozen=True)
 class ChannelLocation:
-    """Where a channel is: group and name in the file, the name of the clock or first time and increment (s)."""
+    """Where a channel's data are: group and name in the file, and either the name of its time channel, or first time
+    and increment (s)."""
 
     group: str
     name: str
@@ -43,12 +44,12 @@ class ChannelLocation:
 
 @dataclass(frozen=True)
 class TdmsData(Opened):
-    """Reader of a TDMS file that knows the place of every channel."""
+    """Reader of a TDMS file with the location of every channel."""
 
     places: tuple[ChannelLocation, ...]
 
     def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Read each channel's own part of each span."""
+        """Read the samples of each span, separately for each channel."""
         places = [self.places[i] for i in channel_indices]
         with Bounded(self.path) as file:
             data = opened(self.path, file)
@@ -63,7 +64,7 @@ class TdmsData(Opened):
 
 
 class Bounded(io.BufferedReader):
-    """A file whose reads allocate no more memory than the file has bytes: a damaged length field may claim
+    """A file whose reads never allocate more memory than the file's size, since a damaged length field may claim
     gigabytes."""
 
     def __init__(self, path: Path) -> None:
@@ -71,12 +72,12 @@ class Bounded(io.BufferedReader):
         self.size = path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Read no more bytes than are left."""
+        """Read at most the bytes that remain in the file."""
         return super().read(size if size is None or size < 0 else min(size, max(self.size - self.tell(), 0)))
 
 
 def opened(path: Path, file: Bounded) -> Any:
-    """Return npTDMS's file, without a word on the terminal; InputError where the package is missing."""
+    """npTDMS's open file, with its terminal output suppressed; InputError where the package is missing."""
     try:
         from nptdms import TdmsFile
         from nptdms.log import log_manager
@@ -95,7 +96,7 @@ def open_tdms(path: Path) -> TdmsData:
 
 
 def check_segments(path: Path) -> list[Finding]:
-    """Follow the segments from one to the next; a last one that is cut off is said, any other damage raised."""
+    """Follow the chain of segments. An incomplete last one gives a finding, any other damage an error."""
     size, place = path.stat().st_size, 0
     with path.open("rb") as file:
         while place < size:
@@ -124,7 +125,7 @@ def _cut(path: Path, offset: int) -> Finding:
 
 
 def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
-    """Channels that hold numbers over time, those of one clock in one group."""
+    """Channels that hold numbers over time; channels with the same time axis form a group."""
     left = LeftOut()
     usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
@@ -174,7 +175,7 @@ def _numeric(channel: Any, skipped_channels: LeftOut) -> bool:
 def _channel_location(
     group: Any, channel: Any, zero: datetime | None, skipped_channels: LeftOut
 ) -> ChannelLocation | None:
-    """Where a channel's samples and times are; None where it has no clock or is one."""
+    """Location of a channel's samples and times; None where it has no time axis, or is a time axis itself."""
     properties, start = channel.properties, _start_in_utc(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
@@ -201,7 +202,7 @@ def _channel_location(
 
 
 def _start_in_utc(channel: Any) -> datetime | None:
-    """When a channel began, in UTC; None where the file does not say."""
+    """Date and time in UTC at which a channel begins; None where the file does not say."""
     stamp = channel.properties.get("wf_start_time")
     if not hasattr(stamp, "seconds"):
         return None
@@ -210,11 +211,11 @@ def _start_in_utc(channel: Any) -> datetime | None:
 
 
 def _text(channel: Any, *names: str) -> str:
-    """First of some properties that is there."""
+    """Value of the first of some properties that the channel has."""
     return next((str(channel.properties[name]).strip() for name in names if name in channel.properties), "")
 
 
 def _resolution(channel: Any) -> float:
-    """Step between values of whole numbers without a scaling; 0 otherwise."""
+    """Step between values stored as whole numbers without a scaling; 0 otherwise."""
     scaled = any(name.startswith("NI_Scale") for name in channel.properties)
     return 1.0 if channel.dtype.kind in "iu" and not scaled else 0.0

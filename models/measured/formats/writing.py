@@ -85,7 +85,7 @@ def check(path: Path, groups: Sequence[ChannelGroup], start: datetime | None) ->
 
 
 def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) -> ChannelGroup:
-    """The only group of a format with one clock."""
+    """The single group of channels, for a format that has only one clock."""
     if len(groups) != 1:
         raise InputError(
             path, "groups", len(groups), f"{format_name} has one sampling rate: write a file for each, or MDF 4"
@@ -94,13 +94,14 @@ def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) ->
 
 
 def missing(path: Path, format_name: str, package: str) -> InputError:
-    """Error for a package that is not installed."""
+    """Error for a format whose package is not installed."""
     return InputError(path, "", None, f"{format_name} files need {package}: pip install 'twinrig[measured]'")
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Path to write to, beside ``path`` and with its extension; ``path`` itself appears when all is written.
+    """Context with a temporary path beside ``path`` and with its extension; it is renamed to ``path`` when all is
+    written.
 
     Raises InputError where ``path`` exists, before or after, or nothing can be written; then nothing is left behind.
     """
@@ -160,7 +161,7 @@ def _csv_header(group: ChannelGroup, start: datetime | None, comment: str) -> st
 def write_mdf(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Append the blocks to a temporary file beside ``temporary``, then save it as a whole."""
+    """Append the blocks to a second temporary file, then save it as the complete file ``temporary``."""
     try:
         from asammdf import MDF
     except ImportError:
@@ -182,7 +183,7 @@ def write_mdf(
 
 
 def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values: np.ndarray) -> None:
-    """Add a block to a group that the first one begins."""
+    """Append a block to a group; the first block creates the group."""
     from asammdf import Signal
 
     columns = np.ascontiguousarray(values.T)
@@ -199,7 +200,7 @@ def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values
 def write_tdms(
     path: Path, temporary: Path, groups: Sequence[ChannelGroup], start: datetime | None, comment: str
 ) -> None:
-    """Write the groups one after the other, each block as one segment."""
+    """Write the groups one after the other, with one segment per block."""
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:
@@ -246,7 +247,7 @@ def write_rpc(
 
 
 def _frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
-    """Values in frames of equal length, the last one filled up with the last values."""
+    """Values in frames of equal length; the last frame is padded with the last values."""
     kept = np.empty((0, len(group.names)))
     for first, values in group.rows(path):
         if (np.abs(values) > np.finfo("<f4").max).any():
@@ -300,7 +301,7 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
 
 
 def _record(path: Path, key: str, value: str) -> bytes:
-    """One parameter."""
+    """One header parameter as bytes."""
     try:
         text = value.encode("latin-1")
     except UnicodeEncodeError as error:

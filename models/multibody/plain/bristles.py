@@ -22,8 +22,9 @@ LARGEST_EXPONENT = 50.0
 
 
 class Net(NamedTuple):
-    """Strips: place y / b, half length by a, share of the load per cell and height; cells: places of their centres and
-    of the middles of the steps to them, bounds there; ``peak``: pressure in the patch's middle times a b / N."""
+    """Grid of the contact patch. Strips: position y / b, ratio of half length to a, share of the load per cell and
+    height; cells: positions of their centres and of the middles of the steps to them, bounds at both; ``peak``:
+    pressure in the patch's middle times a b / N."""
 
     y: np.ndarray
     half: np.ndarray
@@ -37,7 +38,7 @@ class Net(NamedTuple):
 
 @cache
 def net(cells: int) -> Net:
-    """Strips of one width, an even number of at least ``cells``, with ``cells`` cells each."""
+    """Grid with an even number of strips, at least ``cells``, of equal width, and ``cells`` cells in each."""
     count = cells + cells % 2
     y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells
@@ -76,13 +77,13 @@ def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
 
 
 def cornering_factor(cells: int) -> float:
-    """Cornering stiffness by a^2 b k, as the net sums it up, nearly 8/3: that of a bound that nothing reaches."""
+    """Ratio, near 8/3, of the cornering stiffness without sliding to a^2 b k, as the grid of cells sums it up."""
     ones = np.ones(1)
     return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
 
 
 def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
-    """Forces (w, 3) of tyres that roll forwards."""
+    """Forces fx, fy and moments mz (w, 3) of tyres that roll forwards."""
     of = net(cells)
     a, b = patch.half_length[:, None], patch.half_width[:, None]
     grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
@@ -99,7 +100,7 @@ def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) ->
 
 
 def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sums over all cells of tractions (complex) and of place times lateral traction, of many strips.
+    """Sums over the cells of each strip: of tractions (complex), and of position times lateral traction.
 
     slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
     """
@@ -114,7 +115,7 @@ def _march(net: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray,
 
 
 def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions limited to a bound, and flags of those that were above it."""
+    """Tractions limited to a bound, and flags of those that exceeded it."""
     size = np.abs(traction)
     beyond = size > bound
     return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
@@ -127,7 +128,8 @@ def _advance(
     turn: np.ndarray,
     bounds: tuple[float, float, float],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tractions in the next cell, and which bristles slide there; bounds: there, before, and between."""
+    """Tractions in the next cell, and which bristles slide there; bounds: in that cell, in the one before, and between
+    them."""
     bound, last, between = bounds
     stuck = tractions_before - w
     after, beyond = _cut(stuck, bound)

@@ -23,21 +23,21 @@ SQUARE = ((2, 1), (2, 0), (0, 1))
 
 
 class ConstraintTerms(NamedTuple):
-    """What constraints ask at a state: J (c, n), J' q' (c,)."""
+    """Acceleration-level terms of constraints at a state: Jacobian J (c, n), and J' q' (c,)."""
 
     rows: np.ndarray
     rest: np.ndarray
 
 
 class Gap(NamedTuple):
-    """How far coordinates are from satisfying constraints, (c,) in m and rad, and what changes that, (c, n)."""
+    """Violation (c,) of constraints in m and rad at some coordinates, and its derivative (c, n)."""
 
     size: np.ndarray
     rows: np.ndarray
 
 
 class PlainConstraints:
-    """Constant rows (r, n) with rows q = offsets (r,), and joints between bodies."""
+    """Linear constraints rows q = offsets with rows (r, n) and offsets (r,), and joints between bodies."""
 
     def __init__(self, bodies: Bodies, rows: np.ndarray, offsets: np.ndarray, joints: Sequence[Joint]) -> None:
         self._bodies, self._rows, self._offsets = bodies, rows, offsets
@@ -46,33 +46,36 @@ class PlainConstraints:
         self._turns = [([bodies.row[name] if name else GROUND for name, _ in ends], axes) for ends, axes in turns]
 
     def asked(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
-        """At coordinates and rates (n,)."""
+        """``ConstraintTerms`` at coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
         terms = np.hstack((self._apart(motion), *(_products(*each).T for each in self._turned(motion))))
         rest = np.concatenate((np.zeros(len(self._rows)), terms[REST]))
         return ConstraintTerms(np.vstack((self._rows, terms[FIRST:].T)), rest)
 
     def gap(self, q: np.ndarray) -> Gap:
-        """At coordinates (n,); of axes the rotation vector between them, which is 0 where they lie alike alone."""
+        """``Gap`` at coordinates (n,). Between axes it is the rotation vector, which vanishes only where the axes
+        coincide."""
         motion = self._bodies.move(q, np.zeros_like(q))
         apart, turned = self._apart(motion), [rotation(*each) for each in self._turned(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
         return Gap(size, np.vstack((self._rows, apart[FIRST:].T, *(each.rows for each in turned))))
 
     def _apart(self, motion: PlainMotion) -> np.ndarray:
-        """(3 + n, 3 p): vectors between points, with their rates and derivatives in the rows of a motion."""
+        """Vectors between the points of p constraints, with their rates and derivatives, (3 + n, 3 p), rows as in a
+        ``PlainMotion``."""
         ends = motion.at(self._ends)
         apart: np.ndarray = (ends[1::2] - ends[::2]).transpose(1, 0, 2).reshape(len(motion.matrices[0]), -1)
         return apart
 
     def _turned(self, motion: PlainMotion) -> Iterator[list[np.ndarray]]:
-        """(3 + n, 3, 3) each: axes of both bodies as columns, with their rates and derivatives."""
+        """Axes of both bodies of each joint as columns, with their rates and derivatives, (3 + n, 3, 3) each."""
         for rows, axes in self._turns:
             yield [motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
 
 
 def _products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(3, 3 + n): products of pairs of axes of two bodies, by the product rule."""
+    """Scalar products (3, 3 + n) of three pairs of axes of two bodies, with rates and derivatives by the product
+    rule."""
     terms = np.empty((len(SQUARE), len(first)))
     for term, (i, j) in zip(terms, SQUARE, strict=True):
         axis, other = first[:, :, i], second[:, :, j]
@@ -83,17 +86,18 @@ def _products(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def rotation(first: np.ndarray, second: np.ndarray) -> Gap:
-    """The rotation vector from the first axes to the second (3,) in the first, and what turns it (3, n)."""
+    """Rotation vector (3,) from the first to the second axes, given in the first, and its derivative (3, n)."""
     turn = first[PLACE].T @ second[PLACE]
     change = first[FIRST:].transpose(0, 2, 1) @ second[PLACE] + first[PLACE].T @ second[FIRST:]
     return Gap(Rotation.from_matrix(turn).as_rotvec(), _spins(change @ turn.T))
 
 
 def turning_rows(axes: np.ndarray) -> np.ndarray:
-    """(3, n): angular velocity of a body in space by the rates of coordinates, from its axes in a motion."""
+    """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space, from the body's axes in a
+    motion."""
     return _spins(axes[FIRST:] @ axes[PLACE].T)
 
 
 def _spins(rates: np.ndarray) -> np.ndarray:
-    """(3, n): vectors of n matrices (3, 3) that turn."""
+    """Rotation vectors (3, n) of n skew-symmetric matrices (3, 3)."""
     return np.array((rates[:, 2, 1], rates[:, 0, 2], rates[:, 1, 0]))

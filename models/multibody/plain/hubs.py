@@ -32,7 +32,8 @@ class HubState(NamedTuple):
 
 
 class PlainHubs:
-    """A driven cut vehicle; ``step`` (s) is that of the rows of its hub inputs, two to a step.
+    """A cut vehicle driven by its hub inputs, in plain numpy. ``step`` (s) covers two intervals between rows of the
+    inputs.
 
     any_time : whether the hub inputs are read between its rows, too, for methods that pick their own steps.
     """
@@ -67,7 +68,8 @@ class PlainHubs:
         return HubState(acceleration, inside, wrenches, moments)
 
     def _inputs(self, t: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Rows of the hubs and of the guide at a time (s): the nearest ones, or by differences of a step's three."""
+        """Inputs of the hubs and of the guide at a time (s): the nearest rows, or a parabola through the three rows of
+        a step."""
         last, place = len(self.hub_inputs.hubs) - 1, 2.0 * t / self.step
         if not self.any_time:
             nearest = min(max(round(place), 0), last)
@@ -94,7 +96,7 @@ class PlainHubs:
         return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
     def _act(self, motion: PlainMotion, hubs: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of all hubs by a row of the hub inputs, and their wrenches (h, 6)."""
+        """Generalised forces (n,) of all hubs for one row of the inputs, and the hubs' wrenches (h, 6)."""
         points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
         for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
             axes = motion.axes(int(frame))[PLACE]
@@ -110,7 +112,7 @@ class PlainHubs:
     def _tyre(
         self, i: int, hub: np.ndarray, motion: PlainMotion, road: tuple[float, float], q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Force (N) and moment (N m) in space at a hub by its tyre on a road of a height (m) and rate (m/s)."""
+        """Force (N) and moment (N m) in space on a hub from its tyre, on a road with height (m) and rate (m/s)."""
         tyre, (cornering, roll_steer), speed = self.vehicle.uncut.tyres[i], self._sides[i], self.hub_inputs.speed
         height, rising = road
         down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
@@ -127,7 +129,8 @@ class PlainHubs:
     def _guide_accelerations(
         self, mass: np.ndarray, force: np.ndarray, guide: np.ndarray | None, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""
+        """Accelerations (n,), and moments (2,) on roll and pitch in N m that pull the vehicle towards its guide or hold
+        it there."""
         hub_inputs, moments = self.hub_inputs, np.zeros(2)
         if guide is None:
             return np.linalg.solve(mass, force), moments

@@ -25,7 +25,7 @@ Load = tuple[str, Vector, np.ndarray]
 
 
 class Acting(NamedTuple):
-    """What acts on bodies besides gravity and joint elements; lists may be empty."""
+    """Forces on bodies besides gravity and joint elements; any of the lists may be empty."""
 
     loads: Sequence[Load] = ()
     lines: Sequence[Line] = ()
@@ -38,7 +38,7 @@ NOTHING_ACTS = Acting()
 
 
 def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
-    """(e, n): what every joint element's d is made of, by the coordinates."""
+    """Rows (e, n) of factors of the coordinates in the displacement of each joint element."""
     rows = np.zeros((len(vehicle.joint_elements), bodies.size))
     for row, element in zip(rows, vehicle.joint_elements, strict=True):
         for place, factor in zip(element.coordinates, element.factors, strict=True):
@@ -47,7 +47,7 @@ def joint_rows(bodies: Bodies, vehicle: SpatialVehicle) -> np.ndarray:
 
 
 def joint_numbers(vehicle: SpatialVehicle) -> np.ndarray:
-    """(4, e): stiffness, damping, preload and inertia of every joint element."""
+    """Stiffness, damping, preload and inertia (4, e) of every joint element."""
     numbers = [(e.stiffness, e.damping, e.held, e.inertia) for e in vehicle.joint_elements]
     return np.array(numbers).reshape(-1, 4).T
 
@@ -70,7 +70,8 @@ class PlainTree:
         self._friction, self._slides = np.array([rest for _, *rest in frictions]).reshape(-1, 2).T
 
     def mass_and_force(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mass matrix (n, n) and forces (n,), less what inertia asks without q'', at coordinates and rates (n,)."""
+        """Mass matrix (n, n), and forces (n,) including inertia forces without the q'' terms, at coordinates and rates
+        (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.gravity)
         along = self._held + self._stiffness * (self._rows @ q) + self._damping * (self._rows @ v)
@@ -89,7 +90,7 @@ class PlainTree:
         return mass + self._rows.T * self._inertia @ self._rows, force
 
     def _line_spring_forces(self, motion: PlainMotion) -> np.ndarray:
-        """Generalised forces (n,) of springs along lines: -F dl/dq, l the distance of their ends."""
+        """Generalised forces (n,) of springs along straight lines: -F dl/dq, with l the distance between their ends."""
         total, ends = np.zeros(self.size), motion.at(self._ends)
         for (_, stiffness, damping, length), first, second in zip(self._lines, ends[::2], ends[1::2], strict=True):
             apart = second - first
@@ -100,7 +101,8 @@ class PlainTree:
         return total
 
     def _turning_resistance(self, turn: Turn, motion: PlainMotion, v: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) that a spring and damper between two bodies' turning overcome."""
+        """Generalised forces (n,) against which the relative rotation of two bodies works, from a spring and damper
+        between them."""
         bodies, axes, stiffness, damping = turn
         rows = [self.bodies.row[name] if name else GROUND for name in bodies]
         first, second = (motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True))
@@ -109,7 +111,7 @@ class PlainTree:
         return resistance
 
     def applied(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Forces (n,) without those of inertia: their power with the rates is the rate of the kinetic energy."""
+        """Applied forces (n,), without inertia forces; their power is the rate of change of kinetic energy."""
         _, inertia = self.bodies.inertia(self.bodies.move(q, v), np.zeros(3))
         return self.mass_and_force(0.0, q, v)[1] - inertia
 

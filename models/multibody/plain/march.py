@@ -11,7 +11,8 @@ Acceleration = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
 
 
 def march(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
-    """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each, by steps (s); NaN where it blows up."""
+    """Positions and rates (steps + 1, 2 n), integrated from the start values (n,) each, by steps (s); NaN where the
+    motion diverges."""
     states = np.empty((steps + 1, 2 * len(q)))
     states[0] = np.concatenate((q, v))
 

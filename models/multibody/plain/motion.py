@@ -24,7 +24,7 @@ PLACE, RATE, REST, FIRST = range(4)
 
 
 def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
-    """G (4, 4) of a freedom: a shift along, or a turn about, one of the axes (rows)."""
+    """Generator matrix G (4, 4) of a freedom: translation along, or rotation about, one of the axes (rows)."""
     kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
     x, y, z = axes[kind % 3]
     if kind < 3:
@@ -36,7 +36,8 @@ def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of bodies: their rows among the bodies (p,), and where they are from the bodies' centres (p, 4), m, 1."""
+    """Points on bodies: indices of their bodies (p,), and homogeneous coordinates from the bodies' centres (p, 4), in
+    m, the last one 1."""
 
     rows: np.ndarray
     arms: np.ndarray
@@ -44,29 +45,33 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class PlainMotion:
-    """All bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the space first."""
+    """Motion of all bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the first body being the
+    space."""
 
     matrices: np.ndarray
 
     def at(self, points: Points) -> np.ndarray:
-        """(p, 3 + n, 3): place (m), velocity, acceleration without q'', and derivatives by q of points, in space."""
+        """For each point in space: position (m), velocity, acceleration without the q'' terms, then derivatives by q;
+        (p, 3 + n, 3)."""
         rows = self.matrices[points.rows]
         count = rows.shape[1]
         return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)
 
     def axes(self, row: int) -> np.ndarray:
-        """(3 + n, 3, 3): a body's axes as columns, their rates, second rates without q'', derivatives by q."""
+        """A body's axes as columns, their rates, second derivatives without the q'' terms, and derivatives by q: (3 +
+        n, 3, 3), in this order."""
         axes: np.ndarray = self.matrices[row, :, :, :3]
         return axes
 
     def turning(self, row: int) -> np.ndarray:
-        """(3,) rad/s: angular velocity of a body in space, half the sum of axis x its rate."""
+        """Angular velocity (3,) in rad/s of a body in space: half the sum of the products axis x rate of axis."""
         axes = self.axes(row)
         spin = axes[RATE] @ axes[PLACE].T
         return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
 
     def by_moment(self, row: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of a moment (N m, in space) on a body: couples of forces M x axis / 2 at its axes."""
+        """Generalised forces (n,) of a moment M (N m, in space) on a body, applied as couples of forces M x axis / 2 at
+        its axes."""
         axes = self.axes(row)
         x, y, z = moment.tolist()
         couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
@@ -92,7 +97,7 @@ class Bodies:
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
 
     def _arm(self, vehicle: SpatialVehicle, name: str) -> np.ndarray:
-        """(4, 4): shift from the parent's centre, or from the origin, to a body's own."""
+        """Translation (4, 4) from the parent's centre, or from the origin, to the centre of a body."""
         parent, arm = vehicle.body(name).parent, np.eye(4)
         arm[:3, 3] = self.position[name] - (self.position[parent] if parent else 0.0)
         return arm
@@ -103,13 +108,13 @@ class Bodies:
         return self.places.index(place) if place in self.places else -1
 
     def points(self, places: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
-        """Points (body, or None for the space; m in the design position) as this vehicle has them."""
+        """``Points`` of this vehicle, from pairs of body (None for space) and position in the design position (m)."""
         rows = [self.row[body] if body else GROUND for body, _ in places]
         arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
         return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
-        """All bodies at coordinates and rates (n,): m, rad, per s."""
+        """Motion of all bodies at coordinates and rates (n,): m, rad, per s."""
         matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
         matrices[GROUND, PLACE, :, :3] = np.eye(3)
         first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)
@@ -122,7 +127,7 @@ class Bodies:
         return PlainMotion(matrices)
 
     def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
-        """Rows of matrices behind joint j, by the product rule, from those before it."""
+        """Rows of the matrices behind joint j, from those before the joint, by the product rule."""
         rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
         turned = (rows[:REST].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
         rows[FIRST + j] = turned[PLACE]
@@ -131,7 +136,8 @@ class Bodies:
         return rows
 
     def inertia(self, motion: PlainMotion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mass matrix (n, n), and forces (n,) of weights (gravity (3,), m/s^2) less what inertia asks without q''."""
+        """Mass matrix (n, n), and forces (n,): weights by gravity (3,) in m/s^2, less inertia forces without the q''
+        terms."""
         columns = motion.matrices[1:, FIRST:]
         count = self.size
         weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)

@@ -14,13 +14,14 @@ from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDa
 
 
 def frame_of(element: SpringDamper | AntiRollBar, default: str | None) -> str | None:
-    """Body in whose axes a part's axis is fixed, None for the space: its own frame, or the system's default."""
+    """Body in which the axis of a spring or bar is fixed (None for space): the part's own choice, or ``default``."""
     return getattr(element, "frame", None) or default
 
 
 @dataclass(frozen=True, eq=False)
 class Travels:
-    """Travel (p,), its rate (p,) and its derivatives by the coordinates (p, n): m, or rad of a bar."""
+    """Travels (p,) of springs and bars, their rates (p,) and their derivatives with respect to the coordinates (p, n):
+    m, or rad for a bar."""
 
     travel: np.ndarray
     rate: np.ndarray
@@ -28,7 +29,7 @@ class Travels:
 
 
 class PlainParts:
-    """The springs, then the bars, of a vehicle on its bodies; ``default`` is the frame of those that name none."""
+    """The springs, then the bars, of a vehicle; ``default`` is the frame of those that name none."""
 
     def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
         springs, bars = vehicle.springs, vehicle.bars
@@ -57,7 +58,8 @@ class PlainParts:
         self._design = self.travels(bodies.move(still, still), still, still).travel
 
     def travels(self, motion: PlainMotion, q: np.ndarray, v: np.ndarray) -> Travels:
-        """Travels at coordinates and rates (n,) in whose motion all bodies are."""
+        """Travels of all springs and bars at coordinates and rates (n,), for which ``motion`` holds the motion of the
+        bodies."""
         axes, apart = motion.at(self._axes), motion.at(self._two) - motion.at(self._one)
         axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]
         all_ways = ((apart @ axis) + (axes @ way))[:, :, 0]
@@ -65,8 +67,8 @@ class PlainParts:
         return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST:] + self._rolls)
 
     def forces(self, travels: Travels, preloads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (p,) that draw both ends together, N or N m: of springs with preloads ``preloads`` (p,), and of all
-        else: dampers, friction and curves."""
+        """Forces (p,) that pull both ends together, N or N m: from springs with preloads ``preloads`` (p,), dampers,
+        friction and curves."""
         other = self.damping * travels.rate + self.friction * np.tanh(travels.rate / self.friction_rate)
         for i, on_travel, on_rate in self._curves:
             other[i] += on_travel(float(travels.travel[i])) if on_travel else 0.0

@@ -19,7 +19,8 @@ def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray
 
 
 def driven(knots: Knots, t: float) -> tuple[float, float]:
-    """Value and rate of a control at a time (s): at rest at knots; between, 6 u^5 - 15 u^4 + 10 u^3 of the rise."""
+    """Value and rate of a control at a time (s): at rest at knots; between knots it changes by the fraction 6 u^5 - 15
+    u^4 + 10 u^3."""
     for (start, low), (end, high) in pairwise(knots):
         if start < t < end:
             u = (t - start) / (end - start)

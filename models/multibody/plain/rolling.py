@@ -54,7 +54,7 @@ class Ledger(NamedTuple):
 
 
 class State(NamedTuple):
-    """Accelerations (n,) at one state, and what acts there."""
+    """Accelerations (n,) at one state, with the report of the tyres and the ledger of energy."""
 
     acceleration: np.ndarray
     tyres: TyreReport
@@ -116,8 +116,8 @@ class PlainRolling:
         self._shares_of_tyres(tyres)
 
     def _shares_of_tyres(self, tyres: tuple[Tyre, ...]) -> None:
-        """Shares of steering, brake and drive of every tyre: wheels of an axle share evenly, and so do axles behind;
-        what is towed is not driven."""
+        """Each tyre's share in steering, brake and drive. Wheels of an axle share evenly, and so do rear axles;
+        trailers are not driven."""
         axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
         beside, behind, front = np.array([np.sum(axles == axle) for axle in axles]), max(axles.max(), 1), axles == 0
         self._steered = front.astype(float)
@@ -186,7 +186,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _loads_and_points(self, motion: PlainMotion, points: np.ndarray, steer: np.ndarray) -> TyreContact:
-        """Loads of the tyres on the road and their contact points; steer (w,), rad."""
+        """``TyreContact`` with the tyres' loads and contact points on the road; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
@@ -207,7 +207,8 @@ class PlainRolling:
     def _slide(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, steering: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside what carries them, rad/s.
+        """Sliding velocities (w, 4) as ``bristles`` takes them, and spin rates (w,) of the wheels relative to the
+        bodies that carry them, rad/s.
 
         steering (w,) : rates of steering, rad/s.
         """
@@ -221,8 +222,8 @@ class PlainRolling:
         return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
     def _axles(self, motion: PlainMotion, steer: np.ndarray) -> np.ndarray:
-        """Axles (w, 3), to the left of their wheels: steered and leaning beside where the carrier heads, or a towed
-        body by its x axis in the road's plane."""
+        """Unit vectors (w, 3) along the axles, to the left: steered and inclined relative to the heading of the
+        carrier, or of a towed body's x axis in the road's plane."""
         ahead = np.array([motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
         ahead /= _length(ahead)[:, None]
         left, level = _cross(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
@@ -231,7 +232,7 @@ class PlainRolling:
         return axles
 
     def _creep(self, contact: TyreContact, slides: np.ndarray) -> np.ndarray:
-        """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
+        """Creep forces along and across (N) and moments (N m), (w, 3), from sliding velocities ``slides`` (w, 4)."""
         of, ones = self.handling.tyres, np.ones(len(slides))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
@@ -240,7 +241,8 @@ class PlainRolling:
     def _tyre_forces(
         self, motion: PlainMotion, points: np.ndarray, contact: TyreContact, creep: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
+        """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of creep about the wheels'
+        centres."""
         force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
         moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
         total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
@@ -254,7 +256,7 @@ class PlainRolling:
         return total, moments
 
     def _hold(self, motion: PlainMotion, i: int, moment: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of a moment that what carries wheel i takes over from the wheel's body."""
+        """Generalised forces (n,) when the body that carries wheel i takes over a moment from the wheel's body."""
         return motion.by_moment(self._carrying[i], moment) - motion.by_moment(int(self._points.rows[i]), moment)
 
     def _torques(self, t: float, relative_spin: np.ndarray) -> np.ndarray:
@@ -268,7 +270,8 @@ class PlainRolling:
         return np.where(self._rotors >= 0, torque, 0.0)
 
     def _turn_wheels(self, motion: PlainMotion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """Generalised forces (n,) of torques on the wheels, and against them on what carries these."""
+        """Generalised forces (n,) of torques on the wheels, and of the opposite torques on the bodies that carry
+        them."""
         total = np.zeros(self.bodies.size)
         for i in np.flatnonzero(torques).tolist():
             total[self._rotors[i]] += torques[i]
