@@ -44,7 +44,7 @@ def damages(result: Result, error: float) -> list[float]:
     return [pseudo_damage(repeated(forces[name])) for name in CHANNELS]
 
 
-def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
+def log_damage_over_pitch_error(result: Result, reach: float, file: str = "") -> CubicSpline:
     """Logarithm of the damage of all section forces by the true ones', over a constant error of the pitch (rad).
 
     Raises InputError, which names the scene's file, for a run without damage.
