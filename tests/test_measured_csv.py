@@ -78,6 +78,13 @@ def test_every_form_that_is_meant_is_read_as_the_plain_file(form):
     assert ended(own) <= 1e-16, own.text()[:200]
 
 
+def test_a_tab_is_no_blank_before_a_time():
+    """It may stand for a lost digit: 23:59:59 would become 3:59:59, a gap of 20 hours before the next row."""
+    form = next(form for _, _, form, truth in READ if set(truth) == set(usual()) and form.times[0].startswith("23:"))
+    text = form.text().replace(form.times[0], "\t" + form.times[0][1:], 1)
+    assert "a tab in it" in str(ended(form, text))
+
+
 @settings(max_examples=150, deadline=None)
 @given(
     FORMS,

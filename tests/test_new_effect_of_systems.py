@@ -98,10 +98,10 @@ NEW = {
         0.5,
         "{}",
         """
-    from models.contact.material import Material, Pair
+    from models.contact.material import Material, MaterialPair
 
     soft = (Material(E=p.share * body.E, nu=body.nu) for body in (built.pair.wheel, built.pair.rail))
-    return replace(built, pair=Pair(*soft))
+    return replace(built, pair=MaterialPair(*soft))
 """,
         beside=("saturation",),
     ),

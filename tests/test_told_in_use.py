@@ -64,7 +64,7 @@ def pressing():
 
 def test_a_sweep_tells_in_table_columns_json_and_code(tmp_path, monkeypatch, capsys):
     (tmp_path / "s.toml").write_text(SCENE)
-    monkeypatch.setattr(sweep, "draw_sweep", lambda swept, folder: [])
+    monkeypatch.setattr("studies.command.sweep_figure.draw_sweep", lambda swept, folder: [])
     asked = [str(tmp_path / "s.toml"), "--engine", "reference", "--sweep", "effects.road.speed=5,20", "--strict"]
     asked += ["--workers", "1"]
     with pytest.raises(SystemExit) as ended:

@@ -34,7 +34,7 @@ def _counted_loads() -> Iterator[list[int]]:
 
             return counted
 
-    with patch.object(exudyn, "Clock", CountingClock):
+    with patch.object(exudyn, "SignalClock", CountingClock):
         yield calls
 
 

@@ -194,10 +194,15 @@ def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int
 
 
 def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
-    """Error at the first cell that is not a number; None where there is none such."""
+    """Error at the first cell that is not a number, or has a tab in a time; None where there is none such."""
     comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)
+        time = cells[layout.clock].replace(_WRONG, ",") if layout.stamps and layout.clock < len(cells) else ""
+        if not time.isprintable():
+            place = f"line {line_number + i}, column {layout.names[layout.clock]!r}"
+            allowed = "a time is needed; a tab in it, or another sign that nobody sees, may stand for a lost digit"
+            return InputError(path, place, time.strip(), allowed)
         for column in (column for column in layout.numbers if column < len(cells)):
             cell = cells[column]
             try:
