@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, SpatialVehicle, SpringDamper, Vector
-from models.vehicles.spatial_linear import UNIT, End, preloads
+from models.vehicles.kinematics import UNIT, End
+from models.vehicles.spatial_linear import preloads
 
 
 @dataclass
